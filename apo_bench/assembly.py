@@ -1,0 +1,154 @@
+"""The topology of a demonstration, in the paper's words: contacts, operations, ODLs. Symbols, no poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Face, Solid
+
+
+class PartFace(NamedTuple):
+    """A face of a part, written `castle1.topP`."""
+
+    part: str
+    face: str
+
+    def __str__(self) -> str:
+        return f"{self.part}.{self.face}"
+
+
+class Contact(NamedTuple):
+    """A face of the manipulated part lies on a face of the environment part (an arc of Section 3.1)."""
+
+    manipulated: PartFace
+    environment: PartFace
+
+    def __str__(self) -> str:
+        return f"{self.manipulated} on {self.environment}"
+
+
+@final
+@dataclass(frozen=True)
+class Operation:
+    """One act, without numbers: who moves, which contacts it makes, whom it carries."""
+
+    main: str
+    contacts: tuple[Contact, ...] = ()
+    carries: tuple[str, ...] = ()
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Every part that moves, the main one first."""
+        return (self.main, *self.carries)
+
+
+class Term(NamedTuple):
+    """One term of an ODL: the motion parameter T of an operation (counted from 0), or its inverse."""
+
+    operation: int
+    inverse: bool = False
+
+
+ODL = tuple[Term, ...]
+"""An operation dependency list (Section 3.2.1): T6 T5^-1 T2 is `(Term(5), Term(4, True), Term(1))`."""
+
+
+class Relation(NamedTuple):
+    """A contact with its history: disappeared relations are kept (Section 3.2.2)."""
+
+    contact: Contact
+    made: int
+    """The operation that made it, counted from 0."""
+    lost: int | None
+    """The operation that moved one of its parts away, or None while it stands."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """What is taken as certain: solids, operations, fixed parts. It never changes."""
+
+    solids: Mapping[str, Solid]
+    operations: tuple[Operation, ...]
+    fixed: frozenset[str]
+    """Stable objects (Section 2.3): parts that no operation moves, such as the table."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))
+
+    def __len__(self) -> int:
+        return len(self.operations)
+
+    def face(self, of: PartFace) -> Face:
+        return self.solids[of.part].faces[of.face]
+
+    def is_fit(self, contact: Contact) -> bool:
+        """Whether the physical faces stay apart by the clearance when the nominal ones touch."""
+        return self.face(contact.manipulated).fit or self.face(contact.environment).fit
+
+    def odls(self) -> tuple[Mapping[str, ODL], ...]:
+        """The ODL of every part moved so far, after each operation (Section 3.2.1).
+
+        A part that was never moved has none: it rests where it started.
+        """
+        history: list[Mapping[str, ODL]] = []
+        current: dict[str, ODL] = {}
+        for k, operation in enumerate(self.operations):
+            before = current.get(operation.main, ())
+            current = dict(current)
+            for part in operation.carries:
+                current[part] = simplified((Term(k), *inverted(before), *current.get(part, ())))
+            current[operation.main] = (Term(k),)
+            history.append(MappingProxyType(current))
+        return tuple(history)
+
+    def relations(self) -> tuple[Relation, ...]:
+        """Every contact ever made, in the order of the operations."""
+        return tuple(
+            Relation(contact, k, self._lost(contact, k))
+            for k, operation in enumerate(self.operations)
+            for contact in operation.contacts
+        )
+
+    def _lost(self, contact: Contact, made: int) -> int | None:
+        ends = {contact.manipulated.part, contact.environment.part}
+        for k in range(made + 1, len(self.operations)):
+            if len(ends.intersection(self.operations[k].moves)) == 1:
+                return k
+        return None
+
+
+def inverted(odl: Iterable[Term]) -> ODL:
+    """The inverse product: reversed order, each term inverted."""
+    return tuple(Term(k, not inverse) for k, inverse in reversed(tuple(odl)))
+
+
+def simplified(odl: Sequence[Term]) -> ODL:
+    """The same product with neighbours that cancel taken out."""
+    out: list[Term] = []
+    for term in odl:
+        if out and out[-1] == (term.operation, not term.inverse):
+            out.pop()
+        else:
+            out.append(Term(*term))
+    return tuple(out)
+
+
+def spelled(odl: Iterable[Term]) -> str:
+    """The ODL as the paper writes it, counted from 1: `T6 T5^-1 T2`; the empty product is `I`."""
+    return " ".join(f"T{k + 1}{'^-1' if inverse else ''}" for k, inverse in odl) or "I"
+
+
+def product(odl: Iterable[Term], goals: Array) -> Array:
+    """The pose an ODL stands for, given the motion parameters `goals` (n, 4, 4) -> (4, 4)."""
+    T = np.eye(4)
+    for k, inverse in odl:
+        T = T @ (pose.inverse(goals[k]) if inverse else goals[k])
+    return T

@@ -1,0 +1,18 @@
+"""The one error a person sees: what was given, what is allowed, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
+    """A request or a file that cannot be honoured; its message is one clear sentence (CLI: exit code 2)."""
+
+
+def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
+    """`unknown corrector 'papr'; did you mean 'paper'? Known: none, oracle, paper.`"""
+    names = sorted(allowed)
+    near = get_close_matches(given, names, n=1, cutoff=0.5)
+    hint = f"; did you mean '{near[0]}'?" if near else "."
+    return f"unknown {kind} '{given}'{hint} Known: {', '.join(names) or 'none'}."

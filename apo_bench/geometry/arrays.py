@@ -1,0 +1,27 @@
+"""Arrays that stay as they were made."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def frozen(value: ArrayLike, *shape: int | None) -> Array:
+    """A read-only float64 copy of `value`.
+
+    Args:
+        shape: The shape it must have; `None` stands for any length.
+
+    Raises:
+        ValueError: The shape differs, or a number is not finite.
+    """
+    array = np.array(value, dtype=np.float64)
+    if shape and (array.ndim != len(shape) or any(w not in (None, g) for w, g in zip(shape, array.shape, strict=True))):
+        wanted = ", ".join("*" if s is None else str(s) for s in shape)
+        raise ValueError(f"an array of shape ({wanted}) is needed, {array.shape} was given")
+    if not np.isfinite(array).all():
+        raise ValueError("every number must be finite, a NaN or an infinity was given")
+    array.flags.writeable = False
+    return array

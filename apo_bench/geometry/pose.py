@@ -1,0 +1,130 @@
+"""Rigid poses, SE(3), as the paper writes them: 4 x 4 homogeneous matrices, [m].
+
+`T_world_cube` takes cube coordinates to world coordinates, so neighbouring names cancel:
+`T_world_table @ T_table_cube` is `T_world_cube`. A twist is `(x, y, z, rx, ry, rz)`, [m] and [rad], in the
+body's own frame, and acts from the right: `T @ exp(twist)`. Leading axes broadcast.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from apo_bench.geometry.arrays import Array
+
+IDENTITY = np.eye(4)
+IDENTITY.flags.writeable = False
+
+
+def exp(twist: ArrayLike) -> Array:
+    """The displacement a body twist makes, (*, 6) -> (*, 4, 4). A zero twist gives exactly the identity."""
+    twist = np.asarray(twist, dtype=np.float64)
+    K = hat(twist[..., 3:])
+    A, B, C = _series(np.linalg.norm(twist[..., 3:], axis=-1)[..., None, None])
+    T = np.zeros((*twist.shape[:-1], 4, 4))
+    K2 = K @ K
+    T[..., :3, :3] = np.eye(3) + A * K + B * K2
+    T[..., :3, 3] = ((np.eye(3) + B * K + C * K2) @ twist[..., :3, None])[..., 0]
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def log(T: ArrayLike) -> Array:
+    """The shortest body twist that makes the displacement, (*, 4, 4) -> (*, 6); inverse of `exp`."""
+    from scipy.spatial.transform import Rotation
+
+    T = np.asarray(T, dtype=np.float64)
+    w = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_rotvec().reshape(*T.shape[:-2], 3)
+    angle = np.linalg.norm(w, axis=-1)[..., None, None]
+    near = angle < 1e-4
+    a = np.where(near, 1.0, angle)
+    D = np.where(near, 1 / 12 + angle**2 / 720, (1 - a * np.sin(a) / (2 * (1 - np.cos(a)))) / a**2)
+    K = hat(w)
+    v = ((np.eye(3) - K / 2 + D * K @ K) @ T[..., :3, 3, None])[..., 0]
+    return np.concatenate([v, w], axis=-1)
+
+
+def inverse(T: ArrayLike) -> Array:
+    """The inverse displacement, (*, 4, 4) -> (*, 4, 4)."""
+    T = np.asarray(T, dtype=np.float64)
+    R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
+    out = np.zeros(T.shape)
+    out[..., :3, :3] = R_inverse
+    out[..., :3, 3] = -(R_inverse @ T[..., :3, 3, None])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def hat(w: ArrayLike) -> Array:
+    """The cross-product matrix, (*, 3) -> (*, 3, 3)."""
+    w = np.asarray(w, dtype=np.float64)
+    out = np.zeros((*w.shape[:-1], 3, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -w[..., 2], w[..., 1], -w[..., 0]
+    return out - np.swapaxes(out, -1, -2)
+
+
+def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+    """A pose from a position [m] and turns about the fixed x, then y, then z axis [degrees].
+
+    Quarter turns are exact, so that parts that stand upright stand exactly upright.
+    """
+    rx, ry, rz = (_turn(axis, angle) for axis, angle in enumerate(np.asarray(turn_deg, dtype=np.float64)))
+    T = np.eye(4)
+    T[:3, :3] = rz @ ry @ rx
+    T[:3, 3] = position
+    return T
+
+
+def pack(T: ArrayLike) -> Array:
+    """`(x, y, z, qw, qx, qy, qz)` with qw >= 0, (*, 4, 4) -> (*, 7)."""
+    from scipy.spatial.transform import Rotation
+
+    T = np.asarray(T, dtype=np.float64)
+    q = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return np.concatenate([T[..., :3, 3], q.reshape(*T.shape[:-2], 4)], axis=-1)
+
+
+def unpack(pose: ArrayLike) -> Array:
+    """Inverse of `pack`, (*, 7) -> (*, 4, 4); the quaternion is normalised.
+
+    Raises:
+        ValueError: A quaternion is zero.
+    """
+    from scipy.spatial.transform import Rotation
+
+    pose = np.asarray(pose, dtype=np.float64)
+    T = np.zeros((*pose.shape[:-1], 4, 4))
+    q = pose[..., 3:].reshape(-1, 4)
+    T[..., :3, :3] = Rotation.from_quat(q, scalar_first=True).as_matrix().reshape(*pose.shape[:-1], 3, 3)
+    T[..., :3, 3] = pose[..., :3]
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def apply(T: ArrayLike, points: ArrayLike) -> Array:
+    """Points (k, 3) taken through one pose (4, 4), -> (k, 3)."""
+    T = np.asarray(T, dtype=np.float64)
+    return np.asarray(points, dtype=np.float64) @ T[:3, :3].T + T[:3, 3]
+
+
+def _series(angle: Array) -> tuple[Array, Array, Array]:
+    """sin(a)/a, (1-cos a)/a^2 and (a-sin a)/a^3, also at zero."""
+    near = angle < 1e-4
+    a = np.where(near, 1.0, angle)
+    A = np.where(near, 1.0 - angle**2 / 6, np.sin(a) / a)
+    B = np.where(near, 0.5 - angle**2 / 24, (1 - np.cos(a)) / a**2)
+    C = np.where(near, 1 / 6 - angle**2 / 120, (a - np.sin(a)) / a**3)
+    return A, B, C
+
+
+def _turn(axis: int, degrees: float) -> Array:
+    quarter = round(degrees / 90.0)
+    if degrees == 90.0 * quarter:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    else:
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[i, i] = R[j, j] = c
+    R[i, j], R[j, i] = -s, s
+    return R

@@ -1,0 +1,82 @@
+"""Solids and their named faces, in the frame of the solid, [m]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array, frozen
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A flat polygon, convex or not, with or without holes, that looks outwards along its normal."""
+
+    name: str
+    outline: Array
+    """Corners, shape (n, 3), counter-clockwise seen from outside, [m]."""
+    holes: tuple[Array, ...] = ()
+    """Corners of each hole, shape (k, 3), clockwise seen from outside, [m]."""
+    fit: bool = False
+    """The physical part recedes here by the clearance; the nominal face does not."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outline", frozen(self.outline, None, 3))
+        object.__setattr__(self, "holes", tuple(frozen(hole, None, 3) for hole in self.holes))
+
+    @property
+    def normal(self) -> Array:
+        """The outward unit normal, (3,) (Newell's formula: right for concave outlines too)."""
+        following = np.roll(self.outline, -1, axis=0)
+        n = np.cross(self.outline, following).sum(axis=0)
+        return n / np.linalg.norm(n)
+
+    @property
+    def plane(self) -> Array:
+        """The face equation (n_x, n_y, n_z, -d) of Eq. 1, (4,), d in [m]."""
+        n = self.normal
+        return np.append(n, -n @ self.outline.mean(axis=0))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Box:
+    """An axis-aligned box in the frame of its solid, [m]."""
+
+    name: str
+    center: Array
+    half: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen(self.center, 3))
+        object.__setattr__(self, "half", frozen(self.half, 3))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A rigid part of nominal size: named faces, and the boxes whose union it is."""
+
+    name: str
+    faces: Mapping[str, Face]
+    boxes: tuple[Box, ...]
+    centroid: Array
+    """Centre of volume of the union, (3,), [m]; the centre of mass, since parts are homogeneous."""
+    volume: float
+    """[m^3]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "faces", MappingProxyType(dict(self.faces)))
+        object.__setattr__(self, "centroid", frozen(self.centroid, 3))
+
+    @property
+    def bounds(self) -> Array:
+        """Lowest and highest corner of the solid, (2, 3), [m]."""
+        low = np.min([box.center - box.half for box in self.boxes], axis=0)
+        high = np.max([box.center + box.half for box in self.boxes], axis=0)
+        return np.array([low, high])

@@ -1,0 +1,44 @@
+"""Everything a user may bring comes by short name, as `module:name`, or as the object itself."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from typing import Any
+
+from apo_bench.errors import InputError, unknown
+
+
+def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
+    """The object a name stands for; anything that is not a string is returned as it is.
+
+    Args:
+        given: A short name out of `known`, `"package.module:name"`, or the object itself.
+        known: Short name -> `"package.module:name"`.
+        kind: What it is, for the message: `corrector`, `noise model`.
+
+    Raises:
+        InputError: No such name, module or attribute.
+    """
+    if not isinstance(given, str):
+        return given
+    if ":" not in given:
+        if given not in known:
+            raise InputError(unknown(kind, given, known) + " Or give your own as 'package.module:name'.")
+        given = known[given]
+    module_name, _, attribute = given.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise InputError(f"the {kind} '{given}' cannot be imported: {error}.") from error
+    try:
+        value: Any = module
+        for name in attribute.split("."):
+            value = getattr(value, name)
+    except AttributeError as error:
+        raise InputError(unknown(f"{kind} in module {module_name}", attribute, _public(module))) from error
+    return value
+
+
+def _public(module: Any) -> list[str]:
+    return [name for name in vars(module) if not name.startswith("_")]

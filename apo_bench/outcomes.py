@@ -1,0 +1,47 @@
+"""The closed list of stages and codes: every way a trial can end, with its sentence.
+
+A physical failure is a result, not an exception. `{part}` and `{operation}` (counted from 1) are filled in
+where the outcome is made; no other words appear in a row.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+STAGES = ("demonstrate", "observe", "correct", "plan", "pick", "lift", "carry", "attach", "release", "depart", "judge")
+"""Where a trial can fail, in the order of a trial; `done` is where one that did not fail ends."""
+
+CODES = MappingProxyType(
+    {
+        "ok": "every operation was carried out",
+        # demonstrate
+        "demonstration_failed": "the human's own assembly was not right at the end",
+        # observe
+        "not_seen": "operation {operation} was not seen",
+        # correct
+        "inconsistent": "the contacts cannot all hold: the solver came to rest with a gap above the threshold",
+        "not_converged": "the solver did not come to rest within its iterations",
+        "not_finite": "the solver met a number that is not finite",
+        # plan
+        "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
+        "unstable_goal": "at the goal of operation {operation} the centre of mass of {part} lies beside its support",
+        # pick .. depart
+        "lost_grasp": "{part} was lost from the gripper in operation {operation}",
+        "force_stop": "the motion of operation {operation} ({part}) was stopped by contact force before its goal",
+        "collision": "the arm struck {part} in operation {operation}",
+        "unstable_simulation": "the simulation became unstable in operation {operation}",
+        # judge
+        "not_made": "a contact of an operation was never made, because the operation was not finished",
+        "gap": "faces that should touch are too far apart or too deep",
+        "overlap": "faces that should touch overlap too little",
+        "penetration": "parts are inside each other",
+        "pushed": "a part that was already in place was pushed away",
+        "not_released": "a part is still held",
+        "not_at_rest": "a part still moves",
+    }
+)
+
+
+def sentence(code: str, *, part: str = "", operation: int = 0) -> str:
+    """The sentence of a code; `operation` counted from 0."""
+    return CODES[code].format(part=part, operation=operation + 1)

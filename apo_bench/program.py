@@ -1,0 +1,204 @@
+"""The numbers that flow, under different names by role, so that a plan cannot be mixed up with the truth.
+
+Goals are one pose per operation, shape (n, 4, 4), world frame, [m]. Parts that start somewhere known have a
+`start` pose; for a fixed part that is where it stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly
+from apo_bench.geometry.arrays import Array, frozen
+
+Poses = Mapping[str, Array]
+"""Part name -> pose (4, 4) in the world, [m]."""
+
+
+def frozen_poses(poses: Poses) -> Poses:
+    """A read-only copy."""
+    return MappingProxyType({name: frozen(T, 4, 4) for name, T in poses.items()})
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """The truth of a trial: the consistent goals a seed draws, before any human error."""
+
+    goals: Array
+    start: Poses
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
+        object.__setattr__(self, "start", frozen_poses(self.start))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """What the human did, without measurement error."""
+
+    assembly: Assembly
+    start: Poses
+    goals: Array
+    """(n, 4, 4): pose of each operation's main part when the hand had let go of it and it rested."""
+    final: Poses
+    """Where every part lay at the end: small late adjustments show here and nowhere else."""
+    careless: Array
+    """(n, 6, 6) covariance [m, rad] that the human's carelessness adds, body frame of each main part."""
+    code: str = "ok"
+    """`ok`, or why the demonstration itself failed."""
+
+    def __post_init__(self) -> None:
+        n = len(self.assembly)
+        object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
+        object.__setattr__(self, "careless", frozen(self.careless, n, 6, 6))
+        object.__setattr__(self, "start", frozen_poses(self.start))
+        object.__setattr__(self, "final", frozen_poses(self.final))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What was seen: all a corrector may use."""
+
+    assembly: Assembly
+    start: Poses
+    goals: Array
+    """(n, 4, 4)."""
+    covariance: Array
+    """(n, 6, 6), of the body twist by which each goal is wrong, [m, rad]."""
+    seen: Array
+    """(n,) bool: whether the operation was seen at all."""
+
+    def __post_init__(self) -> None:
+        n = len(self.assembly)
+        object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
+        object.__setattr__(self, "covariance", frozen(self.covariance, n, 6, 6))
+        object.__setattr__(self, "start", frozen_poses(self.start))
+        seen = np.array(self.seen, dtype=np.bool_)
+        if seen.shape != (n,):
+            raise ValueError(f"`seen` needs shape ({n},), {seen.shape} was given")
+        seen.flags.writeable = False
+        object.__setattr__(self, "seen", seen)
+
+
+class Step(NamedTuple):
+    """One entry of a schedule: do an operation (counted from 0), or undo it."""
+
+    operation: int
+    undo: bool = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What the robot is asked to do."""
+
+    assembly: Assembly
+    start: Poses
+    goals: Array
+    schedule: tuple[Step, ...] = field(default=())
+    """Empty stands for: every operation once, in order."""
+
+    def __post_init__(self) -> None:
+        n = len(self.assembly)
+        object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
+        object.__setattr__(self, "start", frozen_poses(self.start))
+        if not self.schedule:
+            object.__setattr__(self, "schedule", tuple(Step(k) for k in range(n)))
+
+
+class Iterate(NamedTuple):
+    """One turn of a solver, kept for the reader and the plots."""
+
+    gap_m: float
+    """Largest |e| before the step."""
+    rank: int
+    step: float
+    """Length of the scaled step, [m]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What a corrector returns: the goals, and what happened."""
+
+    goals: Array
+    status: str
+    """`converged`, or one of the endings in `apo_bench.outcomes`."""
+    sentence: str
+    freed: tuple[int, ...]
+    """Operations whose motion parameters were free, counted from 0, most recent first."""
+    gap_before_m: float
+    gap_after_m: float
+    rank: int
+    trace: tuple[Iterate, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
+
+    @property
+    def ok(self) -> bool:
+        return self.status == "converged"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The physical state when an operation was over, or at the end."""
+
+    poses: Poses
+    """Every part, fixed ones too."""
+    penetration_m: float
+    """Deepest overlap of two physical geoms of different parts, >= 0."""
+    speed_m_s: float
+    """Fastest centre of a part."""
+    spin_rad_s: float
+    """Fastest turning part."""
+    released: bool
+    """Whether no hand or gripper touches a part."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "poses", frozen_poses(self.poses))
+
+
+@final
+@dataclass(frozen=True)
+class Outcome:
+    """How a replay ended, as the robot knows it; whether the assembly is right is the judge's to say."""
+
+    stage: str
+    code: str
+    """`ok`, or one of the codes in `apo_bench.outcomes`."""
+    operation: int | None
+    """Counted from 0."""
+    sentence: str
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """What the judge looks at: nothing but physics."""
+
+    after: tuple[Snapshot | None, ...]
+    """After each operation; None for one that was not finished."""
+    final: Snapshot | None
+    """None if the simulation became unstable."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ReplayResult:
+    """One replay: what was reached and how it went."""
+
+    reached: Reached
+    outcome: Outcome
+    peak_force_n: float
+    """Largest net contact force on a part that the robot held (the gripper's own forces excluded)."""
+    sim_seconds: float

@@ -1,0 +1,31 @@
+"""What the judge demands: one set of numbers, stated in the scenario and repeated in every row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+
+@final
+@dataclass(frozen=True)
+class Thresholds:
+    """Lengths in mm, angles in degrees, as in files and rows."""
+
+    fit_margin_mm: float = 0.1
+    """Strict: a fit contact may be off by the clearance plus this."""
+    support_mm: float = 0.1
+    """Strict: any other contact may be off by this."""
+    overlap_fraction: float = 0.5
+    """Strict and loose: the faces overlap by at least this part of the true overlap."""
+    penetration_mm: float = 0.05
+    """Strict: no two physical geoms of different parts are deeper in each other."""
+    pushed_mm: float = 1.0
+    """Strict: no part that was in place moved its centre by more."""
+    rest_mm_s: float = 1.0
+    """Strict: every part is slower."""
+    rest_deg_s: float = 2.0
+    """Strict: every part turns slower."""
+    loose_gap_mm: float = 5.0
+    """Loose: a contact may be off by this."""
+    loose_angle_deg: float = 5.0
+    """Loose: the normals of touching faces may be off by this."""
