@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array, frozen
@@ -73,8 +74,10 @@ class Observation:
     """(n, 4, 4)."""
     covariance: Array
     """(n, 6, 6), of the body twist by which each goal is wrong, [m, rad]."""
-    seen: Array
-    """(n,) bool: whether the operation was seen at all."""
+    seen: NDArray[np.bool_]
+    """(n,): whether the operation was seen at all."""
+    gap_m: float = 1e-4
+    """Largest |e| at which the contact equations count as solved, [m]."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
