@@ -1,0 +1,112 @@
+"""How much of one face covers another, and where: the corners at which a contact is measured (Fig. 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.solid import Face
+
+EDGE_ON = 1e-6
+"""Cosine between the normals below which a face is seen edge-on and covers nothing."""
+SLIVER_M2 = 1e-12
+"""Pieces smaller than this, (0.001 mm)^2, are rounding, not overlap."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """What is left of a face when another one is laid on it along the normal."""
+
+    corners: Array
+    """Every corner of every piece, of holes too, (k, 3), world, [m], on the plane of the lower face; (0, 3) if none."""
+    area: float
+    """[m^2]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "corners", frozen(self.corners, None, 3))
+
+    def __bool__(self) -> bool:
+        return self.area > 0.0
+
+
+NOTHING = Overlap(np.zeros((0, 3)), 0.0)
+
+
+def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
+    """Project `face` along the normal of `on` onto the plane of `on` and clip it there (Section 2.2, Fc of Fig. 1).
+
+    Concave outlines, holes and several pieces are allowed. How far the planes are apart does not matter.
+
+    Args:
+        face: The face that is projected, in the frame of its solid.
+        T_face: World pose of that solid, (4, 4), [m].
+        on: The face on whose plane the overlap lies, in the frame of its solid.
+        T_on: World pose of that solid, (4, 4), [m].
+
+    Returns:
+        The overlap; nothing, if the faces only touch along an edge or `face` is seen edge-on.
+    """
+    T_on_face = pose.inverse(T_on) @ T_face
+    if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < EDGE_ON:
+        return NOTHING
+    frame = _plane_frame(on)
+    lower = _polygon(on, pose.inverse(frame))
+    upper = _polygon(face, pose.inverse(frame) @ T_on_face)
+    pieces = [piece for piece in _pieces(upper.intersection(lower)) if piece.area > SLIVER_M2]
+    if not pieces:
+        return NOTHING
+    flat = np.concatenate([_corners(piece) for piece in pieces])
+    corners = pose.apply(T_on @ frame, np.column_stack([flat, np.zeros(len(flat))]))
+    return Overlap(corners, float(sum(piece.area for piece in pieces)))
+
+
+def area(face: Face) -> float:
+    """The area of a face without its holes, [m^2]."""
+    return float(_polygon(face, pose.inverse(_plane_frame(face))).area)
+
+
+def _plane_frame(face: Face) -> Array:
+    """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
+    edges = np.roll(face.outline, -1, axis=0) - face.outline
+    longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]
+    z, x = face.normal, longest / np.linalg.norm(longest)
+    frame = np.eye(4)
+    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    frame[:3, 3] = face.outline[0]
+    return frame
+
+
+def _polygon(face: Face, T: Array) -> Any:
+    """The face in the plane z = 0 after `T`: heights are dropped, which is the projection along z."""
+    from shapely import Polygon
+
+    return Polygon(pose.apply(T, face.outline)[:, :2], [pose.apply(T, hole)[:, :2] for hole in face.holes])
+
+
+def _pieces(shape: Any) -> Iterator[Any]:
+    """The polygons in a shape; points and lines are left out."""
+    if shape.geom_type == "Polygon":
+        yield shape
+    for part in getattr(shape, "geoms", ()):
+        yield from _pieces(part)
+
+
+def _corners(piece: Any) -> Array:
+    """Corners of outline and holes of a polygon, (k, 2), each once, none in the middle of a straight edge."""
+    rings = [np.asarray(ring.coords)[:-1, :2] for ring in (piece.exterior, *piece.interiors)]
+    return np.concatenate([ring[_bends(ring)] for ring in rings])
+
+
+def _bends(ring: Array) -> NDArray[np.bool_]:
+    """Which points of a closed ring (k, 2) are corners: not within 1e-9 m of the line through their neighbours."""
+    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    chord = np.maximum(np.linalg.norm(before + after, axis=1), 1e-12)
+    return np.abs(across) > 1e-9 * chord
