@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.polygon import straightened
 from apo_bench.geometry.solid import Face
 
 EDGE_ON = 1e-6
@@ -99,14 +99,6 @@ def _pieces(shape: Any) -> Iterator[Any]:
 
 
 def _corners(piece: Any) -> Array:
-    """Corners of outline and holes of a polygon, (k, 2), each once, none in the middle of a straight edge."""
-    rings = [np.asarray(ring.coords)[:-1, :2] for ring in (piece.exterior, *piece.interiors)]
-    return np.concatenate([ring[_bends(ring)] for ring in rings])
-
-
-def _bends(ring: Array) -> NDArray[np.bool_]:
-    """Which points of a closed ring (k, 2) are corners: not within 1e-9 m of the line through their neighbours."""
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    chord = np.maximum(np.linalg.norm(before + after, axis=1), 1e-12)
-    return np.abs(across) > 1e-9 * chord
+    """Corners of outline and holes of a polygon, (k, 2)."""
+    rings = (piece.exterior, *piece.interiors)
+    return np.concatenate([straightened(np.asarray(ring.coords)[:-1, :2]) for ring in rings])

@@ -1,0 +1,98 @@
+"""A part file becomes a solid with named faces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.geometry.solid import Face, Solid
+from apo_bench.parts.faces import SIDES, Surface, unite
+from apo_bench.parts.mjcf import Mark, PartFile, read_part
+from apo_bench.resources import folder
+
+ON_FACE_M = 1e-6
+"""A site lies on a face if it is this near to its plane and this far from its edges."""
+
+
+def part_names() -> tuple[str, ...]:
+    """The short names of the parts that come with the package."""
+    return tuple(sorted(path.stem for path in (folder("assets") / "parts").glob("*.xml")))
+
+
+def part_path(given: str | Path) -> Path:
+    """The file a short name or a path stands for.
+
+    Raises:
+        InputError: No part has that short name.
+    """
+    if isinstance(given, Path) or given.endswith(".xml") or "/" in given or "\\" in given:
+        return Path(given)
+    if given not in part_names():
+        raise InputError(unknown("part", given, part_names()) + " Or give the path of an MJCF file, ending in .xml.")
+    return folder("assets") / "parts" / f"{given}.xml"
+
+
+def load_part(given: str | Path) -> Solid:
+    """The solid of a part file: the union of its boxes, faces named by the sites that lie on them.
+
+    Faces without a site are called `auto_px_1`, ...: outward direction, and their number along it. The solid is
+    named after the file.
+
+    Args:
+        given: The short name of a part of the package, or the path of an MJCF file.
+
+    Raises:
+        InputError: The file breaks a rule; the message names file, element and remedy.
+    """
+    file = read_part(part_path(given))
+    union = unite(file.boxes)
+    if union.pieces != 1:
+        raise InputError(f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece.")
+    marks = _matched(file, union.surfaces)
+    faces = [_face(surface, marks.get(k), _number(union.surfaces, k)) for k, surface in enumerate(union.surfaces)]
+    faces.sort(key=lambda face: face.name.startswith("auto_"))
+    return Solid(file.path.stem, {face.name: face for face in faces}, file.boxes, union.centroid, union.volume)
+
+
+def _matched(file: PartFile, surfaces: tuple[Surface, ...]) -> dict[int, Mark]:
+    """Which mark lies on which surface."""
+    found: dict[int, Mark] = {}
+    for mark in file.marks:
+        k = _under(file, mark, surfaces)
+        if k in found:
+            raise InputError(
+                f"{file.path}: sites '{found[k].name}' and '{mark.name}' lie on one face; keep one of them."
+            )
+        found[k] = mark
+    return found
+
+
+def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
+    from shapely import Point
+
+    where = ", ".join(f"{1e3 * x:g}" for x in mark.point)
+    for k, surface in enumerate(surfaces):
+        if abs(mark.point[surface.axis] - surface.height) > ON_FACE_M:
+            continue
+        point = Point(surface.flat(mark.point[None])[0])
+        if surface.shape.distance(point) > ON_FACE_M:
+            continue
+        if surface.shape.boundary.distance(point) <= ON_FACE_M:
+            raise InputError(
+                f"{file.path}: site '{mark.name}' at ({where}) mm lies on an edge between faces; move it into one face."
+            )
+        return k
+    raise InputError(f"{file.path}: site '{mark.name}' at ({where}) mm lies on no face; move it onto the surface.")
+
+
+def _number(surfaces: tuple[Surface, ...], k: int) -> int:
+    """The place of a surface among those that look the same way, counted from 1, named or not."""
+    return 1 + sum(surface.side == surfaces[k].side for surface in surfaces[:k])
+
+
+def _face(surface: Surface, mark: Mark | None, number: int) -> Face:
+    outline, *holes = surface.rings()
+    name = mark.name if mark else f"auto_{SIDES[surface.side]}_{number}"
+    return Face(name, np.asarray(outline), tuple(holes), fit=bool(mark and mark.fit))
