@@ -124,6 +124,8 @@ class Scenario:
     clearance_mm: float
     gap_mm: float
     """Largest |e| at which the contact equations count as solved."""
+    follows_site: frozenset[str] = frozenset()
+    """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goals", frozen(self.goals, len(self.assembly), 4, 4))
