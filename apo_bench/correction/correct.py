@@ -1,0 +1,92 @@
+"""Correct an observation by any corrector: by name, as `module:name`, or the object itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from apo_bench import outcomes
+from apo_bench.correction.equations import equations, gap, largest
+from apo_bench.correction.newton import CUT_OFF, LENGTH_M, least_step
+from apo_bench.correction.paper import sentence
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.rigid import rigid
+from apo_bench.names import resolve
+from apo_bench.program import Correction, Observation
+
+Corrector = Callable[[Observation], Correction]
+"""Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
+
+CORRECTORS = MappingProxyType({"paper": "apo_bench.correction.paper:paper"})
+STATUSES = ("converged", "not_seen", "inconsistent", "not_converged", "not_finite")
+
+
+def correct(seen: Observation, corrector: Any = "paper") -> Correction:
+    """What the corrector makes of an observation.
+
+    Args:
+        corrector: A name out of `CORRECTORS`, `"package.module:name"`, or a callable `Observation -> Correction`;
+            bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
+
+    Raises:
+        InputError: There is no such corrector, or it returned something else.
+    """
+    chosen = resolve(corrector, CORRECTORS, "corrector")
+    name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
+    if not callable(chosen) or isinstance(chosen, type):
+        raise InputError(
+            f"the corrector '{name}' is {_kind(chosen)}; give a function that takes an Observation "
+            "and returns a Correction, or an object with such a __call__."
+        )
+    found = chosen(seen)
+    if not isinstance(found, Correction):
+        return _wrapped(seen, _bare(found, len(seen.goals), name))
+    if found.status not in STATUSES:
+        raise InputError(
+            f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
+        )
+    _bare(found.goals, len(seen.goals), name)
+    return found
+
+
+def _bare(found: Any, n: int, name: str) -> Array:
+    """Goals as an array (n, 4, 4), numbers that are not finite let through."""
+    try:
+        goals = np.array(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        goals = np.zeros(0)
+    if goals.shape != (n, 4, 4):
+        given = f"an array of shape {found.shape}" if isinstance(found, np.ndarray) else _kind(found)
+        raise InputError(f"the corrector '{name}' returned {given}; return a Correction or goals of shape ({n}, 4, 4).")
+    for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~rigid(goals)):
+        raise InputError(
+            f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; "
+            "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)."
+        )
+    return goals
+
+
+def _wrapped(seen: Observation, goals: Array) -> Correction:
+    """Bare goals with what can be measured about them; goals that are not finite leave what was seen."""
+    before = gap(seen.assembly, seen.start, seen.goals)
+    if not np.isfinite(goals).all():
+        return Correction(seen.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
+    system = equations(seen.assembly, seen.start, goals)
+    e, J = system.linearised(goals)
+    _, rank = least_step(J / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(goals)), e, CUT_OFF)
+    freed = tuple(int(k) for k in np.flatnonzero((goals != seen.goals).any(axis=(1, 2)))[::-1])
+    after = largest(e)
+    said = sentence("converged", seen.gap_m) if after <= seen.gap_m else "the corrector returned goals and no status"
+    return Correction(goals, "converged", said, freed, before, after, rank)
+
+
+def _kind(value: Any) -> str:
+    """`a str`, `an int`, `None`, `a class`."""
+    if value is None or isinstance(value, type):
+        return "None" if value is None else "a class"
+    name = type(value).__name__
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"

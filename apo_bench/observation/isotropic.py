@@ -1,0 +1,50 @@
+"""Noise that is right on SE(3): the same in every direction, in the frame of the part that was seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.noise import Level
+from apo_bench.program import Demonstration, Observation
+
+FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)
+"""Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
+FLOOR.flags.writeable = False
+
+
+@final
+@dataclass(frozen=True)
+class Isotropic:
+    """Every goal is seen at `T exp(xi)`, xi a Gaussian body twist of zero mean.
+
+    Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
+    exactly zero: the goals are then those that were shown, bit for bit.
+    """
+
+    level: Level
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        xi = rng.standard_normal((len(assembly), 6)) * sigma
+        goals = np.where(np.any(xi, axis=1, keepdims=True)[..., None], shown.goals @ pose.exp(xi), shown.goals)
+        covariance = floored(np.diag(sigma**2) + shown.careless)
+        return Observation(assembly, shown.start, goals, covariance, np.ones(len(assembly), dtype=np.bool_))
+
+
+def floored(covariance: Array) -> Array:
+    """The least covariance (n, 6, 6) above the given one that says at least `FLOOR` in every direction.
+
+    In units of the floor, eigenvalues below 1 are raised to 1, so the result is symmetric and positive definite.
+    """
+    unit = np.outer(FLOOR, FLOOR)
+    w, V = np.linalg.eigh(covariance / unit)
+    raised = unit * ((V * np.maximum(w, 1.0)[:, None]) @ np.swapaxes(V, -1, -2))
+    return np.where(
+        np.all(w >= 1.0, axis=1, keepdims=True)[..., None], covariance, (raised + np.swapaxes(raised, -1, -2)) / 2
+    )

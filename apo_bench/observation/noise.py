@@ -1,0 +1,59 @@
+"""What a noise model is, and how to name one."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Assembly
+from apo_bench.errors import InputError
+from apo_bench.names import resolve
+from apo_bench.program import Demonstration, Observation
+
+Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
+"""Any function `(assembly, shown, rng) -> Observation` is a noise model."""
+
+NOISES = MappingProxyType({"isotropic": "apo_bench.observation.isotropic:Isotropic"})
+
+
+class Level(NamedTuple):
+    """How much noise: standard deviation per axis."""
+
+    mm: float
+    deg: float
+
+
+def make_noise(given: Any, level: Level) -> Noise:
+    """The noise model that a name stands for.
+
+    Args:
+        given: A name out of `NOISES`, `"package.module:name"`, or the object: a class is made with the level, a
+            function `(assembly, shown, rng) -> Observation` is used as it is.
+        level: How much noise.
+
+    Raises:
+        InputError: There is no such noise model, or the level is negative or not finite.
+    """
+    for value, unit in zip(level, ("mm", "degrees"), strict=True):
+        if not (math.isfinite(value) and value >= 0.0):
+            raise InputError(f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.")
+    model = resolve(given, NOISES, "noise model")
+    name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
+    if isinstance(model, type):
+        _check(model, 1, f"the noise model '{name}' is a class that cannot be made with one argument, the level")
+        model = model(level)
+    _check(model, 3, f"the noise model '{name}' cannot be called with (assembly, shown, rng)")
+    return model
+
+
+def _check(model: Any, arguments: int, complaint: str) -> None:
+    """Whether it can be called with so many arguments."""
+    try:
+        inspect.signature(model).bind(*[None] * arguments)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{complaint}; give a function (assembly, shown, rng) -> Observation.") from error
