@@ -1,0 +1,220 @@
+"""The tables [parts] and [[operations]] of a scenario file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Contact, Operation, PartFace
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid
+from apo_bench.parts import load_part, part_path
+from apo_bench.parts.mjcf import NAME
+from apo_bench.scenario import Attach, Grasp, Shift
+from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
+from apo_bench.strict_json import Node
+
+TRAVEL_M = 0.05
+"""How far before its goal the line of attach begins, where the file does not say."""
+LEVEL = 1e-6
+"""Vertical component below which a unit vector is level."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One entry of [parts]."""
+
+    path: Path
+    solid: Solid
+    fixed: bool
+    follows_site: bool
+    start: Array
+    """(4, 4), [m]."""
+    color: tuple[float, float, float] | None
+
+
+class Entry(NamedTuple):
+    """One entry of [[operations]]."""
+
+    operation: Operation
+    goal: Array
+    """(4, 4), frame of the assembly, [m]."""
+    attach: Attach
+    grasp: Grasp
+    shifts: tuple[Shift, ...]
+
+
+def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
+    """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
+    if not isinstance(node.value, dict) or not node.value:
+        node.fail("at least one table [parts.NAME] is needed")
+    solids: dict[Path, Solid] = {}
+    return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
+
+
+def _part(node: Node, name: str, folder: Path, solids: dict[Path, Solid]) -> Part:
+    if not NAME.fullmatch(name):
+        refuse(node, f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores")
+    keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
+    fixed = "fixed" in keys and keys["fixed"].flag()
+    follows = "follows_site" in keys and keys["follows_site"].flag()
+    if follows and not fixed:
+        refuse(keys["follows_site"], "only a fixed part can follow the site; say fixed = true, or leave this key out")
+    if not fixed and "start" not in keys:
+        refuse(node, "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }")
+    path, solid = _solid(keys["file"], folder, solids)
+    start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
+    return Part(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
+
+
+def _solid(node: Node, folder: Path, solids: dict[Path, Solid]) -> tuple[Path, Solid]:
+    try:
+        path = part_path(node.text())
+        path = path if path.is_absolute() else folder / path
+        if path not in solids:
+            solids[path] = load_part(path)
+    except InputError as error:
+        if str(error).startswith(f"{node.file}, "):
+            raise
+        raise InputError(f"{node.file}, {node.key}: {error}") from error
+    return path, solids[path]
+
+
+def _color(node: Node) -> tuple[float, float, float]:
+    r, g, b = node.numbers(3)
+    if not (min(r, g, b) >= 0 and max(r, g, b) <= 1):
+        node.fail("red, green and blue from 0 to 1 are needed")
+    return float(r), float(g), float(b)
+
+
+def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
+    """Every operation in order, with defaults filled in."""
+    nodes = node.items("operation")
+    if not nodes:
+        refuse(node, "the list is empty; give at least one [[operations]]")
+    poses = {name: part.start for name, part in parts.items()}
+    there = {name for name, part in parts.items() if part.fixed}
+    entries = []
+    for k, each in enumerate(Node(n.value, n.file, n.key) for n in nodes):
+        entry = _entry(each, k, parts, poses, there)
+        entries.append(entry)
+        T = entry.goal @ pose.inverse(poses[entry.operation.main])
+        poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
+        there |= set(entry.operation.moves)
+    return tuple(entries)
+
+
+def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Array], there: set[str]) -> Entry:
+    keys = node.fields(("move", "goal", "contacts"), ("carries", "attach", "grasp", "vary"))
+    main = _movable(keys["move"], parts)
+    carries = tuple(_movable(n, parts) for n in keys["carries"].items("entry")) if "carries" in keys else ()
+    for name in carries:
+        if name == main or carries.count(name) > 1:
+            refuse(keys["carries"], f"'{name}' stands here twice or is the moved part itself; name it once")
+        if name not in there:
+            refuse(keys["carries"], f"'{name}' is carried before any operation has moved it; move it first")
+    goal = read_pose(keys["goal"])
+    contacts = _contacts(keys["contacts"], main, carries, parts, there)
+    return Entry(
+        Operation(main, contacts, carries),
+        goal,
+        _attach(keys.get("attach"), goal),
+        _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
+        _shifts(keys["vary"], k) if "vary" in keys else (),
+    )
+
+
+def _movable(node: Node, parts: Mapping[str, Part]) -> str:
+    name = node.text()
+    if name not in parts:
+        refuse_name(node, "part", name, parts)
+    if parts[name].fixed:
+        refuse(node, f"'{name}' is fixed and cannot be moved; move another part, or take fixed = true away")
+    return name
+
+
+def _contacts(
+    node: Node, main: str, carries: tuple[str, ...], parts: Mapping[str, Part], there: set[str]
+) -> tuple[Contact, ...]:
+    found: list[Contact] = []
+    for pair in (Node(n.value, n.file, f"{node.key}, {n.key}") for n in node.items("contact")):
+        if not isinstance(pair.value, list) or len(pair.value) != 2:
+            pair.fail('a pair is needed, such as ["bottom", "table.top"]')
+        above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
+        contact = Contact(_face(above, main, parts), _face(below, None, parts))
+        if contact.manipulated.part not in (main, *carries):
+            refuse(above, f"'{contact.manipulated.part}' does not move here; name a face of '{main}' or a carried part")
+        if contact.environment.part in (main, *carries):
+            refuse(below, f"'{contact.environment.part}' moves in this operation; name a face of a part that rests")
+        if contact.environment.part not in there:
+            refuse(
+                below, f"'{contact.environment.part}' is not there yet; name a fixed part or one that was moved before"
+            )
+        if contact in found:
+            refuse(pair, f"'{contact}' stands here twice; keep one")
+        found.append(contact)
+    if not found:
+        refuse(node, 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
+    return tuple(found)
+
+
+def _face(node: Node, main: str | None, parts: Mapping[str, Part]) -> PartFace:
+    """`part.face`, or a face of the main part."""
+    text = node.text()
+    name, dot, face = text.rpartition(".")
+    if not dot and main is None:
+        node.fail("a face as 'part.face' is needed")
+    part = name if dot or main is None else main
+    if part not in parts:
+        refuse_name(node, "part", part, parts)
+    if face not in parts[part].solid.faces:
+        refuse_name(node, f"face of part '{part}'", face, parts[part].solid.faces)
+    return PartFace(part, face)
+
+
+def _attach(node: Node | None, goal: Array) -> Attach:
+    """The line to the goal; from straight above unless the file says otherwise."""
+    keys = node.fields((), ("along", "travel_mm")) if node else {}
+    direction = read_axis(keys["along"]) if "along" in keys else goal[:3, :3].T @ np.array([0.0, 0.0, -1.0])
+    travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else TRAVEL_M
+    if travel_m > 1e-3 * LARGEST_MM:
+        keys["travel_mm"].fail(f"a length of at most {LARGEST_MM:g} mm is needed")
+    return Attach(direction, travel_m)
+
+
+def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp:
+    """The grasp; at the centroid, across the narrower level axis unless the file says otherwise."""
+    keys = node.fields((), ("at_mm", "across")) if node else {}
+    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else solid.centroid
+    low, high = solid.bounds
+    if ((point < low) | (point > high)).any():
+        span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
+        keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
+    if "across" in keys:
+        across = read_axis(keys["across"])
+        if abs((before[:3, :3] @ across)[2]) > LEVEL:
+            keys["across"].fail(
+                "an axis that is level where the part is picked is needed", "the gripper comes from above"
+            )
+        return Grasp(point, across)
+    level = [axis for axis in range(3) if abs(before[2, axis]) < LEVEL]
+    if len(level) < 2:
+        refuse(entry, "the part does not stand straight where it is picked; say grasp = { across = [x, y, z] }")
+    return Grasp(point, np.eye(3)[min(level, key=lambda axis: (high - low)[axis])])
+
+
+def _shifts(node: Node, operation: int) -> tuple[Shift, ...]:
+    many = node.items(node.key) if isinstance(node.value, list) else (node,)
+    shifts = []
+    for each in many:
+        keys = each.fields(("along", "mm"))
+        low, high = read_span(keys["mm"], -LARGEST_MM, LARGEST_MM)
+        shifts.append(Shift(operation, read_axis(keys["along"]), 1e-3 * low, 1e-3 * high))
+    return tuple(shifts)
