@@ -1,0 +1,157 @@
+"""JSON read strictly: every complaint is one sentence that names the file and the key."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NoReturn, final
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+
+LARGEST_BYTES = 1_000_000
+
+
+@final
+@dataclass(frozen=True)
+class Node:
+    """A value of a JSON document and where it stands in it."""
+
+    value: Any
+    file: str
+    key: str = ""
+    """From the root, such as `operation 2, position_mm`; empty for the document itself."""
+
+    def fail(self, allowed: str, remedy: str = "") -> NoReturn:
+        """Raise the `InputError` that says what stands here and what is allowed instead."""
+        place = f"{self.file}, {self.key}" if self.key else self.file
+        raise InputError(f"{place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
+
+    def child(self, value: Any, key: str) -> Node:
+        return Node(value, self.file, f"{self.key}, {key}" if self.key else key)
+
+    def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, Node]:
+        """The members of an object: every required key, no unknown one."""
+        required, optional = tuple(required), tuple(optional)
+        if not isinstance(self.value, dict):
+            self.fail("an object with named keys is needed", f"its keys are {', '.join((*required, *optional))}")
+        known = (*required, *optional)
+        for key in self.value:
+            if key not in known:
+                near = get_close_matches(key, known, n=1, cutoff=0.5)
+                hint = f"; did you mean '{near[0]}'?" if near else ";"
+                place = f"{self.file}, {self.key}" if self.key else self.file
+                raise InputError(f"{place}: unknown key '{key}'{hint} Allowed: {', '.join(known)}.")
+        for key in required:
+            if key not in self.value:
+                place = f"{self.file}, {self.key}" if self.key else self.file
+                raise InputError(f"{place}: the key '{key}' is missing; needed are {', '.join(required)}.")
+        return {key: self.child(value, key) for key, value in self.value.items()}
+
+    def items(self, name: str, count: int | None = None) -> Sequence[Node]:
+        """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given."""
+        if not isinstance(self.value, list):
+            self.fail("a list is needed")
+        if count is not None and len(self.value) != count:
+            raise InputError(f"{self.file}, {self.key}: {count} entries are needed, {len(self.value)} were given.")
+        return [Node(value, self.file, f"{name} {i}") for i, value in enumerate(self.value, start=1)]
+
+    def numbers(self, *shape: int) -> Array:
+        """Finite numbers in nested lists of this shape."""
+        size = " x ".join(map(str, shape))
+        if not _fits(self.value, shape):
+            self.fail(f"{size} finite numbers are needed")
+        array = np.array(self.value, dtype=np.float64)
+        if not np.isfinite(array).all():
+            self.fail(f"{size} finite numbers are needed")
+        return array
+
+    def number(self, low: float, *, above: bool = False) -> float:
+        """A finite number that is at least `low`, or above it."""
+        wanted = f"a finite number {'above' if above else 'from'} {low:g} is needed"
+        if not _fits(self.value, ()):
+            self.fail(wanted)
+        x = float(self.value)
+        if not math.isfinite(x) or x < low or (above and x == low):
+            self.fail(wanted)
+        return x
+
+    def integer(self) -> int:
+        if not isinstance(self.value, int) or isinstance(self.value, bool):
+            self.fail("a whole number is needed")
+        return self.value
+
+    def text(self) -> str:
+        if not isinstance(self.value, str):
+            self.fail("a text in quotes is needed")
+        return self.value
+
+    def flag(self) -> bool:
+        if not isinstance(self.value, bool):
+            self.fail("true or false is needed")
+        return self.value
+
+
+def read_json(path: str | Path) -> Node:
+    """The document in a file.
+
+    Raises:
+        InputError: No such file, too large, not UTF-8, not JSON, a repeated key, NaN or Infinity.
+    """
+    path = Path(path)
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: a JSON file is needed, a folder was given.")
+        if path.stat().st_size > LARGEST_BYTES:
+            raise InputError(
+                f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give a single document."
+            )
+        text = path.read_bytes().decode("utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a JSON file.") from error
+    return parse_json(text, str(path))
+
+
+def parse_json(text: str, file: str) -> Node:
+    """The document in a text; `file` is its name in messages."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        members = dict(pairs)
+        if len(members) < len(pairs):
+            keys = [key for key, _ in pairs]
+            twice = next(key for key in keys if keys.count(key) > 1)
+            raise InputError(f"{file}: the key '{twice}' stands twice in one object; keep one of the two.")
+        return members
+
+    def refuse(constant: str) -> NoReturn:
+        raise InputError(f"{file}: every number must be finite, {constant} was given.")
+
+    try:
+        return Node(json.loads(text, object_pairs_hook=unique, parse_constant=refuse), file)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
+    except (RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{file}: this is not a JSON document that can be read (nested too deep, or a huge number)."
+        ) from error
+
+
+def _fits(value: Any, shape: tuple[int, ...]) -> bool:
+    if not shape:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+    return isinstance(value, list) and len(value) == shape[0] and all(_fits(entry, shape[1:]) for entry in value)
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "..."
