@@ -192,11 +192,11 @@ def _numbers(path: Path, element: Element, key: str, text: str | None, count: in
         values = np.array([float(word) for word in (text or "").split()])
     except ValueError:
         values = np.array([np.nan])
-    if not np.isfinite(values).all() or count not in (None, len(values)) or (np.abs(values) > LARGEST_M).any():
-        wanted = f"{count} finite numbers" if count else "finite numbers"
-        raise InputError(
-            f'{path}: {_called(element)} has {key}="{text or ""}"; {wanted} of at most {LARGEST_M:g} are needed.'
-        )
+    if count is None and np.isfinite(values).all():
+        return values
+    if len(values) != count or not (np.abs(values) <= LARGEST_M).all():
+        wanted = f"{count} numbers of at most {LARGEST_M:g} m are" if count else "finite numbers are"
+        raise InputError(f'{path}: {_called(element)} has {key}="{text or ""}"; {wanted} needed.')
     return values
 
 

@@ -1,0 +1,134 @@
+"""Overlap of faces: areas known by hand, and laws that hold for any pose."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import area, overlap
+from apo_bench.geometry.solid import Face
+from apo_bench.parts import load_part
+
+EYE = np.eye(4)
+OVER = pose.at((0, 0, 0), (180, 0, 0))
+"""Turned over, so that the face looks down."""
+
+
+def rectangle(x: float, y: float) -> Face:
+    """A face of 2x by 2y [m] in the plane z = 0 that looks up."""
+    return Face("r", np.array([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)]))
+
+
+def ring(outer: float, inner: float) -> Face:
+    """A square with a square hole [m]."""
+    return Face("ring", rectangle(outer, outer).outline, (rectangle(inner, inner).outline[::-1],))
+
+
+def mm(*corners: tuple[float, float]) -> Array:
+    return 1e-3 * np.array([(x, y, 0.0) for x, y in corners])
+
+
+U_SHAPE = Face("u", mm((-30, -30), (30, -30), (30, 30), (10, 30), (10, 0), (-10, 0), (-10, 30), (-30, 30)))
+"""60 x 60 mm, a slot 20 wide and 30 deep from above."""
+
+lengths = st.floats(-0.05, 0.05)
+turns = st.floats(-180, 180)
+poses = st.builds(lambda p, a: pose.at(p, a), st.tuples(lengths, lengths, lengths), st.tuples(turns, turns, turns))
+flat_poses = st.builds(lambda x, y, a: pose.at((x, y, 0), (0, 0, a)), lengths, lengths, turns)
+
+
+def test_a_small_face_on_a_large_one_keeps_its_own_corners():
+    found = overlap(rectangle(0.03, 0.02), OVER, rectangle(0.1, 0.1), EYE)
+    assert found.area == pytest.approx(24e-4, abs=1e-15)
+    assert {tuple(c) for c in found.corners.round(12)} == {(x, y, 0.0) for x in (-0.03, 0.03) for y in (-0.02, 0.02)}
+
+
+def test_the_corners_lie_on_the_lower_plane_whatever_the_distance():
+    found = overlap(rectangle(0.03, 0.02), pose.at((0, 0, 0.7), (180, 0, 0)), rectangle(0.1, 0.1), EYE)
+    assert found.area == pytest.approx(24e-4)
+    assert np.abs(found.corners[:, 2]).max() == 0.0
+
+
+def test_a_strip_across_a_concave_face_leaves_two_pieces():
+    found = overlap(rectangle(0.05, 0.005), pose.at((0, 0.02, 0), (180, 0, 0)), U_SHAPE, EYE)
+    assert found.area == pytest.approx(2 * 0.02 * 0.01)
+    assert len(found.corners) == 8
+    assert np.abs(found.corners[:, 0]).min() == pytest.approx(0.01)
+
+
+def test_a_hole_is_no_overlap_and_its_corners_count():
+    found = overlap(rectangle(0.02, 0.02), OVER, ring(0.025, 0.01), EYE)
+    assert found.area == pytest.approx(0.04**2 - 0.02**2)
+    assert len(found.corners) == 8
+
+
+@pytest.mark.parametrize(
+    ("T", "why"),
+    [
+        (pose.at((0.06, 0, 0), (180, 0, 0)), "they only share an edge"),
+        (pose.at((0.2, 0, 0), (180, 0, 0)), "they are far apart"),
+        (pose.at((0, 0, 0), (90, 0, 0)), "the upper face is seen edge-on"),
+    ],
+)
+def test_no_overlap(T: Array, why: str):
+    found = overlap(rectangle(0.03, 0.03), T, rectangle(0.03, 0.03), EYE)
+    assert found.area == 0.0, why
+    assert found.corners.shape == (0, 3)
+    assert not found
+
+
+def test_a_face_inside_the_hole_does_not_overlap():
+    assert not overlap(rectangle(0.01, 0.01), OVER, ring(0.025, 0.01), EYE)
+
+
+def test_two_holed_cubes_side_by_side_share_the_ring():
+    cube = load_part("cube")
+    found = overlap(cube.faces["px"], EYE, cube.faces["nx"], pose.at((0.05, 0, 0)))
+    assert found.area == pytest.approx(0.05**2 - 0.02**2)
+    assert np.abs(found.corners[:, 0] - 0.025).max() < 1e-12
+
+
+@given(flat_poses, poses)
+@settings(max_examples=60, deadline=None)
+def test_moving_both_parts_together_moves_the_corners_and_keeps_the_area(T_face: Array, T: Array):
+    face, on = U_SHAPE, ring(0.04, 0.012)
+    before, after = overlap(face, T_face @ OVER, on, EYE), overlap(face, T @ T_face @ OVER, on, T)
+    assert after.area == pytest.approx(before.area, abs=1e-12)
+    if before and len(before.corners) == len(after.corners):
+        gaps = np.linalg.norm(pose.apply(T, before.corners)[:, None] - after.corners[None], axis=-1).min(axis=0)
+        assert gaps.max() < 1e-7
+
+
+@given(flat_poses)
+@settings(max_examples=60, deadline=None)
+def test_faces_in_one_plane_overlap_each_other_equally(T_face: Array):
+    there = overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE)
+    back = overlap(ring(0.04, 0.012), EYE, U_SHAPE, T_face @ OVER)
+    assert back.area == pytest.approx(there.area, abs=1e-12)
+    assert there.area <= min(area(U_SHAPE), area(ring(0.04, 0.012))) + 1e-12
+
+
+@given(st.floats(-80, 80), st.floats(-80, 80))
+@settings(max_examples=60, deadline=None)
+def test_the_shadow_of_a_tilted_face_shrinks_with_the_cosine(rx: float, ry: float):
+    T = pose.at((0, 0, 0.01), (rx, ry, 0))
+    cosine = abs(T[2, 2])
+    assert overlap(U_SHAPE, T, rectangle(0.2, 0.2), EYE).area == pytest.approx(cosine * area(U_SHAPE), abs=1e-12)
+
+
+@given(flat_poses)
+@settings(max_examples=20, deadline=None)
+def test_the_area_is_that_of_counted_points(T_face: Array):
+    """An independent count: points of a fine grid that lie in both faces."""
+    step = 1e-3
+    x, y = (g.ravel() for g in np.meshgrid(*[np.arange(-0.0395, 0.04, step)] * 2))
+    in_ring = np.maximum(abs(x), abs(y)) > 0.012
+    local = pose.apply(pose.inverse(T_face @ OVER), np.column_stack([x, y, 0 * x]))
+    u, v = local[:, 0], local[:, 1]
+    in_u = (np.maximum(abs(u), abs(v)) < 0.03) & ~((abs(u) < 0.01) & (v > 0))
+    counted = step**2 * np.count_nonzero(in_ring & in_u)
+    assert overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)
