@@ -1,0 +1,143 @@
+"""The grid of a sweep: which trials there are, and which of them share a demonstration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, final
+
+from apo_bench.benchmark.spec import TrialSpec, check_careless, check_clearance, check_level, check_method, check_seed
+from apo_bench.errors import InputError
+from apo_bench.scenario import Scenario
+from apo_bench.scenario_file import load_scenario
+
+LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+METHODS = ("oracle", "none", "paper")
+LARGEST_TRIALS = 1_000_000
+
+Key = tuple[str, float, int, float, float, float, str]
+"""Scenario, clearance, seed, carelessness, level in mm, level in degrees, method: one trial of a sweep."""
+
+
+@final
+@dataclass(frozen=True)
+class SweepSpec:
+    """What a sweep varies; it runs every combination, with the same seeds in every cell."""
+
+    scenarios: tuple[str, ...]
+    """Names, or paths of scenario files."""
+    levels: tuple[float, ...] = LEVELS
+    careless: tuple[float, ...] = (0.0, 1.0)
+    methods: tuple[str, ...] = METHODS
+    clearances_mm: tuple[float, ...] = ()
+    """Empty stands for each scenario's own."""
+    trials: int = 100
+    seed: int = 0
+    """The first of the seeds."""
+    noise: str = "isotropic"
+    grasp: str = "friction"
+    arm: str = "six_axis"
+    timestep_s: float = 0.001
+
+    def __post_init__(self) -> None:
+        for name in ("scenarios", "levels", "careless", "methods", "clearances_mm"):
+            object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
+        for name in ("scenarios", "levels", "careless", "methods"):
+            if not getattr(self, name):
+                raise InputError(f"no {name} were given for the sweep; at least one is needed.")
+        if not 1 <= self.trials <= LARGEST_TRIALS:
+            raise InputError(f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.")
+        check_seed(self.seed)
+        check_seed(self.seed + self.trials - 1)
+        for level in self.levels:
+            check_level(level)
+        for careless in self.careless:
+            check_careless(careless)
+        for clearance in self.clearances_mm:
+            check_clearance(clearance)
+        for method in self.methods:
+            check_method(method)
+
+
+@final
+@dataclass(frozen=True)
+class Unit:
+    """The trials of one scenario, clearance and seed: they share layouts and demonstrations."""
+
+    trials: tuple[TrialSpec, ...]
+
+
+def load_all(spec: SweepSpec) -> Mapping[str, Scenario]:
+    """Every scenario of a sweep by what was given for it.
+
+    Raises:
+        InputError: A scenario cannot be loaded, or two have the same name.
+    """
+    loaded = {given: load_scenario(given) for given in spec.scenarios}
+    names = [scenario.name for scenario in loaded.values()]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two scenarios called '{name}' were given; rows name them, so rename one of the files.")
+    return loaded
+
+
+def units(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
+    """All the work of a sweep, seeds first, so that an interrupted sweep has every cell about equally full.
+
+    The oracle meets neither noise nor carelessness: it runs once per seed, recorded at level 0 and carelessness 0.
+    """
+    return tuple(
+        Unit(_trials(spec, given, clearance, seed))
+        for seed in range(spec.seed, spec.seed + spec.trials)
+        for given, scenario in loaded.items()
+        for clearance in spec.clearances_mm or (scenario.clearance_mm,)
+    )
+
+
+def described(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
+    """The specification as it stands in `run.json`, with scenarios by name and clearances filled in."""
+    values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(spec).items()}
+    names = {given: scenario.name for given, scenario in loaded.items()}
+    clearances = {s.name: list(spec.clearances_mm or (s.clearance_mm,)) for s in loaded.values()}
+    return {**values, "scenarios": [names[given] for given in spec.scenarios], "clearances_mm": clearances}
+
+
+def trial_key(trial: TrialSpec, name: str) -> Key:
+    """The key of a trial whose scenario is called `name`."""
+    t = trial
+    return (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg, t.method)
+
+
+def row_key(row: Mapping[str, Any]) -> Key:
+    """The key of the trial that a row is of."""
+    return (
+        *(row["scenario"], row["clearance_mm"], row["seed"], row["careless"]),
+        *(row["level"], row["level_deg"], row["method"]),
+    )
+
+
+def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tuple[TrialSpec, ...]:
+    def trial(method: str, level: float, careless: float) -> TrialSpec:
+        return TrialSpec(
+            scenario=given,
+            level_mm=level,
+            level_deg=level,
+            careless=careless,
+            clearance_mm=clearance_mm,
+            noise=spec.noise,
+            grasp=spec.grasp,
+            arm=spec.arm,
+            method=method,
+            seed=seed,
+            timestep_s=spec.timestep_s,
+        )
+
+    ceiling = tuple(trial(method, 0.0, 0.0) for method in spec.methods if method == "oracle")
+    rest = tuple(
+        trial(method, level, careless)
+        for careless in spec.careless
+        for level in spec.levels
+        for method in spec.methods
+        if method != "oracle"
+    )
+    return ceiling + rest

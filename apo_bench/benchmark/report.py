@@ -1,0 +1,107 @@
+"""The report of a sweep: a table, a figure, and a page that shows both."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from apo_bench.benchmark.figure import draw, level_label
+from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.statistics import Cell, tally
+from apo_bench.errors import InputError
+
+COLUMNS = (
+    *("scenario", "clearance_mm", "careless", "level_mm", "level_deg", "method"),
+    *("trials", "successes", "rate", "low_95", "high_95", "loose_successes", "loose_rate", "excluded", "failures"),
+)
+
+
+class Report(NamedTuple):
+    """Where the report of a sweep was written."""
+
+    table: Path
+    figure: Path
+    page: Path
+
+
+def report(folder: str | Path) -> Report:
+    """Write `table.csv`, `success_over_level.png` and `report.md` beside the rows of a sweep.
+
+    Raises:
+        InputError: No rows there, or the folder cannot be written.
+    """
+    folder = Path(folder)
+    rows = read_rows(folder)
+    if not rows:
+        raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
+    cells = tally(rows)
+    made = Report(folder / "table.csv", folder / "success_over_level.png", folder / "report.md")
+    try:
+        _write_table(cells, made.table)
+        draw(cells, made.figure)
+        made.page.write_text(_page(rows, cells, made), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
+    return made
+
+
+def percent(rate: float | None) -> str:
+    """`97.0 %`, or a dash where nothing counted."""
+    return "–" if rate is None else f"{100 * rate:.1f} %"
+
+
+def interval(cell: Cell) -> str:
+    """`91.5 to 99.0 %`."""
+    low, high = cell.interval
+    return f"{100 * low:.1f} to {100 * high:.1f} %"
+
+
+def failures(cell: Cell, most: int = 3) -> str:
+    """`attach: force_stop 12, judge: gap 3`: the most frequent endings of trials that failed."""
+    return ", ".join(f"{why} {count}" for why, count in list(cell.failures.items())[:most])
+
+
+def _write_table(cells: Sequence[Cell], path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for c in cells:
+            where = (c.scenario, c.clearance_mm, c.careless, c.level, c.level_deg, c.method)
+            loose = (c.loose_successes, c.loose_rate)
+            writer.writerow([*where, c.trials, c.successes, c.rate, *c.interval, *loose, c.excluded, failures(c, 99)])
+
+
+def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report) -> str:
+    excluded = {(r["scenario"], r["seed"], r["careless"]) for r in rows if r["demonstration"] != "ok"}
+    shown = {(r["scenario"], r["seed"], r["careless"]) for r in rows}
+    grasps = ", ".join(sorted({r["grasp"] for r in rows}))
+    noises = ", ".join(sorted({r["noise"] for r in rows}))
+    lines = [
+        "# Success of replayed demonstrations",
+        "",
+        f"{len(rows)} trials; grasp {grasps}, noise {noises}. A level of L is a standard deviation of L mm and "
+        "L degrees per axis.",
+        "`oracle` replays the drawn layout and meets neither noise nor carelessness; `none` replays what was seen.",
+        f"{len(excluded)} of {len(shown)} demonstrations were not right themselves and are left out of every method.",
+        "",
+        f"![Success over level]({made.figure.name})",
+        "",
+        "| scenario | clearance | careless | level | method | strict success | 95 % interval | n | loose | failures |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+        *(_line(cell) for cell in cells),
+        "",
+        "Strict and loose are the judge's; intervals are Wilson's; the same numbers stand in "
+        f"[{made.table.name}]({made.table.name}).",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _line(c: Cell) -> str:
+    ceiling = c.method == "oracle"
+    return (
+        f"| {c.scenario} | {c.clearance_mm:g} mm | {'any' if ceiling else f'{c.careless:g}'} "
+        f"| {'any' if ceiling else level_label(c.level, c.level_deg)} | {c.method} | {percent(c.rate)} "
+        f"| {interval(c)} | {c.trials} | {percent(c.loose_rate)} | {failures(c)} |"
+    )

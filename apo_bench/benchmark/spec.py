@@ -1,0 +1,84 @@
+"""What one trial is made of: every setting of a row, checked at the door."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+from apo_bench.errors import InputError, unknown
+
+ENV_ID = "APOReplay-v0"
+ROW = "apo-bench/row/1"
+LARGEST_LEVEL = 50.0
+"""[mm] and [degrees]: five times that is still inside the room."""
+LARGEST_CARELESS = 10.0
+LARGEST_SEED = 2**53 - 1
+"""Whole numbers up to here survive every JSON reader."""
+RELATIONS = "given"
+"""The contacts come with the demonstration; they are not recognised from the poses."""
+
+
+@final
+@dataclass(frozen=True)
+class TrialSpec:
+    """One trial: with the same code and the same assets it determines its row."""
+
+    scenario: str
+    """A name, or the path of a scenario file."""
+    level_mm: float = 1.0
+    level_deg: float = 1.0
+    careless: float = 1.0
+    clearance_mm: float = 0.25
+    noise: str = "isotropic"
+    grasp: str = "friction"
+    arm: str = "six_axis"
+    method: str = "none"
+    seed: int = 0
+    timestep_s: float = 0.001
+    relations: str = RELATIONS
+
+    def __post_init__(self) -> None:
+        check_level(self.level_mm, "level in mm")
+        check_level(self.level_deg, "level in degrees")
+        check_careless(self.careless)
+        check_clearance(self.clearance_mm)
+        check_method(self.method)
+        check_seed(self.seed)
+        if self.relations != RELATIONS:
+            raise InputError(unknown("kind of relations", self.relations, (RELATIONS,)))
+
+
+def check_level(level: float, what: str = "level") -> None:
+    """Raise an `InputError` unless the level is a number from 0 to the largest."""
+    _within(level, 0.0, LARGEST_LEVEL, what, "where 1 means 1 mm and 1 degree standard deviation")
+
+
+def check_careless(careless: float) -> None:
+    """Raise an `InputError` unless it is a number from 0 to the largest."""
+    _within(careless, 0.0, LARGEST_CARELESS, "carelessness", "where 0 is a careful human and 1 the scenario's")
+
+
+def check_clearance(clearance_mm: float) -> None:
+    """Raise an `InputError` unless the clearance can be one; what a part can have is the scene's to say."""
+    _within(clearance_mm, 0.0, 5.0, "clearance", "in mm per side")
+
+
+def check_seed(seed: int) -> None:
+    """Raise an `InputError` unless the seed is a whole number from 0."""
+    if not 0 <= seed <= LARGEST_SEED:
+        raise InputError(f"a seed of {seed} was given; whole numbers from 0 to {LARGEST_SEED} are allowed.")
+
+
+def check_method(method: str) -> None:
+    """Raise an `InputError` unless it is `oracle`, `none`, a corrector by name, or `module:name`."""
+    from apo_bench.correction.correct import CORRECTORS
+
+    known = ("oracle", "none", *CORRECTORS)
+    if ":" not in method and method not in known:
+        raise InputError(unknown("method", method, known) + " Or give your own corrector as 'package.module:name'.")
+
+
+def _within(x: float, low: float, high: float, what: str, meaning: str) -> None:
+    if not (math.isfinite(x) and low <= x <= high):
+        raise InputError(f"a {what} of {x:g} was given; a number from {low:g} to {high:g} is allowed, {meaning}.")

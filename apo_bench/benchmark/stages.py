@@ -1,0 +1,102 @@
+"""The stages that every method of a trial shares: show, see, attempt. Chance enters here and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.judge import Verdict, judge
+from apo_bench.layout import draw_layout
+from apo_bench.observation.noise import Noise
+from apo_bench.observation.observe import observe
+from apo_bench.outcomes import sentence
+from apo_bench.program import Demonstration, Layout, Observation, Plan, ReplayResult
+from apo_bench.simulation.demonstrate import demonstrate
+from apo_bench.simulation.replay import replay
+from apo_bench.simulation.scene import Scene
+
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM = range(4)
+"""Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What was drawn and what the human made of it: shared by every method and level of a seed."""
+
+    layout: Layout
+    demonstration: Demonstration
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """One replay and what the judge says of it."""
+
+    result: ReplayResult
+    verdict: Verdict
+
+
+class Ending(NamedTuple):
+    """Where and why a trial ended; stage `done` and code `ok` if nothing failed."""
+
+    stage: str
+    code: str
+    operation: int | None
+    """Counted from 0."""
+    sentence: str
+
+    @property
+    def failed(self) -> bool:
+        return self.stage != "done"
+
+
+def stream(seed: int, which: int) -> np.random.Generator:
+    """The random numbers of one stage of one trial; nothing but seed and stage is in the key."""
+    return np.random.default_rng([seed, which])
+
+
+def show(scene: Scene, careless: float, seed: int) -> Shown:
+    """Draw the truth of a trial and let the human demonstrate it."""
+    layout = draw_layout(scene.scenario, stream(seed, LAYOUT))
+    return Shown(layout, demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION)))
+
+
+def see(scene: Scene, shown: Shown, noise: Noise, seed: int) -> Observation:
+    """Watch the demonstration of a trial through a noise model."""
+    rng = stream(seed, OBSERVATION)
+    return observe(shown.demonstration, noise, rng, gap_m=scene.scenario.gap_mm * 1e-3)
+
+
+def unseen(seen: Observation) -> Ending | None:
+    """Why an observation cannot be replayed as it is: an operation was not seen."""
+    if seen.seen.all():
+        return None
+    k = int(np.argmin(seen.seen))
+    return Ending("observe", "not_seen", k, sentence("not_seen", operation=k))
+
+
+def attempt(plan: Plan, scene: Scene, reference: Array, watch: Any = None) -> Tried:
+    """Replay a plan and judge what was reached.
+
+    Args:
+        reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
+        watch: Called with the `MjData` about every 10 ms of simulated time.
+    """
+    result = replay(plan, scene, watch)
+    scenario = scene.scenario
+    verdict = judge(scenario.assembly, result.reached, reference, scenario.thresholds, scene.clearance_mm)
+    return Tried(result, verdict)
+
+
+def ending(tried: Tried) -> Ending:
+    """Physics decides: what is right is done, and of what is wrong the robot's own word comes first."""
+    outcome, verdict = tried.result.outcome, tried.verdict
+    if verdict.success:
+        return Ending("done", "ok", None, sentence("ok"))
+    if outcome.code != "ok":
+        return Ending(outcome.stage, outcome.code, outcome.operation, outcome.sentence)
+    return Ending("judge", verdict.code, None, sentence(verdict.code))

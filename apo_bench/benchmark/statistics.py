@@ -1,0 +1,112 @@
+"""Success rates with intervals: one cell per scenario, clearance, carelessness, level and method."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NamedTuple, final
+
+CONFIDENCE = 0.95
+
+Place = tuple[str, float, float, float, float, str]
+"""Scenario, clearance, carelessness, level in mm, level in degrees, method: all but the seed."""
+
+
+class Interval(NamedTuple):
+    """A two-sided confidence interval of a rate."""
+
+    low: float
+    high: float
+
+
+@final
+@dataclass(frozen=True)
+class Cell:
+    """What came out where only seeds differ."""
+
+    scenario: str
+    clearance_mm: float
+    careless: float
+    level: float
+    level_deg: float
+    method: str
+    trials: int
+    """Trials that count: those whose demonstration was right."""
+    successes: int
+    """Strict."""
+    loose_successes: int
+    excluded: int
+    """Trials left out of every method alike, since the demonstration itself was not right."""
+    failures: Mapping[str, int]
+    """`stage: code` -> how many, most frequent first."""
+
+    @property
+    def rate(self) -> float | None:
+        """Strict success rate; None without a trial that counts."""
+        return self.successes / self.trials if self.trials else None
+
+    @property
+    def loose_rate(self) -> float | None:
+        return self.loose_successes / self.trials if self.trials else None
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's 95 % interval of the strict rate."""
+        return wilson(self.successes, self.trials)
+
+
+def wilson(successes: int, trials: int) -> Interval:
+    """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
+    from scipy.stats import binomtest
+
+    if trials == 0:
+        return Interval(0.0, 1.0)
+    found = binomtest(successes, trials).proportion_ci(confidence_level=CONFIDENCE, method="wilson")
+    return Interval(float(found.low), float(found.high))
+
+
+def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
+    """Count rows into cells, sorted by scenario, clearance, carelessness, method (`oracle` first), level.
+
+    Rows of a measured demonstration have no level and belong to no cell.
+    """
+    groups: dict[Place, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        if row["level"] is not None:
+            place = (
+                row["scenario"],
+                row["clearance_mm"],
+                row["careless"],
+                row["level"],
+                row["level_deg"],
+                row["method"],
+            )
+            groups.setdefault(place, []).append(row)
+    return tuple(_cell(key, groups[key]) for key in sorted(groups, key=_order))
+
+
+def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
+    counted = [row for row in rows if row["success"] is not None]
+    why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in counted if not row["success"])
+    scenario, clearance, careless, level, level_deg, method = key
+    return Cell(
+        scenario=scenario,
+        clearance_mm=clearance,
+        careless=careless,
+        level=level,
+        level_deg=level_deg,
+        method=method,
+        trials=len(counted),
+        successes=sum(row["success"] for row in counted),
+        loose_successes=sum(row["loose_success"] for row in counted),
+        excluded=len(rows) - len(counted),
+        failures=MappingProxyType(dict(why.most_common())),
+    )
+
+
+def _order(key: Place) -> tuple[Any, ...]:
+    scenario, clearance, careless, level, level_deg, method = key
+    rank = {"oracle": 0, "none": 1}.get(method, 2)
+    return (scenario, clearance, careless, rank, method, level, level_deg)

@@ -1,0 +1,220 @@
+"""One trial: a demonstration, watched, planned by a method, replayed, judged; as one row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, final
+
+from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
+from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, see, show, unseen
+from apo_bench.correction.correct import correct
+from apo_bench.correction.equations import gap
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.outcomes import sentence
+from apo_bench.pose_error import pose_errors
+from apo_bench.program import Correction, Observation, Plan, Snapshot
+from apo_bench.simulation.scene import Scene
+
+Row = dict[str, Any]
+"""One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """What a method made of an observation: a plan, or why there is none."""
+
+    plan: Plan | None
+    refused: Ending | None
+    freed: tuple[int, ...]
+    gap_before_m: float
+    gap_after_m: float
+
+
+def run_trial(
+    spec: TrialSpec, scene: Scene, *, shown: Shown | None = None, content: str | None = None, watch: Any = None
+) -> Row:
+    """Run one trial.
+
+    Args:
+        scene: Compiled for the scenario, clearance, grasp, arm and time step of `spec`.
+        shown: The demonstration of this seed and carelessness, if it is at hand.
+        content: From `content_hash`, if it is at hand.
+        watch: Called with the `MjData` of the replay about every 10 ms of simulated time.
+
+    Raises:
+        InputError: The noise model or the corrector is unknown or returned what it must not.
+    """
+    shown = shown or show(scene, spec.careless, spec.seed)
+    content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    head = _head(spec, scene, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
+    if shown.demonstration.code != "ok":
+        code = shown.demonstration.code
+        return head | _result(Ending("demonstrate", code, None, sentence(code)), success=None)
+    noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
+    planned = plan(spec.method, see(scene, shown, noise, spec.seed), shown.layout.goals)
+    return head | _carry_out(planned, scene, shown.layout.goals, shown.layout.goals, watch)
+
+
+def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, watch: Any = None) -> Row:
+    """Replay an observation that came from a file: its truth is not known.
+
+    The judge compares overlaps with those of the scenario's nominal goals; level, carelessness and pose errors of
+    the row are null, its noise is `measured`.
+
+    Args:
+        text: The content of the file, for the hash.
+
+    Raises:
+        InputError: The method is `oracle`, which would need the truth.
+    """
+    if spec.method == "oracle":
+        raise InputError(
+            "the method 'oracle' was given for a measured observation, whose truth is not known; use none or paper."
+        )
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    head = _head(spec, scene, spec_hash(spec, content, text)) | {
+        "level": None,
+        "level_deg": None,
+        "careless": None,
+        "noise": "measured",
+        "demonstration": "ok",
+    }
+    planned = plan(spec.method, seen, None)
+    return head | _carry_out(planned, scene, scene.scenario.goals, None, watch)
+
+
+def plan(method: str, seen: Observation, truth: Array | None) -> Planned:
+    """What a method would have the robot do.
+
+    Args:
+        method: `oracle` takes the truth, `none` what was seen, anything else names a corrector.
+        truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
+    """
+    if method == "oracle" and truth is not None:
+        return _as_it_is(seen, truth, None)
+    if method == "none":
+        return _as_it_is(seen, seen.goals, unseen(seen))
+    made = correct(seen, method)
+    return Planned(
+        plan=Plan(seen.assembly, seen.start, made.goals) if made.ok else None,
+        refused=None if made.ok else refusal(made),
+        freed=made.freed,
+        gap_before_m=made.gap_before_m,
+        gap_after_m=made.gap_after_m,
+    )
+
+
+def refusal(made: Correction) -> Ending:
+    """A correction that did not converge is not executed."""
+    return Ending("correct", made.status, None, made.sentence)
+
+
+def _as_it_is(seen: Observation, goals: Array, refused: Ending | None) -> Planned:
+    open_m = gap(seen.assembly, seen.start, goals)
+    made = None if refused else Plan(seen.assembly, seen.start, goals)
+    return Planned(made, refused, (), open_m, open_m)
+
+
+def _carry_out(planned: Planned, scene: Scene, reference: Array, truth: Array | None, watch: Any) -> Row:
+    correction = {
+        "freed": [k + 1 for k in planned.freed],
+        "gap_before_mm": _mm(planned.gap_before_m),
+        "gap_after_mm": _mm(planned.gap_after_m),
+    }
+    if planned.plan is None:
+        assert planned.refused is not None
+        return _result(planned.refused, success=False) | correction
+    tried = attempt(planned.plan, scene, reference, watch)
+    return _result(ending(tried), success=tried.verdict.success) | correction | _physics(tried, planned.plan, truth)
+
+
+def _head(spec: TrialSpec, scene: Scene, hashed: str) -> Row:
+    return {
+        "schema": ROW,
+        "env_id": ENV_ID,
+        "spec_hash": hashed,
+        "scenario": scene.scenario.name,
+        "level": spec.level_mm,
+        "level_deg": spec.level_deg,
+        "careless": spec.careless,
+        "clearance_mm": spec.clearance_mm,
+        "noise": spec.noise,
+        "grasp": spec.grasp,
+        "arm": spec.arm,
+        "relations": spec.relations,
+        "method": spec.method,
+        "seed": spec.seed,
+        "timestep_s": spec.timestep_s,
+        "thresholds": asdict(scene.scenario.thresholds),
+    }
+
+
+def _result(end: Ending, *, success: bool | None) -> Row:
+    """The rest of a row of which nothing but its ending is known."""
+    return {
+        "success": success,
+        "loose_success": success,
+        "failure_stage": end.stage if end.failed else None,
+        "failure_code": end.code if end.failed else None,
+        "failure_operation": None if end.operation is None else end.operation + 1,
+        "sentence": end.sentence,
+        "conditions": None,
+        "worst_gap_mm": None,
+        "worst_angle_deg": None,
+        "least_overlap": None,
+        "penetration_mm": None,
+        "pushed_mm": None,
+        "freed": None,
+        "gap_before_mm": None,
+        "gap_after_mm": None,
+        "reached": None,
+        "pose_error_fixed_mm": None,
+        "pose_error_free_mm": None,
+        "peak_force_n": None,
+        "sim_seconds": None,
+    }
+
+
+def _physics(tried: Tried, plan: Plan, truth: Array | None) -> Row:
+    result, verdict = tried.result, tried.verdict
+    fixed, free = None, None
+    if truth is not None:
+        fixed, free = pose_errors(plan.assembly, plan.start, truth, result.reached)
+    return {
+        "loose_success": verdict.loose_success,
+        "conditions": dict(verdict.conditions),
+        "worst_gap_mm": _finite(verdict.gap_mm),
+        "worst_angle_deg": _finite(verdict.angle_deg),
+        "least_overlap": _finite(verdict.overlap),
+        "penetration_mm": _finite(verdict.penetration_mm),
+        "pushed_mm": _finite(verdict.pushed_mm),
+        "reached": _poses(result.reached.final),
+        "pose_error_fixed_mm": _finite(fixed),
+        "pose_error_free_mm": _finite(free),
+        "peak_force_n": _finite(result.peak_force_n),
+        "sim_seconds": result.sim_seconds,
+    }
+
+
+def _poses(final: Snapshot | None) -> Mapping[str, list[float]] | None:
+    """Part -> [x, y, z in mm, qw, qx, qy, qz], world frame."""
+    if final is None:
+        return None
+    packed = {part: pose.pack(T) for part, T in final.poses.items()}
+    return {part: [*(p[:3] * 1e3).tolist(), *p[3:].tolist()] for part, p in packed.items()}
+
+
+def _mm(metres: float) -> float | None:
+    return _finite(metres * 1e3)
+
+
+def _finite(x: float | None) -> float | None:
+    """A number that JSON can hold, else null."""
+    return float(x) if x is not None and math.isfinite(x) else None
