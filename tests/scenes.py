@@ -11,6 +11,8 @@ from apo_bench.assembly import Assembly, Contact, Operation, PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.placement import placed
+from apo_bench.program import Demonstration, Observation
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -248,3 +250,24 @@ ALL = {
 def noisy(goals: Array, rng: np.random.Generator, mm: float, deg: float) -> Array:
     """Goals with a Gaussian body twist each."""
     return goals @ pose.exp(rng.standard_normal((len(goals), 6)) * np.repeat([mm * 1e-3, np.radians(deg)], 3))
+
+
+def turned(scene: Scene, T_world: Array) -> Scene:
+    """The same scene in another world frame."""
+    start = {part: T_world @ T for part, T in scene.start.items()}
+    return Scene(scene.assembly, start, T_world @ scene.goals)
+
+
+def shown(scene: Scene, careless: Array | None = None) -> Demonstration:
+    """A demonstration that shows the true goals."""
+    n = len(scene.assembly)
+    final = placed(scene.assembly, scene.start, scene.goals)[-1]
+    added = np.zeros((n, 6, 6)) if careless is None else careless
+    return Demonstration(scene.assembly, scene.start, scene.goals, final, added)
+
+
+def seen(scene: Scene, goals: Array) -> Observation:
+    """An observation of these goals, all seen, at 1 mm and 1 degree."""
+    n = len(scene.assembly)
+    covariance = np.tile(np.diag(np.repeat([1e-3, np.radians(1.0)], 3) ** 2), (n, 1, 1))
+    return Observation(scene.assembly, scene.start, goals, covariance, np.ones(n, dtype=np.bool_))

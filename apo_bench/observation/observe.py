@@ -46,8 +46,10 @@ def _complaint(shown: Demonstration, seen: Any) -> str:
         return "changed the assembly, which is taken as certain; pass on the one it was given"
     if set(seen.start) != set(shown.start):
         return "changed which parts have a start pose; pass on `shown.start`"
-    for k in np.flatnonzero(~rigid(seen.goals)):
-        return f"returned a goal for operation {k + 1} that is not a rigid pose; return `shown.goals[k] @ exp(twist)`"
+    for wrong in np.flatnonzero(~rigid(seen.goals)):
+        return (
+            f"returned a goal for operation {wrong + 1} that is not a rigid pose; return `shown.goals[k] @ exp(twist)`"
+        )
     for k, C in enumerate(seen.covariance):
         if not _positive_definite(C):
             return (

@@ -1,0 +1,103 @@
+"""Whether the contacts of an assembly were made, measured on the nominal faces at the poses that were reached."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Contact
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+from apo_bench.placement import placed
+from apo_bench.program import Poses, Snapshot
+from apo_bench.thresholds import Thresholds
+
+Moment = Literal["made", "end"]
+
+
+class ContactVerdict(NamedTuple):
+    """One contact at one moment."""
+
+    contact: Contact
+    operation: int
+    """The operation that made it, counted from 0."""
+    moment: Moment
+    """`made`: when its operation was over; `end`: at the end, if nothing moved the parts away from each other."""
+    gap_mm: float | None
+    """Largest |e|: distance of a corner of the overlap to the plane of the other face; None without any overlap."""
+    angle_deg: float
+    """Between the normals of the faces; 0 if they look straight at each other."""
+    overlap: float
+    """Area of the overlap over that of the true one."""
+    touching: bool
+    """Strict in gap and angle."""
+    covering: bool
+    """Strict and loose in overlap."""
+    loose: bool
+
+    @property
+    def strict(self) -> bool:
+        return self.touching and self.covering and self.loose
+
+
+def judged_contacts(
+    assembly: Assembly,
+    after: Sequence[Snapshot | None],
+    final: Snapshot | None,
+    reference: Array,
+    thresholds: Thresholds,
+    clearance_mm: float,
+) -> tuple[ContactVerdict, ...]:
+    """Every contact in the snapshot after its operation, and at the end if it still stands.
+
+    Moments of which there is no snapshot are left out. Args as for `apo_bench.judge.judge`.
+    """
+    true_area = _true_areas(assembly, after, reference)
+    out = []
+    for k, (contact, made, lost) in enumerate(assembly.relations()):
+        allowed = clearance_mm + thresholds.fit_margin_mm if assembly.is_fit(contact) else thresholds.support_mm
+        moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
+        for moment, snapshot in moments.items():
+            if snapshot is not None:
+                gap, angle, area = _measured(assembly, contact, snapshot.poses)
+                share = area / true_area[k] if true_area[k] > 0.0 else 1.0
+                turned = not angle <= thresholds.loose_angle_deg
+                covering = share >= thresholds.overlap_fraction
+                touching = not turned and (gap is None or gap <= allowed)
+                loose = not turned and covering and gap is not None and gap <= thresholds.loose_gap_mm
+                out.append(ContactVerdict(contact, made, moment, gap, angle, share, touching, covering, loose))
+    return tuple(out)
+
+
+def _true_areas(assembly: Assembly, after: Sequence[Snapshot | None], reference: Array) -> list[float]:
+    """The area of the overlap of every contact when it is made at the true goals, [m^2].
+
+    A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
+    """
+    first = next((snapshot for snapshot in after if snapshot is not None), None)
+    if first is None:
+        return [0.0] * len(assembly.relations())
+    history = placed(assembly, first.poses, reference)
+    return [_overlap(assembly, contact, history[made])[1] for contact, made, _ in assembly.relations()]
+
+
+def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float | None, float, float]:
+    """Largest |e| [mm], angle between the normals [degrees], area of the overlap [m^2]."""
+    corners, area = _overlap(assembly, contact, poses)
+    (m, e) = contact
+    R_m, n_m, p_m = poses[m.part][:3, :3], assembly.face(m).plane, poses[m.part][:3, 3]
+    against = -(R_m @ n_m[:3]) @ poses[e.part][:3, :3] @ assembly.face(e).normal
+    angle = float(np.degrees(np.arccos(np.clip(against, -1.0, 1.0))))
+    if not len(corners):
+        return None, angle, 0.0
+    distance = ((corners - p_m) @ R_m) @ n_m[:3] + n_m[3]
+    return float(np.abs(distance).max()) * 1e3, angle, area
+
+
+def _overlap(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, float]:
+    """Corners (k, 3), world, on the plane of the environment face, and area."""
+    m, e = contact
+    found = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])
+    return found.corners, found.area

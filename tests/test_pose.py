@@ -1,0 +1,113 @@
+"""Group laws of poses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.rigid import rigid
+
+SHAPES = [(), (1,), (3, 1, 2, 1)]
+SCALES = [0.0, 1e-9, 1e-5, 1e-3, 1.0, 3.0]
+
+
+def twists(shape: tuple[int, ...], angle: float, seed: int = 0) -> Array:
+    """Twists with rotations of exactly that angle [rad]."""
+    xi = np.random.default_rng(seed).standard_normal((*shape, 6))
+    xi[..., 3:] *= angle / np.linalg.norm(xi[..., 3:], axis=-1, keepdims=True)
+    return xi
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("angle", SCALES)
+def test_log_inverts_exp(shape: tuple[int, ...], angle: float) -> None:
+    xi = twists(shape, angle)
+    assert_allclose(pose.log(pose.exp(xi)), xi, atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", SCALES)
+def test_exp_is_the_matrix_exponential(angle: float) -> None:
+    from scipy.linalg import expm
+
+    xi = twists((), angle)
+    generator = np.zeros((4, 4))
+    generator[:3, :3], generator[:3, 3] = pose.hat(xi[3:]), xi[:3]
+    assert_allclose(pose.exp(xi), expm(generator), atol=1e-12)
+
+
+@given(st.integers(0, 10**6), st.floats(0.0, 3.1), st.floats(0.0, 3.1))
+def test_group_laws(seed: int, a: float, b: float) -> None:
+    A, B = pose.exp(twists((), a, seed)), pose.exp(twists((), b, seed + 1))
+    assert_allclose(A @ pose.inverse(A), np.eye(4), atol=1e-12)
+    assert_allclose(pose.inverse(A @ B), pose.inverse(B) @ pose.inverse(A), atol=1e-12)
+    assert_allclose(pose.exp(-twists((), a, seed)), pose.inverse(A), atol=1e-12)
+    assert rigid((A @ B)[None]).all()
+
+
+@given(st.integers(0, 10**6))
+def test_a_twist_acts_in_the_frame_of_the_body(seed: int) -> None:
+    T, xi = pose.exp(twists((), 2.0, seed)), twists((), 0.5, seed + 1)
+    R, t = T[:3, :3], T[:3, 3]
+    seen_from_the_world = np.concatenate([R @ xi[:3] + np.cross(t, R @ xi[3:]), R @ xi[3:]])
+    assert_allclose(T @ pose.exp(xi), pose.exp(seen_from_the_world) @ T, atol=1e-12)
+
+
+def test_a_zero_twist_is_exactly_the_identity() -> None:
+    assert_array_equal(pose.exp(np.zeros((2, 6))), np.tile(np.eye(4), (2, 1, 1)))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_pack_round_trip(shape: tuple[int, ...]) -> None:
+    T = pose.exp(twists(shape, 2.5))
+    packed = pose.pack(T)
+    assert packed.shape == (*shape, 7)
+    assert (packed[..., 3] >= 0).all()
+    assert_allclose(pose.unpack(packed), T, atol=1e-12)
+
+
+def test_pack_writes_w_first() -> None:
+    assert_array_equal(pose.pack(pose.at((1.0, 2.0, 3.0))), [1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def test_unpack_refuses_a_zero_quaternion() -> None:
+    with pytest.raises(ValueError, match="zero norm"):
+        pose.unpack(np.zeros(7))
+
+
+@given(st.tuples(*[st.integers(-8, 8)] * 3))
+def test_quarter_turns_are_exact(quarters: tuple[int, int, int]) -> None:
+    T = pose.at((0.0, 0.0, 0.0), 90.0 * np.array(quarters))
+    assert set(np.unique(T[:3, :3])) <= {-1.0, 0.0, 1.0}
+    assert_allclose(T[:3, :3], Rotation.from_euler("xyz", 90.0 * np.array(quarters), degrees=True).as_matrix(), atol=1e-12)
+
+
+@given(st.tuples(*[st.floats(-180.0, 180.0)] * 3))
+def test_turns_are_about_the_fixed_axes_in_order(turn_deg: tuple[float, float, float]) -> None:
+    T = pose.at((0.1, 0.2, 0.3), turn_deg)
+    assert_allclose(T[:3, :3], Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix(), atol=1e-12)
+    assert_array_equal(T[:3, 3], [0.1, 0.2, 0.3])
+
+
+def test_apply_moves_points() -> None:
+    T = pose.at((1.0, 0.0, 0.0), (0, 0, 90))
+    assert_allclose(pose.apply(T, [[1.0, 0.0, 0.0]]), [[1.0, 1.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "T",
+    [
+        np.diag([1.0, 1.0, -1.0, 1.0]),
+        np.diag([1.0, 1.0, 1.1, 1.0]),
+        np.diag([1.0, 1.0, 1.0, 2.0]),
+        np.full((4, 4), np.nan),
+        np.zeros((4, 4)),
+    ],
+)
+def test_what_is_not_rigid(T: Array) -> None:
+    assert not rigid(T[None]).any()
