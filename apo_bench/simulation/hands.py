@@ -1,0 +1,66 @@
+"""Human hands: mocap bodies that hold a part by a soft weld and move it along straight lines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Poses
+from apo_bench.simulation.paths import Line
+from apo_bench.simulation.scene import HANDS
+from apo_bench.simulation.world import World, fresh, part_pose
+
+
+class Hands:
+    """Two hands and the parts before them; one demonstration long."""
+
+    def __init__(self, world: World, start: Poses) -> None:
+        self.world = world
+        self.data: Any = fresh(world, start)
+        self._mocap = [int(world.model.body(hand).mocapid[0]) for hand in HANDS]
+
+    def grab(self, hand: int, part: str) -> Array:
+        """Hold a part where it is; returns its pose."""
+        T = part_pose(self.world, self.data, part)
+        self._put(hand, T)
+        weld = self._weld(hand, part)
+        self.world.model.eq_data[weld, :11] = (0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1)
+        self.data.eq_active[weld] = 1
+        return T
+
+    def let_go(self, hand: int, part: str) -> None:
+        self.data.eq_active[self._weld(hand, part)] = 0
+
+    def move(self, *moves: tuple[int, Line]) -> None:
+        """Move hands together; a hand whose line ends early waits at its end."""
+        step = self.world.model.opt.timestep
+        counts = [max(1, round(line.seconds / step)) for _, line in moves]
+        paths = [line.poses(line.progress(np.arange(1, n + 1) / n)) for (_, line), n in zip(moves, counts, strict=True)]
+        targets = [(hand, path[:, :3, 3], _quaternions(path)) for (hand, _), path in zip(moves, paths, strict=True)]
+        for i in range(max(counts)):
+            for hand, positions, quaternions in targets:
+                j = min(i, len(positions) - 1)
+                self.data.mocap_pos[self._mocap[hand]] = positions[j]
+                self.data.mocap_quat[self._mocap[hand]] = quaternions[j]
+            mujoco.mj_step(self.world.model, self.data)
+
+    def wait(self, seconds: float) -> None:
+        mujoco.mj_step(self.world.model, self.data, round(seconds / self.world.model.opt.timestep))
+
+    def _weld(self, hand: int, part: str) -> int:
+        return int(self.world.model.equality(f"{HANDS[hand]}_{part}").id)
+
+    def _put(self, hand: int, T: Array) -> None:
+        self.data.mocap_pos[self._mocap[hand]] = T[:3, 3]
+        self.data.mocap_quat[self._mocap[hand]] = _quaternions(T[None])[0]
+
+
+def _quaternions(T: Array) -> Array:
+    """(k, 4, 4) -> (k, 4), w first; neighbours may differ in sign, which a weld does not mind."""
+    from scipy.spatial.transform import Rotation
+
+    q: Array = Rotation.from_matrix(T[:, :3, :3]).as_quat(scalar_first=True)
+    return q

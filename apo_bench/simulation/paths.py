@@ -1,0 +1,75 @@
+"""Straight lines in space and time: where the tip is when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+PEAK = 1.875
+"""Peak over mean speed of a minimum-jerk motion."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Line:
+    """From one pose to another: position along a straight line, orientation about one fixed axis."""
+
+    start: Array
+    end: Array
+    seconds: float
+    progress: Callable[[Array], Array]
+    """Time / seconds in [0, 1] -> part of the way in [0, 1]."""
+
+    def poses(self, s: Array) -> Array:
+        """(k,) parts of the way -> (k, 4, 4)."""
+        turn = pose.log(pose.inverse(self.start) @ self.end)[3:]
+        T = np.zeros((len(s), 4, 4))
+        T[:, :3, :3] = self.start[:3, :3] @ pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * turn]))[:, :3, :3]
+        T[:, :3, 3] = self.start[:3, 3] + s[:, None] * (self.end[:3, 3] - self.start[:3, 3])
+        T[:, 3, 3] = 1.0
+        return T
+
+
+def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5, shortest: float = 0.15) -> Line:
+    """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
+    far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    turn = float(np.linalg.norm(pose.log(pose.inverse(start) @ end)[3:]))
+    return Line(start, end, max(shortest, PEAK * far / speed, PEAK * turn / turn_speed), minimum_jerk)
+
+
+def steady(start: Array, end: Array, speed: float, ramp: float = 0.1) -> Line:
+    """Constant speed [m/s] with a short ramp [s] at both ends, for motions that a guard may stop."""
+    far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    seconds = max(far / speed + ramp, 2.0 * ramp)
+    return Line(start, end, seconds, _Trapezoid(ramp / seconds))
+
+
+def minimum_jerk(t: Array) -> Array:
+    """10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan, 1985)."""
+    return t**3 * (10.0 + t * (-15.0 + 6.0 * t))
+
+
+@final
+@dataclass(frozen=True)
+class _Trapezoid:
+    """Constant speed between two linear ramps, each this part of the whole time."""
+
+    ramp: float
+
+    def __call__(self, t: Array) -> Array:
+        r, top = self.ramp, 1.0 - self.ramp
+        s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
+        return s / top
+
+
+def moved(T: Array, along: Array, by: float) -> Array:
+    """The pose shifted in the world."""
+    out = np.array(T)
+    out[:3, 3] += by * np.asarray(along)
+    return out

@@ -1,0 +1,44 @@
+"""Physics settings, each with the reason it has the value it has.
+
+The time step and the stiffness of a contact decide verdicts at the border of the clearance, so they belong together:
+a contact's time constant of four steps, damping ratio 1.5. With a ratio of 1 a stick rocks in its slot for ever at 1
+to 5 mm/s; with a time constant of two steps a misaligned stick rattles over an edge that should stop it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+from apo_bench.errors import InputError
+
+
+@final
+@dataclass(frozen=True)
+class Physics:
+    """MuJoCo options shared by the demonstration and the replay."""
+
+    timestep_s: float = 0.001
+    solref: tuple[float, float] = (0.004, 1.5)
+    solimp: tuple[float, float, float, float, float] = (0.99, 0.999, 0.001, 0.5, 2.0)
+    """A soft impedance lets a grasp creep; 0.99 to 0.999 holds it to some micrometres a second."""
+    impratio: float = 100.0
+    """Stiff friction: without it a stick held off its centre turns in the hand by degrees a second."""
+    condim: int = 3
+    """Between parts, whose corners resist turning anyway; the gripper's pads ask for torsional friction themselves."""
+    tolerance: float = 1e-10
+    iterations: int = 50
+
+
+def physics(timestep_s: float = 0.001) -> Physics:
+    """The settings for a time step: the contact's time constant is four steps.
+
+    Raises:
+        InputError: A step for which the settings were not checked.
+    """
+    if not 0.0001 <= timestep_s <= 0.001:
+        raise InputError(
+            f"a time step of {timestep_s * 1e3:g} ms was given; 0.1 to 1 ms are allowed, "
+            "since a longer step lets misaligned parts slip into each other; use 1 (tables) or 0.5 (check)."
+        )
+    return Physics(timestep_s=timestep_s, solref=(4 * timestep_s, 1.5))

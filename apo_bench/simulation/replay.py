@@ -1,0 +1,72 @@
+"""The robot repeats a plan: open loop in the poses, closed loop only in force. The same controller for every method."""
+
+from __future__ import annotations
+
+from apo_bench.outcomes import sentence
+from apo_bench.program import Outcome, Plan, Reached, ReplayResult, Snapshot
+from apo_bench.simulation.prepare import transfers, unreachable
+from apo_bench.simulation.robot import Halt, Robot, Watch
+from apo_bench.simulation.scene import Scene
+from apo_bench.simulation.transfer import Transfer, transfer
+from apo_bench.simulation.world import snapshot
+from apo_bench.stability import unstable
+
+SETTLE_S = 0.5
+
+
+def replay(plan: Plan, scene: Scene, watch: Watch | None = None) -> ReplayResult:
+    """Carry out a plan.
+
+    Args:
+        watch: Called with the `MjData` about every 10 ms of simulated time.
+    """
+    robot = Robot(scene, plan.start, watch)
+    after: list[Snapshot | None] = [None] * len(plan.assembly)
+    moves = transfers(plan, scene)
+    outcome = _refusal(plan, scene, moves) or _carry_out(plan, robot, moves, after)
+    final = None
+    if outcome.code != "unstable_simulation":
+        final = _settled(robot, plan)
+    return ReplayResult(
+        reached=Reached(after=tuple(after), final=final),
+        outcome=outcome,
+        peak_force_n=robot.peak_force_n,
+        sim_seconds=float(robot.data.time),
+    )
+
+
+def _refusal(plan: Plan, scene: Scene, moves: tuple[Transfer, ...]) -> Outcome | None:
+    """What is wrong with the plan before anything moves."""
+    k = unstable(plan.assembly, plan.start, plan.goals)
+    if k is not None:
+        return _outcome(plan, "plan", "unstable_goal", k)
+    for step, t in zip(plan.schedule, moves, strict=True):
+        if unreachable(scene, t):
+            return _outcome(plan, "plan", "unreachable", step.operation)
+    return None
+
+
+def _carry_out(plan: Plan, robot: Robot, moves: tuple[Transfer, ...], after: list[Snapshot | None]) -> Outcome:
+    robot.wait(0.05)
+    for step, t in zip(plan.schedule, moves, strict=True):
+        try:
+            transfer(robot, t)
+        except Halt as halt:
+            if halt.code == "force_stop":
+                after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
+            return _outcome(plan, halt.stage, halt.code, step.operation)
+        after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
+    return Outcome("done", "ok", None, sentence("ok"))
+
+
+def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
+    try:
+        robot.wait(SETTLE_S)
+    except Halt as halt:
+        if halt.code == "unstable_simulation":
+            return None
+    return snapshot(robot.scene.work, robot.data, plan.start)
+
+
+def _outcome(plan: Plan, stage: str, code: str, k: int) -> Outcome:
+    return Outcome(stage, code, k, sentence(code, part=plan.assembly.operations[k].main, operation=k))
