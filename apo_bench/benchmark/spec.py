@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -52,6 +53,17 @@ class TrialSpec:
 def check_level(level: float, what: str = "level") -> None:
     """Raise an `InputError` unless the level is a number from 0 to the largest."""
     _within(level, 0.0, LARGEST_LEVEL, what, "where 1 means 1 mm and 1 degree standard deviation")
+
+
+def level_pair(level: float | Sequence[float]) -> tuple[float, float]:
+    """A level in mm and in degrees: one number stands for both, a pair for each."""
+    pair = (level, level) if isinstance(level, (int, float)) else tuple(level)
+    if len(pair) != 2:
+        raise InputError(f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees.")
+    mm, deg = float(pair[0]), float(pair[1])
+    check_level(mm, "level in mm")
+    check_level(deg, "level in degrees")
+    return mm, deg
 
 
 def check_careless(careless: float) -> None:

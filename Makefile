@@ -1,0 +1,44 @@
+# Two commands do everything, on a machine with Python 3.11 or newer and make:
+#   make sweep   set up, run a small benchmark, print the table, write the report
+#   make test    set up, check style and types, run every test
+
+PYTHON ?= python3
+TRIALS ?= 10
+WORKERS ?= 2
+OUT ?= runs/sweep
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+MIN := import sys; sys.exit(sys.version_info < (3, 11))
+
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+
+.PHONY: sweep test clean
+
+sweep: $(VENV)/.installed
+	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
+	    --methods oracle,none,paper --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
+	@$(BIN)/apo-bench report $(OUT) | tail -n 3
+
+test: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest -q -n 2 --dist worksteal
+
+clean:
+	rm -rf $(VENV) build dist runs .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+$(BIN)/python:
+	@$(PYTHON) -c '$(MIN)' || { echo "Python 3.11 or newer is needed; say which with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml | $(BIN)/python
+	$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
+	$(PIP) install --editable '.[dev]'
+	@touch $@ $(VENV)/.installed

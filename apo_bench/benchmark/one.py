@@ -1,0 +1,114 @@
+"""One trial by hand: from what was asked for on the command line to its row, a film, a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+from apo_bench.benchmark.spec import TrialSpec, check_clearance
+from apo_bench.benchmark.stages import see, show
+from apo_bench.benchmark.trial import Row, run_measured, run_trial
+from apo_bench.errors import InputError
+from apo_bench.files import observation_form, read_observation, write_form
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.scene import Scene, build_scene
+
+
+@final
+@dataclass(frozen=True)
+class Request:
+    """One replay; None stands for the default."""
+
+    scenario: str
+    level: float | None = None
+    level_mm: float | None = None
+    level_deg: float | None = None
+    careless: float | None = None
+    noise: str | None = None
+    seed: int = 0
+    method: str = "none"
+    clearance_mm: float | None = None
+    grasp: str = "friction"
+    arm: str = "six_axis"
+    timestep_s: float = 0.001
+    observation: Path | None = None
+    save_observation: Path | None = None
+    video: Path | None = None
+
+
+def run_one(request: Request) -> Row:
+    """Run the trial, or the replay of a measured observation, that was asked for.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
+    """
+    scenario = load_scenario(request.scenario)
+    spec = _spec(request, scenario.clearance_mm)
+    scene = build_scene(
+        scenario,
+        clearance_mm=spec.clearance_mm,
+        grasp=spec.grasp,
+        arm=spec.arm,
+        timestep_s=spec.timestep_s,
+    )
+    film = _film(scene) if request.video else None
+    if request.observation:
+        row = _measured(request.observation, spec, scene, film)
+    else:
+        row = _drawn(request, spec, scene, film)
+    if film is not None and row["sim_seconds"] is not None:
+        film.save(request.video)
+    return row
+
+
+def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
+    shown = show(scene, spec.careless, spec.seed)
+    if request.save_observation:
+        noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
+        name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
+        write_form(observation_form(see(scene, shown, noise, spec.seed), name), request.save_observation)
+    return run_trial(spec, scene, shown=shown, watch=film)
+
+
+def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
+    seen = read_observation(path, scene.scenario)
+    return run_measured(spec, scene, seen, path.read_text(encoding="utf-8"), watch=film)
+
+
+def _spec(request: Request, clearance_mm: float) -> TrialSpec:
+    if request.observation:
+        _refuse_contradictions(request)
+    if request.clearance_mm is not None:
+        check_clearance(request.clearance_mm)
+    level = 1.0 if request.level is None else request.level
+    return TrialSpec(
+        scenario=request.scenario,
+        level_mm=level if request.level_mm is None else request.level_mm,
+        level_deg=level if request.level_deg is None else request.level_deg,
+        careless=1.0 if request.careless is None else request.careless,
+        clearance_mm=clearance_mm if request.clearance_mm is None else request.clearance_mm,
+        noise=request.noise or "isotropic",
+        grasp=request.grasp,
+        arm=request.arm,
+        method=request.method,
+        seed=request.seed,
+        timestep_s=request.timestep_s,
+    )
+
+
+def _refuse_contradictions(request: Request) -> None:
+    """Nothing is drawn for an observation that comes from a file."""
+    for name in ("level", "level_mm", "level_deg", "careless", "noise", "save_observation"):
+        if getattr(request, name) is not None:
+            option = "--" + name.replace("_", "-")
+            raise InputError(
+                f"{option} was given together with --observation, which draws nothing; leave one of them out."
+            )
+
+
+def _film(scene: Scene) -> Any:
+    from apo_bench.simulation.render import Film
+
+    return Film(scene)

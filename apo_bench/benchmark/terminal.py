@@ -1,0 +1,89 @@
+"""What a person reads on the terminal: a trial, a table of rates, the list of scenarios."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from apo_bench.benchmark.figure import level_label
+from apo_bench.benchmark.report import failures, interval, percent
+from apo_bench.benchmark.statistics import Cell
+from apo_bench.scenario import Scenario
+
+
+def print_scenarios(scenarios: Sequence[Scenario]) -> None:
+    """Name, operations, title and place in the paper of each."""
+    table = Table("scenario", "operations", "title", "paper", box=None, pad_edge=False)
+    for s in scenarios:
+        table.add_row(s.name, str(len(s.assembly)), s.title, s.paper)
+    _console().print(table)
+
+
+def print_row(row: Mapping[str, Any]) -> None:
+    """One trial, from what was asked to how it ended."""
+    table = Table(show_header=False, box=None, pad_edge=False)
+    for name, value in _lines(row):
+        table.add_row(name, value)
+    _console().print(table)
+
+
+def print_cells(cells: Sequence[Cell]) -> None:
+    """Strict success rates with their intervals."""
+    table = Table(box=None, pad_edge=False)
+    for name in ("scenario", "clearance", "careless", "level", "method"):
+        table.add_column(name)
+    for name in ("success", "95 % interval", "n", "loose"):
+        table.add_column(name, justify="right")
+    table.add_column("failures")
+    for c in cells:
+        where = (f"{c.careless:g}", level_label(c.level, c.level_deg)) if c.method != "oracle" else ("any", "any")
+        rates = (percent(c.rate), interval(c), str(c.trials), percent(c.loose_rate))
+        table.add_row(c.scenario, f"{c.clearance_mm:g} mm", *where, c.method, *rates, failures(c))
+    _console().print(table)
+    excluded = sum(c.excluded for c in cells)
+    if excluded:
+        _console().print(f"{excluded} rows are left out, since the demonstration itself was not right.")
+
+
+def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if row["level"] is None:
+        asked = "measured observation"
+    else:
+        asked = f"level {level_label(row['level'], row['level_deg'])}, careless {row['careless']:g}, seed {row['seed']}"
+    lines = [
+        ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
+        ("trial", asked),
+        ("method", row["method"]),
+        ("result", _result(row)),
+        ("ended", row["sentence"]),
+    ]
+    if row["gap_before_mm"] is not None:
+        gaps = f"{row['gap_before_mm']:.3f} mm as seen, {row['gap_after_mm'] or 0.0:.3f} mm as planned"
+        lines.append(("contact gap", gaps))
+    if row["worst_gap_mm"] is not None:
+        lines.append(("reached", f"worst contact gap {row['worst_gap_mm']:.3f} mm, overlap {row['least_overlap']:.2f}"))
+    if row["pose_error_fixed_mm"] is not None:
+        errors = f"{row['pose_error_fixed_mm']:.3f} mm fixed by contacts, {row['pose_error_free_mm']:.3f} mm free"
+        lines.append(("pose error", errors))
+    if row["sim_seconds"] is not None:
+        lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
+    return lines
+
+
+def _result(row: Mapping[str, Any]) -> str:
+    if row["success"] is None:
+        return "none: the demonstration failed"
+    if row["success"]:
+        return "success (strict)"
+    loosely = ", loosely right" if row["loose_success"] else ""
+    where = "" if row["failure_operation"] is None else f", operation {row['failure_operation']}"
+    return f"failure at stage {row['failure_stage']}: {row['failure_code']}{where}{loosely}"
+
+
+def _console() -> Console:
+    """As wide as the terminal, and wide enough to keep lines whole where there is none."""
+    return Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False)

@@ -1,0 +1,257 @@
+"""The command line: `apo-bench scenarios | scene | replay | sweep | report`.
+
+Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
+request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from apo_bench import __version__
+from apo_bench.errors import InputError
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Does a robot's replay of an observed assembly fit, with and without correction by face contacts?",
+)
+
+WRONG_REQUEST = 2
+NO_RESULT = 1
+INTERRUPTED = 130
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that fit; default: the scenario's.")]
+GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
+ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
+NoiseOption = Annotated[str | None, typer.Option(help="Noise model, or package.module:name; default: isotropic.")]
+Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(args=given or ["--help"], prog_name="apo-bench", standalone_mode=False)
+    except InputError as error:
+        return _complain(str(error), WRONG_REQUEST)
+    except KeyboardInterrupt:
+        return _complain("interrupted; what had ended is kept, and the same command continues.", INTERRUPTED)
+    except RuntimeError as error:
+        return _complain(str(error), NO_RESULT)
+    except Exception as error:
+        if not hasattr(error, "format_message"):
+            raise
+        return _complain(" ".join(error.format_message().split()), WRONG_REQUEST)
+    return int(code or 0)
+
+
+def _complain(sentence: str, code: int) -> int:
+    typer.echo(f"apo-bench: {sentence}", err=True)
+    return code
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"apo-bench {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Options of every command."""
+
+
+@app.command()
+def scenarios() -> None:
+    """List the scenarios that come with the package."""
+    from apo_bench.benchmark.terminal import print_scenarios
+    from apo_bench.scenario_file import load_scenario, scenario_names
+
+    print_scenarios([load_scenario(name) for name in scenario_names()])
+
+
+@app.command()
+def scene(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, typer.Option(help="The MJCF file to write.")],
+    clearance: Clearance = None,
+    grasp: GraspOption = "friction",
+    arm: ArmOption = "six_axis",
+    timestep_ms: Timestep = 1.0,
+) -> None:
+    """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
+    from apo_bench.benchmark.spec import check_clearance
+    from apo_bench.scenario_file import load_scenario
+    from apo_bench.simulation.scene import scene_xml
+
+    if clearance is not None:
+        check_clearance(clearance)
+    loaded = load_scenario(scenario)
+    _check_writable(out, "--out", (".xml",))
+    xml = scene_xml(loaded, clearance_mm=clearance, grasp=grasp, arm=arm, timestep_s=timestep_ms * 1e-3)
+    out.write_text(xml, encoding="utf-8")
+    typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
+
+
+@app.command()
+def replay(
+    scenario: ScenarioArgument,
+    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees, standard deviation; default 1.")] = None,
+    level_mm: Annotated[float | None, typer.Option(help="Only the mm; default: the level.")] = None,
+    level_deg: Annotated[float | None, typer.Option(help="Only the degrees; default: the level.")] = None,
+    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
+    seed: Annotated[int, typer.Option(help="Number of the trial.")] = 0,
+    method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "none",
+    clearance: Clearance = None,
+    grasp: GraspOption = "friction",
+    arm: ArmOption = "six_axis",
+    noise: NoiseOption = None,
+    timestep_ms: Timestep = 1.0,
+    observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,
+    save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
+    video: Annotated[Path | None, typer.Option(help="Write a film of the replay: .mp4 or .gif.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
+) -> None:
+    """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
+    from apo_bench.benchmark.one import Request, run_one
+    from apo_bench.benchmark.terminal import print_row
+
+    for path, option, endings in (
+        (video, "--video", (".mp4", ".gif")),
+        (save_observation, "--save-observation", (".json",)),
+    ):
+        if path is not None:
+            _check_writable(path, option, endings)
+    row = run_one(
+        Request(
+            scenario=scenario,
+            level=level,
+            level_mm=level_mm,
+            level_deg=level_deg,
+            careless=careless,
+            noise=noise,
+            seed=seed,
+            method=method,
+            clearance_mm=clearance,
+            grasp=grasp,
+            arm=arm,
+            timestep_s=timestep_ms * 1e-3,
+            observation=observation,
+            save_observation=save_observation,
+            video=video,
+        )
+    )
+    if as_json:
+        typer.echo(json.dumps(row, allow_nan=False))
+    else:
+        print_row(row)
+    if video is not None and row["sim_seconds"] is None:
+        typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
+    if row["success"] is None:
+        raise typer.Exit(NO_RESULT)
+
+
+@app.command()
+def sweep(
+    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Names, or scenario files.")],
+    out: Annotated[Path, typer.Option(help="Folder of the rows; one that was interrupted is continued.")],
+    levels: Annotated[str, typer.Option(help="Noise levels, mm and degrees.")] = "0,0.1,0.25,0.5,1,2,4",
+    careless: Annotated[str, typer.Option(help="Carelessness of the human.")] = "0,1",
+    methods: Annotated[str, typer.Option(help="oracle, none and correctors.")] = "oracle,none,paper",
+    trials: Annotated[int, typer.Option(help="Trials per cell; the same seeds in every cell.")] = 100,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 0,
+    clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,
+    grasp: GraspOption = "friction",
+    arm: ArmOption = "six_axis",
+    noise: NoiseOption = None,
+    timestep_ms: Timestep = 1.0,
+    workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
+) -> None:
+    """Run every combination and print success rates with Wilson 95 % intervals."""
+    from apo_bench.benchmark import sweep as runner
+    from apo_bench.benchmark.grid import SweepSpec
+    from apo_bench.benchmark.statistics import tally
+    from apo_bench.benchmark.terminal import print_cells
+
+    spec = SweepSpec(
+        scenarios=tuple(scenarios),
+        levels=_numbers(levels, "--levels"),
+        careless=_numbers(careless, "--careless"),
+        methods=_words(methods, "--methods"),
+        clearances_mm=() if clearance is None else _numbers(clearance, "--clearance"),
+        trials=trials,
+        seed=seed,
+        noise=noise or "isotropic",
+        grasp=grasp,
+        arm=arm,
+        timestep_s=timestep_ms * 1e-3,
+    )
+    command = shlex.join(["apo-bench", *sys.argv[1:]])
+    rows = runner.sweep(spec, out, workers=_cores() if workers is None else workers, command=command)
+    print_cells(tally(rows))
+    typer.echo(
+        f"{len(rows)} rows in {out / 'trials.jsonl'}; table and figure: apo-bench report {shlex.quote(str(out))}"
+    )
+
+
+@app.command()
+def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep --out` wrote.")]) -> None:
+    """Write the table (CSV), the success-over-level figure (PNG) and a page with both."""
+    from apo_bench.benchmark.journal import read_rows
+    from apo_bench.benchmark.report import report as write_report
+    from apo_bench.benchmark.statistics import tally
+    from apo_bench.benchmark.terminal import print_cells
+
+    made = write_report(folder)
+    print_cells(tally(read_rows(folder)))
+    typer.echo(f"Table:  {made.table}\nFigure: {made.figure}\nReport: {made.page}")
+
+
+def _numbers(text: str, option: str) -> tuple[float, ...]:
+    """`0,0.5,1` as numbers; whether they are allowed is checked where they are used."""
+    try:
+        return tuple(float(word) for word in _words(text, option))
+    except ValueError as error:
+        raise InputError(
+            f"{option} {text} was given; numbers with commas between them are allowed: 0,0.5,1."
+        ) from error
+
+
+def _words(text: str, option: str) -> tuple[str, ...]:
+    words = tuple(word.strip() for word in text.split(","))
+    if not all(words):
+        raise InputError(f"{option} '{text}' was given; at least one entry is needed, with single commas between them.")
+    return words
+
+
+def _check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
+    allowed = " or ".join(endings)
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{option} {path} was given; a file name that ends in {allowed} is allowed.")
+    folder = path.parent
+    if path.is_dir() or not folder.is_dir() or not os.access(path if path.exists() else folder, os.W_OK):
+        raise InputError(f"{option} {path} cannot be written; name a file in a folder that exists and can be written.")
+
+
+def _cores() -> int:
+    affinity: Any = getattr(os, "sched_getaffinity", None)
+    return max(1, min(64, len(affinity(0)) if affinity else os.cpu_count() or 1))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

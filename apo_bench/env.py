@@ -1,0 +1,295 @@
+"""The door for learners: `APOReplay-v0`, and the wrapper that corrects what was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Assembly
+from apo_bench.benchmark.spec import check_careless, check_clearance, check_seed, level_pair
+from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, see, show, unseen
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.observation.noise import Level, Noise, make_noise
+from apo_bench.outcomes import sentence
+from apo_bench.program import Observation, Plan, Poses
+from apo_bench.scenario import Scenario
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.arm import Arm
+from apo_bench.simulation.scene import build_scene
+
+ROOM_M = 2.0
+"""Every goal that can be seen lies within this of the origin, per axis."""
+LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
+"""No stated standard deviation is larger, [m, rad]."""
+LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
+"""How far an action can move a goal per axis, [m, rad]."""
+PICTURE = (480, 640)
+
+Action = NDArray[np.float64]
+Seen = dict[str, Any]
+
+
+@final
+class APOReplay(gymnasium.Env[Seen, Action]):
+    """Replay an observed assembly.
+
+    ## Description
+    A human assembles a few parts on a table; a camera sees where each part was put, with an error. A robot arm with
+    a parallel gripper repeats the assembly. One reset is one noisy demonstration, one step is one whole replay.
+
+    ## Observation Space
+    A `Dict`, one entry per operation of the assembly, in their order:
+
+    - `goals`, `Box(n, 7)`: the pose of the moved part when the operation was over, (x, y, z, qw, qx, qy, qz),
+      world frame, [m].
+    - `covariance`, `Box(n, 6, 6)`: of the body twist by which each goal may be wrong, [m, rad].
+    - `seen`, `MultiBinary(n)`: whether the operation was seen at all.
+
+    Which faces touch is certain and stays the same: `env.unwrapped.assembly`. All of it as one typed object is
+    `env.unwrapped.seen`.
+
+    ## Action Space
+    `Box(n, 6)`: a body twist (x, y, z, rx, ry, rz) per operation, [m, rad], in the frame of the moved part, within
+    0.1 m and 0.5 rad per axis. The robot is asked for `goal @ exp(twist)`; zeros replay what was seen.
+
+    ## Rewards
+    1.0 if the assembly is right in the strict sense of the judge, else 0.0.
+
+    ## Starting State
+    The layout, the human's carelessness and the observation error are drawn anew. `reset(seed=k)` is trial k of
+    sweeps and of `apo-bench replay --seed k`, whatever came before; `reset()` draws the number of a trial. The parts
+    stand where the demonstration began.
+
+    ## Episode End
+    Every step terminates. `info` then holds `is_success`, `loose_success`, `stage` and `code` (`done` and `ok`, or
+    out of `apo_bench.outcomes`), `operation` (numbered from 1, or None) and `sentence`; never the truth.
+    A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
+    keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
+
+    ## Arguments
+    - `scenario`: a name (`apo-bench scenarios`), the path of a scenario file, or a `Scenario`.
+    - `level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
+    - `careless`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
+    - `noise`: a noise model by name, as `module:name`, or the object.
+    - `grasp`: `friction`, or `weld` for an ideal gripper.
+    - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
+    - `arm`: by name, or an `Arm`.
+    - `timestep_s`: of the physics.
+    - `render_mode`: `rgb_array` shows the parts before the step and what was reached after it, without a display;
+      `human` opens a window when the replay begins.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 25}  # noqa: RUF012
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario = "stick_in_tower",
+        level: float | Sequence[float] = 1.0,
+        careless: float = 1.0,
+        noise: str | Callable[..., Any] = "isotropic",
+        grasp: str = "friction",
+        clearance_mm: float | None = None,
+        arm: str | Arm = "six_axis",
+        timestep_s: float = 0.001,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
+        check_careless(careless)
+        if clearance_mm is not None:
+            check_clearance(clearance_mm)
+        self.render_mode = render_mode
+        self._careless = careless
+        self._noise: Noise = make_noise(noise, Level(*level_pair(level)))
+        self._scene = build_scene(
+            load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
+        )
+        n = len(self.assembly)
+        far = np.tile([ROOM_M] * 3 + [1.0] * 4, (n, 1))
+        unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
+        twist = np.tile(LARGEST_TWIST, (n, 1))
+        self.observation_space = spaces.Dict(
+            {
+                "goals": spaces.Box(-far, far, dtype=np.float64),
+                "covariance": spaces.Box(-unsure, unsure, dtype=np.float64),
+                "seen": spaces.MultiBinary(n),
+            }
+        )
+        self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
+        self._shown: Shown | None = None
+        self._seen: Observation | None = None
+        self._aim: Array | None = None
+        self._refused: Ending | None = None
+        self._over = False
+        self._poses: Poses = self._scene.scenario.start
+        self._window: Any = None
+
+    @property
+    def assembly(self) -> Assembly:
+        """The topology: what is certain."""
+        return self._scene.scenario.assembly
+
+    @property
+    def seen(self) -> Observation:
+        """What was seen in this episode, as one typed object.
+
+        Raises:
+            ResetNeeded: There is no episode yet.
+        """
+        if self._seen is None:
+            raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
+        return self._seen
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """Watch another demonstration; `seed=k` is trial k. There are no options."""
+        if seed is not None:
+            check_seed(int(seed))
+        super().reset(seed=seed)
+        trial = int(seed) if seed is not None else self._next_trial()
+        shown = show(self._scene, self._careless, trial)
+        while seed is None and shown.demonstration.code != "ok":
+            trial = self._next_trial()
+            shown = show(self._scene, self._careless, trial)
+        self._shown, self._seen = shown, see(self._scene, shown, self._noise, trial)
+        self._aim, self._refused, self._over = self._seen.goals, unseen(self._seen), False
+        self._poses = shown.layout.start
+        return self._observation(), {"trial": trial, "demonstration": shown.demonstration.code}
+
+    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+        """Replay the goals, each moved by its twist.
+
+        Raises:
+            ResetNeeded: The episode is over, or there is none.
+            InputError: The action is not in the action space.
+        """
+        if self._shown is None or self._aim is None or self._over:
+            raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
+        twist = np.asarray(action, dtype=np.float64)
+        if not self.action_space.contains(twist):
+            raise InputError(
+                f"an action of shape {twist.shape} was given; shape {self.action_space.shape} within 0.1 m and 0.5 rad "
+                "is allowed, as `env.action_space` says."
+            )
+        self._over = True
+        success, loose, end = self._replayed(self._shown, self._aim @ pose.exp(twist))
+        info = {
+            "is_success": success,
+            "loose_success": loose,
+            "stage": end.stage,
+            "code": end.code,
+            "operation": None if end.operation is None else end.operation + 1,
+            "sentence": end.sentence,
+        }
+        return self._observation(), float(success), True, False, info
+
+    def aim(self, goals: Array) -> None:
+        """Replay these goals (n, 4, 4) on zeros, until the next reset; for wrappers."""
+        self._aim, self._refused = frozen(goals, len(self.assembly), 4, 4), None
+
+    def refuse(self, code: str, why: str) -> None:
+        """Do not replay at all: the next step fails at stage `correct`; for wrappers."""
+        self._refused = Ending("correct", code, None, why)
+
+    def render(self) -> Any:
+        """The scene as an array (480, 640, 3) of uint8; None in mode `human`, which shows the replay itself."""
+        if self.render_mode != "rgb_array":
+            return None
+        from apo_bench.simulation.render import picture
+
+        return picture(self._scene, self._poses, PICTURE[1], PICTURE[0])
+
+    def close(self) -> None:
+        """Close the window, if one is open."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def _next_trial(self) -> int:
+        return int(self.np_random.integers(2**31))
+
+    def _observation(self) -> Seen:
+        """Fresh copies of what was seen; rounding must not push a quaternion out of its bounds."""
+        goals = pose.pack(self.seen.goals)
+        goals[:, 3:] = np.clip(goals[:, 3:], -1.0, 1.0)
+        return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
+
+    def _replayed(self, shown: Shown, goals: Array) -> tuple[bool, bool, Ending]:
+        """Strict success, loose success, and where it ended."""
+        code = shown.demonstration.code
+        if code != "ok":
+            return False, False, Ending("demonstrate", code, None, sentence(code))
+        if self._refused is not None:
+            return False, False, self._refused
+        tried = attempt(Plan(self.assembly, self.seen.start, goals), self._scene, shown.layout.goals, self._watch())
+        if tried.result.reached.final is not None:
+            self._poses = tried.result.reached.final.poses
+        return tried.verdict.success, tried.verdict.loose_success, ending(tried)
+
+    def _watch(self) -> Any:
+        if self.render_mode == "human" and self._window is None:
+            from apo_bench.simulation.render import Viewer
+
+            self._window = Viewer(self._scene)
+        return self._window
+
+
+@final
+class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
+    """Correct what was seen, at every reset: the with-correction arm of an experiment.
+
+    The observation then holds the corrected goals, zeros replay them, and an action composes on top. A correction
+    that does not converge is not executed: the step ends with reward 0 at stage `correct`.
+    """
+
+    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = "paper") -> None:
+        """Wrap an `APOReplay` environment.
+
+        Args:
+            corrector: A name, `"package.module:name"`, or a callable `Observation -> Correction`.
+
+        Raises:
+            InputError: There is no such corrector, or the environment is another one.
+        """
+        from apo_bench.correction.correct import CORRECTORS, correct
+        from apo_bench.names import resolve
+
+        gymnasium.utils.RecordConstructorArgs.__init__(self, corrector=corrector)
+        super().__init__(env)
+        if not isinstance(env.unwrapped, APOReplay):
+            raise InputError(f"`Corrected` wraps an APOReplay environment, {env.unwrapped} was given.")
+        self._base: APOReplay = env.unwrapped
+        self._corrector = resolve(corrector, CORRECTORS, "corrector")
+        self._correct = correct
+        self._goals: Array | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """Watch another demonstration and correct it."""
+        seen, info = self.env.reset(seed=seed, options=options)
+        made = self._correct(self._base.seen, self._corrector)
+        if made.ok:
+            self._base.aim(made.goals)
+        else:
+            self._base.refuse(made.status, made.sentence)
+        self._goals = pose.pack(made.goals)
+        self._goals[:, 3:] = np.clip(self._goals[:, 3:], -1.0, 1.0)
+        return self._with_goals(seen), {**info, "correction": made.status}
+
+    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+        """Replay the corrected goals, each moved by its twist."""
+        seen, reward, terminated, truncated, info = self.env.step(action)
+        return self._with_goals(seen), float(reward), terminated, truncated, info
+
+    def _with_goals(self, seen: Seen) -> Seen:
+        assert self._goals is not None
+        return {**seen, "goals": self._goals.copy()}
