@@ -114,7 +114,7 @@ cells = st.lists(st.tuples(*[st.integers(0, 3)] * 3, *[st.integers(1, 3)] * 3), 
 
 
 @given(cells)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_union_is_what_counted_cells_say(spans: list[tuple[int, ...]]):
     """An independent count on a grid of unit cells: volume, centroid, and the area that looks along each direction."""
     full = np.zeros((8, 8, 8), bool)
@@ -133,6 +133,18 @@ def test_a_union_is_what_counted_cells_say(spans: list[tuple[int, ...]]):
         assert areas == pytest.approx(1e-4 * bare.sum(), abs=1e-10)
         heights = {round(s.height * 100) for s in union.surfaces if s.side == side}
         assert heights == {i - (step < 0) for i in np.argwhere(bare)[:, axis]}
+
+
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_a_mesh_union_has_the_same_volume_and_surface(name: str):
+    import trimesh
+
+    solid = load_part(name)
+    boxes = [trimesh.creation.box(bounds=(b.center - b.half, b.center + b.half)) for b in solid.boxes]
+    mesh = trimesh.boolean.union(boxes, engine="manifold") if len(boxes) > 1 else boxes[0]
+    assert mesh.volume == pytest.approx(solid.volume, rel=1e-6)
+    assert mesh.center_mass == pytest.approx(solid.centroid, abs=1e-7)
+    assert mesh.area == pytest.approx(sum(area(face) for face in solid.faces.values()), rel=1e-6)
 
 
 GOOD = """<mujoco model="thing">
@@ -281,9 +293,8 @@ def test_a_side_with_a_fit_face_and_another_cannot_recede():
 def test_reading_parts_needs_no_simulator():
     code = (
         "import sys\n"
-        "for name in ('mujoco', 'dm_control', 'mink', 'gymnasium'): sys.modules[name] = None\n"
+        "for name in ('mujoco', 'dm_control', 'mink'): sys.modules[name] = None\n"
         "from apo_bench.parts import load_part\n"
-        "assert 'trimesh' not in sys.modules and 'shapely' not in sys.modules\n"
         "print(len(load_part('castle').faces))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -1,12 +1,16 @@
-"""The faces of a union of boxes: coplanar, edge-connected pieces of its surface."""
+"""The union of boxes as a solid with flat faces, exactly: on the grid that the sides of all boxes make.
+
+A mesh union computes in rounded numbers and leaves stray corners and fins where boxes share planes; on the grid every
+cell is full or empty, and a face is what lies between the two.
+"""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.polygon import straightened
@@ -63,24 +67,25 @@ class Union(NamedTuple):
     surfaces: tuple[Surface, ...]
     """In the order of `SIDES`, then by height, then by lowest corner."""
     centroid: Array
+    """(3,), [m]."""
     volume: float
+    """[m^3]."""
     pieces: int
-    """How many solids hang together only loosely or not at all; 1 for a rigid part."""
+    """How many solids it is; those that only share an edge or a corner count apart."""
 
 
 def unite(boxes: Sequence[Box]) -> Union:
-    """The union of boxes as a solid with flat faces; coordinates are those of the boxes, exactly.
-
-    The union is made on the grid of all sides of all boxes, in whole numbers, which no rounding touches.
-    """
-    import trimesh
+    """The union of boxes; every coordinate is that of a side of a box."""
+    from scipy.ndimage import label
 
     grid = [_planes(boxes, axis) for axis in range(3)]
-    solids = [trimesh.creation.box(bounds=_ranks(box, grid)) for box in boxes]
-    mesh = trimesh.boolean.union(solids, engine="manifold") if len(solids) > 1 else solids[0]
-    triangles = _off_grid(np.asarray(mesh.vertices), grid)[np.asarray(mesh.faces)]
-    volume, centroid = _content(triangles)
-    return Union(_surfaces(triangles), centroid, volume, int(mesh.body_count))
+    full = _full_cells(boxes, grid)
+    volumes = np.einsum("i,j,k,ijk->ijk", *(np.diff(planes) for planes in grid), full)
+    volume = float(volumes.sum())
+    middles = [(planes[1:] + planes[:-1]) / 2 for planes in grid]
+    centroid = [np.moveaxis(volumes, axis, 0).sum(axis=(1, 2)) @ middles[axis] / volume for axis in range(3)]
+    surfaces = sorted(_surfaces(full, grid), key=lambda s: (s.side, s.height, s.shape.bounds))
+    return Union(tuple(surfaces), np.array(centroid), volume, int(label(full)[1]))
 
 
 def _planes(boxes: Sequence[Box], axis: int) -> Array:
@@ -89,41 +94,31 @@ def _planes(boxes: Sequence[Box], axis: int) -> Array:
     return np.round(sides[np.diff(sides, prepend=-np.inf) > SAME_PLANE_M], 12)
 
 
-def _ranks(box: Box, grid: Sequence[Array]) -> Array:
-    """The box on the grid: ranks of its lowest and highest corner, (2, 3)."""
-    corners = (box.center - box.half, box.center + box.half)
-    return np.array([[np.abs(g - x).argmin() for g, x in zip(grid, corner, strict=True)] for corner in corners], float)
+def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_]:
+    """Which cells of the grid lie in a box."""
+    full = np.zeros([len(planes) - 1 for planes in grid], dtype=np.bool_)
+    for box in boxes:
+        low, high = box.center - box.half, box.center + box.half
+        span = [
+            slice(int(np.abs(p - a).argmin()), int(np.abs(p - b).argmin()))
+            for p, a, b in zip(grid, low, high, strict=True)
+        ]
+        full[tuple(span)] = True
+    return full
 
 
-def _off_grid(corners: Array, grid: Sequence[Array]) -> Array:
-    """Points on the grid (k, 3) as points of the part, [m]; only points inside faces and edges have broken ranks."""
-    whole = np.rint(corners)
-    ranks = np.where(np.abs(corners - whole) < 1e-4, whole, corners)
-    return np.column_stack([np.interp(r, np.arange(len(g)), g) for r, g in zip(ranks.T, grid, strict=True)])
+def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surface]:
+    """Every face: squares between full and empty cells, gathered by plane, joined where they share an edge."""
+    import shapely
 
-
-def _content(triangles: Array) -> tuple[float, Array]:
-    """Volume [m^3] and centre of volume (3,) inside a closed surface (k, 3, 3), by tetrahedra from one corner."""
-    edges = triangles - triangles[0, 0]
-    volumes = np.einsum("ki,ki->k", np.cross(edges[:, 0], edges[:, 1]), edges[:, 2]) / 6
-    volume = float(volumes.sum())
-    return volume, triangles[0, 0] + volumes @ edges.sum(axis=1) / 4 / volume
-
-
-def _surfaces(triangles: Array) -> tuple[Surface, ...]:
-    """Triangles (k, 3, 3) gathered by plane; what hangs together over edges is one face."""
-    from shapely import Polygon, unary_union
-
-    planes: dict[tuple[int, float], list[Any]] = defaultdict(list)
-    for triangle in triangles:
-        n = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
-        axis = int(np.abs(n).argmax())
-        key = 2 * axis + int(n[axis] < 0), float(triangle[0, axis])
-        flat = Polygon(triangle[:, [(axis + 1) % 3, (axis + 2) % 3]])
-        if flat.area > 0:
-            planes[key].append(flat)
-    found = []
-    for (side, height), flats in planes.items():
-        joined = unary_union(flats)
-        found += [Surface(side, height, piece) for piece in getattr(joined, "geoms", (joined,))]
-    return tuple(sorted(found, key=lambda s: (s.side, s.height, s.shape.bounds)))
+    for side in range(len(SIDES)):
+        axis, forward = side // 2, side % 2 == 0
+        u, v = grid[(axis + 1) % 3], grid[(axis + 2) % 3]
+        layers = np.moveaxis(full, [axis, (axis + 1) % 3, (axis + 2) % 3], [0, 1, 2])
+        for k, layer in enumerate(layers):
+            beyond = k + 1 if forward else k - 1
+            bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
+            i, j = np.nonzero(bare)
+            joined = shapely.unary_union(shapely.box(u[i], v[j], u[i + 1], v[j + 1]))
+            for piece in getattr(joined, "geoms", () if joined.is_empty else (joined,)):
+                yield Surface(side, float(grid[axis][k + forward]), piece)

@@ -21,6 +21,7 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 FIT_CLASS = "fit"
 LARGEST_BYTES = 1_000_000
 LARGEST_M = 10.0
+MOST_BOXES = 100
 TURNS = ("quat", "euler", "axisangle", "xyaxes", "zaxis")
 
 
@@ -59,6 +60,8 @@ def read_part(path: Path) -> PartFile:
     marks = tuple(_mark(path, e, a) for e, a in elements if e.tag == "site")
     if not boxes:
         raise InputError(f"{path}: body '{body.get('name', '')}' has no geom; give it at least one named box.")
+    if len(boxes) > MOST_BOXES:
+        raise InputError(f"{path}: there are {len(boxes)} geoms; a part has at most {MOST_BOXES} boxes.")
     for kind, names in (("geom", [b.name for b in boxes]), ("site", [m.name for m in marks])):
         for name in names:
             if names.count(name) > 1:
