@@ -84,7 +84,9 @@ def test_unpack_refuses_a_zero_quaternion() -> None:
 def test_quarter_turns_are_exact(quarters: tuple[int, int, int]) -> None:
     T = pose.at((0.0, 0.0, 0.0), 90.0 * np.array(quarters))
     assert set(np.unique(T[:3, :3])) <= {-1.0, 0.0, 1.0}
-    assert_allclose(T[:3, :3], Rotation.from_euler("xyz", 90.0 * np.array(quarters), degrees=True).as_matrix(), atol=1e-12)
+    assert_allclose(
+        T[:3, :3], Rotation.from_euler("xyz", 90.0 * np.array(quarters), degrees=True).as_matrix(), atol=1e-12
+    )
 
 
 @given(st.tuples(*[st.floats(-180.0, 180.0)] * 3))

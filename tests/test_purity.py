@@ -1,0 +1,70 @@
+"""The pure modules know no simulator, and importing the package does nothing that a person would notice."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import apo_bench
+
+PACKAGE = Path(apo_bench.__file__).parent
+IMPURE = ("simulation", "benchmark", "env", "cli")
+
+
+def pure_modules() -> list[str]:
+    """Every module of the package outside the rooms that may know the simulator."""
+    names = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        inside = path.relative_to(PACKAGE).with_suffix("").parts
+        if inside[0] not in IMPURE:
+            names.append(".".join(("apo_bench", *(part for part in inside if part != "__init__"))))
+    return names
+
+
+def python(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        cwd=PACKAGE.parent,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_the_list_is_not_empty() -> None:
+    expected = {"assembly", "program", "judge", "stability", "pose_error", "observation.isotropic", "correction.paper"}
+    assert {f"apo_bench.{name}" for name in expected} <= set(pure_modules())
+
+
+def test_pure_modules_import_without_any_simulator() -> None:
+    """The corrector uses contacts and noisy poses and nothing else; here that is an import rule.
+
+    The package itself registers its environment, so Gymnasium is taken away once it has done so.
+    """
+    done = python(
+        "import sys, importlib\n"
+        "for name in ('mujoco', 'mink', 'dm_control'): sys.modules[name] = None\n"
+        "import apo_bench\n"
+        "sys.modules['gymnasium'] = sys.modules['apo_bench.simulation'] = None\n"
+        f"for name in {pure_modules()!r}: importlib.import_module(name)\n"
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+HEAVY = ("mujoco", "dm_control", "trimesh", "manifold3d", "mink", "matplotlib", "scipy.optimize", "glfw", "OpenGL")
+
+
+def test_importing_the_package_is_light_and_silent() -> None:
+    done = python(f"import sys, apo_bench; print([name for name in {HEAVY!r} if name in sys.modules])")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
+
+
+@pytest.mark.parametrize("module", ["apo_bench.judge", "apo_bench.correction.paper", "apo_bench.observation.isotropic"])
+def test_the_heart_needs_neither_trimesh_nor_matplotlib(module: str) -> None:
+    unwanted = ("trimesh", "manifold3d", "matplotlib")
+    code = f"import sys, {module}; print([name for name in {unwanted!r} if name in sys.modules])"
+    assert python(code).stdout == "[]\n"
