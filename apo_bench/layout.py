@@ -56,9 +56,9 @@ def layout_at(
 
 def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Array:
     """The start of the physical part: let down until its lowest point is where the nominal one was."""
-    if part in scenario.assembly.fixed:
-        return T
     solid = scenario.assembly.solids[part]
+    if part in scenario.assembly.fixed or clearance_m == 0.0 or not any(face.fit for face in solid.faces.values()):
+        return T
     lowered = np.array(T)
     lowered[2, 3] -= _lowest(T, physical_boxes(solid, clearance_m)) - _lowest(T, solid.boxes)
     return lowered

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import SLIVER_M2
 from apo_bench.geometry.solid import Box, Face, Solid
 
@@ -34,13 +34,42 @@ def physical_boxes(solid: Solid, clearance_m: float) -> tuple[Box, ...]:
             f"a clearance of {1e3 * clearance_m:g} mm was given for part '{solid.name}'; "
             "give a finite length per side that is not negative."
         )
-    return tuple(_receded(solid, box, clearance_m) for box in solid.boxes)
+    if not any(face.fit for face in solid.faces.values()):
+        return solid.boxes
+    sides = [_Side(face.name, face.fit, *_plane(face), _flat(face)) for face in solid.faces.values()]
+    return tuple(_receded(solid, box, sides, clearance_m) for box in solid.boxes)
 
 
-def _receded(solid: Solid, box: Box, clearance_m: float) -> Box:
-    recede = clearance_m * np.array(
-        [[_carries_fit(solid, box, axis, sign) for sign in (-1, 1)] for axis in range(3)], dtype=np.float64
-    )
+class _Side(NamedTuple):
+    """A face as a polygon on an axis-aligned plane."""
+
+    name: str
+    fit: bool
+    axis: int
+    sign: int
+    height: float
+    shape: Any
+
+
+def _plane(face: Face) -> tuple[int, int, float]:
+    """Axis along which the face looks, sign, coordinate [m]."""
+    n = face.normal
+    axis = int(np.abs(n).argmax())
+    return axis, int(np.sign(n[axis])), float(face.outline[0, axis])
+
+
+def _flat(face: Face) -> Any:
+    """The face in the two coordinates that follow its axis cyclically."""
+    from shapely import Polygon
+
+    axis = _plane(face)[0]
+    plane = [(axis + 1) % 3, (axis + 2) % 3]
+    return Polygon(face.outline[:, plane], [hole[:, plane] for hole in face.holes])
+
+
+def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float) -> Box:
+    carries = [[_carries_fit(solid, box, sides, axis, sign) for sign in (-1, 1)] for axis in range(3)]
+    recede = clearance_m * np.array(carries, dtype=np.float64)
     half = box.half - recede.sum(axis=1) / 2
     if (half <= 0).any():
         raise InputError(
@@ -50,10 +79,14 @@ def _receded(solid: Solid, box: Box, clearance_m: float) -> Box:
     return Box(box.name, box.center + (recede[:, 0] - recede[:, 1]) / 2, half)
 
 
-def _carries_fit(solid: Solid, box: Box, axis: int, sign: int) -> bool:
-    """Whether a side of the box carries a fit face; it must then carry no other."""
-    found = [face for face in solid.faces.values() if _lies_on(face, box, axis, sign)]
-    fit, other = [f.name for f in found if f.fit], [f.name for f in found if not f.fit]
+def _carries_fit(solid: Solid, box: Box, sides: Sequence[_Side], axis: int, sign: int) -> bool:
+    """Whether a side of the box carries a fit face, or a piece of one; it must then carry no other."""
+    height = box.center[axis] + sign * box.half[axis]
+    near = [s for s in sides if (s.axis, s.sign) == (axis, sign) and abs(s.height - height) < IN_PLANE_M]
+    if not any(side.fit for side in near):
+        return False
+    on = [side for side in near if side.shape.intersection(_rectangle(box, axis)).area > SLIVER_M2]
+    fit, other = [side.name for side in on if side.fit], [side.name for side in on if not side.fit]
     if fit and other:
         raise InputError(
             f"box '{box.name}' of part '{solid.name}' has the fit face '{fit[0]}' and the face '{other[0]}' on one "
@@ -62,24 +95,9 @@ def _carries_fit(solid: Solid, box: Box, axis: int, sign: int) -> bool:
     return bool(fit)
 
 
-def _lies_on(face: Face, box: Box, axis: int, sign: int) -> bool:
-    """Whether a piece of the face lies on the side of the box."""
-    if face.normal[axis] * sign < 0.5:
-        return False
-    if np.abs(face.outline[:, axis] - (box.center[axis] + sign * box.half[axis])).max() > IN_PLANE_M:
-        return False
+def _rectangle(box: Box, axis: int) -> Any:
+    """The shadow of the box along an axis."""
+    import shapely
+
     plane = [(axis + 1) % 3, (axis + 2) % 3]
-    side = _rectangle(box.center[plane] - box.half[plane], box.center[plane] + box.half[plane])
-    return bool(side.intersection(_flat(face, plane)).area > SLIVER_M2)
-
-
-def _rectangle(low: Array, high: Array) -> Any:
-    from shapely import box
-
-    return box(*low, *high)
-
-
-def _flat(face: Face, plane: list[int]) -> Any:
-    from shapely import Polygon
-
-    return Polygon(face.outline[:, plane], [hole[:, plane] for hole in face.holes])
+    return shapely.box(*(box.center - box.half)[plane], *(box.center + box.half)[plane])
