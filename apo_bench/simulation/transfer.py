@@ -12,11 +12,13 @@ from apo_bench.simulation.paths import moved, smooth, steady
 from apo_bench.simulation.robot import Guard, Halt, Robot
 
 UP = np.array([0.0, 0.0, 1.0])
-FREE, CARRY, NEAR = 0.9, 0.4, 0.35
-"""Peak speeds [m/s]: empty hand, with a part (drift in the hand grows with speed), close to parts."""
+FREE, NEAR = 0.9, 0.35
+"""Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
+LIFT, CARRY, LOWER = 0.25, 0.35, 0.2
+"""Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
 PLACE, TOUCH, INSERT = 0.06, 0.01, 0.05
 """Steady speeds [m/s]: down to just above the support, onto it, along an insertion."""
-SAFE_M = 0.19
+SAFE_M = 0.15
 """Height of the tip at which parts are carried over the others."""
 HOVER_M, DEPART_M = 0.11, 0.09
 OPEN_TO_PICK_M, OPEN_TO_RELEASE_M = 0.012, 0.008
@@ -106,7 +108,7 @@ def _lift(robot: Robot, t: Transfer) -> None:
         robot.follow(smooth(robot.T, moved(robot.T, UP, t.raise_by), 0.01))
         robot.follow(smooth(robot.T, moved(robot.T, t.way_out, t.travel_out), 0.1))
     robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.03))
-    robot.follow(smooth(robot.T, _at_height(robot.T, max(SAFE_M, robot.T[2, 3])), NEAR))
+    robot.follow(smooth(robot.T, _at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
 
 
 def _carry(robot: Robot, t: Transfer) -> None:
@@ -115,7 +117,7 @@ def _carry(robot: Robot, t: Transfer) -> None:
     if not t.from_above:
         before = moved(before, UP, t.raise_by)
     robot.follow(smooth(robot.T, _at_height(before, max(SAFE_M, before[2, 3])), CARRY))
-    robot.follow(smooth(robot.T, before, NEAR))
+    robot.follow(smooth(robot.T, before, LOWER))
     robot.wait(0.1)
     _check_grasp(robot, t)
 
