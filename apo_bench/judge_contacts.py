@@ -32,14 +32,14 @@ class ContactVerdict(NamedTuple):
     overlap: float
     """Area of the overlap over that of the true one."""
     touching: bool
-    """Strict in gap and angle."""
+    """Strict in gap, loose in angle; faces that look at each other but do not overlap leave this open, as true."""
     covering: bool
-    """Strict and loose in overlap."""
+    """There is an overlap, and it is large enough."""
     loose: bool
 
     @property
     def strict(self) -> bool:
-        return self.touching and self.covering and self.loose
+        return self.touching and self.covering
 
 
 def judged_contacts(
@@ -64,9 +64,10 @@ def judged_contacts(
                 gap, angle, area = _measured(assembly, contact, snapshot.poses)
                 share = area / true_area[k] if true_area[k] > 0.0 else 1.0
                 turned = not angle <= thresholds.loose_angle_deg
-                covering = share >= thresholds.overlap_fraction
-                touching = not turned and (gap is None or gap <= allowed)
-                loose = not turned and covering and gap is not None and gap <= thresholds.loose_gap_mm
+                covering = gap is not None and share >= thresholds.overlap_fraction
+                near = not turned and (gap is None or gap <= thresholds.loose_gap_mm)
+                touching = near and (gap is None or gap <= allowed)
+                loose = near and covering
                 out.append(ContactVerdict(contact, made, moment, gap, angle, share, touching, covering, loose))
     return tuple(out)
 
