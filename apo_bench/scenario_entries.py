@@ -102,7 +102,7 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
     poses = {name: part.start for name, part in parts.items()}
     there = {name for name, part in parts.items() if part.fixed}
     entries = []
-    for k, each in enumerate(Node(n.value, n.file, n.key) for n in nodes):
+    for k, each in enumerate(nodes):
         entry = _entry(each, k, parts, poses, there)
         entries.append(entry)
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
@@ -114,7 +114,7 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
 def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Array], there: set[str]) -> Entry:
     keys = node.fields(("move", "goal", "contacts"), ("carries", "attach", "grasp", "vary"))
     main = _movable(keys["move"], parts)
-    carries = tuple(_movable(n, parts) for n in keys["carries"].items("entry")) if "carries" in keys else ()
+    carries = tuple(_movable(n, parts) for n in _items(keys["carries"], "entry")) if "carries" in keys else ()
     for name in carries:
         if name == main or carries.count(name) > 1:
             refuse(keys["carries"], f"'{name}' stands here twice or is the moved part itself; name it once")
@@ -131,6 +131,11 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
     )
 
 
+def _items(node: Node, name: str) -> tuple[Node, ...]:
+    """The entries of a list within an operation, with the operation in their key."""
+    return tuple(Node(each.value, each.file, f"{node.key}, {each.key}") for each in node.items(name))
+
+
 def _movable(node: Node, parts: Mapping[str, Part]) -> str:
     name = node.text()
     if name not in parts:
@@ -144,7 +149,7 @@ def _contacts(
     node: Node, main: str, carries: tuple[str, ...], parts: Mapping[str, Part], there: set[str]
 ) -> tuple[Contact, ...]:
     found: list[Contact] = []
-    for pair in (Node(n.value, n.file, f"{node.key}, {n.key}") for n in node.items("contact")):
+    for pair in _items(node, "contact"):
         if not isinstance(pair.value, list) or len(pair.value) != 2:
             pair.fail('a pair is needed, such as ["bottom", "table.top"]')
         above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
