@@ -1,0 +1,161 @@
+"""Pictures: of a state, of what is believed, and films of a replay. Nothing here is needed to simulate."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import weakref
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Poses
+from apo_bench.simulation.scene import Scene
+from apo_bench.simulation.world import World, fresh, place
+
+Image = NDArray[np.uint8]
+VIDEO_ENDINGS = (".mp4", ".gif")
+
+
+def picture(
+    scene: Scene,
+    poses: Poses,
+    width: int = 640,
+    height: int = 480,
+    camera: str = "overview",
+    look_at: Array | None = None,
+    distance_m: float = 0.45,
+    azimuth_deg: float = 130.0,
+    elevation_deg: float = -22.0,
+) -> Image:
+    """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
+
+    Args:
+        camera: `overview`, `close` or `top`; not used if `look_at` is given.
+        look_at: A point in the world, (3,), [m], to look at from `distance_m` and the two angles.
+    """
+    world = scene.shown
+    data = _at(world, scene, poses)
+    view: Any = camera
+    if look_at is not None:
+        view = mujoco.MjvCamera()
+        view.lookat[:], view.distance = look_at, distance_m
+        view.azimuth, view.elevation = azimuth_deg, elevation_deg
+    with _renderer(world.model, width, height) as renderer:
+        renderer.update_scene(data, camera=view)
+        return np.array(renderer.render())
+
+
+class Film:
+    """Takes pictures of a replay: pass it as `watch`."""
+
+    def __init__(
+        self, scene: Scene, fps: float = 25.0, width: int = 640, height: int = 480, camera: str = "overview"
+    ) -> None:
+        self.fps, self.camera = fps, camera
+        self.frames: list[Image] = []
+        self._renderer = _renderer(scene.work.model, width, height)
+        self._close = weakref.finalize(self, self._renderer.close)
+        self._next = 0.0
+
+    def __call__(self, data: Any) -> None:
+        if data.time >= self._next:
+            self.frames.append(self.shot(data))
+            self._next = data.time + 1.0 / self.fps - 1e-9
+
+    def shot(self, data: Any) -> Image:
+        """One picture of the present state, not kept."""
+        self._renderer.update_scene(data, camera=self.camera)
+        return np.array(self._renderer.render())
+
+    def save(self, path: str | Path) -> None:
+        """Write the film, by its ending as MP4 or GIF.
+
+        Raises:
+            InputError: Another ending.
+        """
+        save_film(self.frames, path, self.fps)
+
+    def close(self) -> None:
+        """Give the renderer back; done by itself when the film is no longer used."""
+        self._close()
+
+
+def save_film(frames: Iterable[Image], path: str | Path, fps: float) -> None:
+    """Write pictures as a film, MP4 or GIF by the ending.
+
+    Raises:
+        InputError: Another ending, or a place that cannot be written.
+    """
+    import imageio.v3 as imageio
+
+    path = Path(path)
+    if path.suffix.lower() not in VIDEO_ENDINGS:
+        raise InputError(f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.")
+    extra = (
+        {"fps": fps, "macro_block_size": 8} if path.suffix.lower() == ".mp4" else {"duration": 1000.0 / fps, "loop": 0}
+    )
+    try:
+        imageio.imwrite(path, np.array(list(frames)), **(mp4 if path.suffix.lower() == ".mp4" else gif))
+    except OSError as error:
+        raise InputError(f"the film '{path}' cannot be written: {error}.") from error
+
+
+class Viewer:
+    """Shows a replay in MuJoCo's window, in real time: pass it as `watch`. On macOS run under `mjpython`."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._window: Any = None
+
+    def __call__(self, data: Any) -> None:
+        import time
+
+        import mujoco.viewer
+
+        if self._window is None:
+            self._window = mujoco.viewer.launch_passive(self._scene.work.model, data)
+            self._behind = time.perf_counter() - data.time
+        self._window.sync()
+        time.sleep(max(0.0, data.time + self._behind - time.perf_counter()))
+
+    def close(self) -> None:
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+
+def _at(world: World, scene: Scene, poses: Poses) -> Any:
+    data = fresh(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
+    for part in world.free:
+        place(world, data, part, poses.get(part, scene.scenario.start[part]))
+    data.mocap_pos[:, 2] = -1.0
+    mujoco.mj_forward(world.model, data)
+    return data
+
+
+def _renderer(model: Any, width: int, height: int) -> Any:
+    """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
+
+    Raises:
+        InputError: There is nothing to draw with.
+    """
+    if "MUJOCO_GL" not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        from mujoco.rendering.classic import gl_context
+
+        os.environ["MUJOCO_GL"] = "egl"
+        importlib.reload(gl_context)  # MuJoCo chose when it was imported; nothing was drawn since
+    try:
+        return mujoco.Renderer(model, height, width)
+    except (mujoco.FatalError, ImportError, AttributeError, RuntimeError) as error:
+        raise InputError(
+            f"no picture can be drawn here ({str(error).splitlines()[0]}); install libegl1 and libgl1-mesa-dri, or set "
+            "MUJOCO_GL=osmesa."
+        ) from error
