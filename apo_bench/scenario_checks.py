@@ -106,18 +106,19 @@ def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact:
     n_face, n_on = T_face[:3, :3] @ face.normal, T_on[:3, :3] @ on.normal
     angle = _angle_deg(n_face, -n_on)
     if angle > ANGLE_DEG:
-        sentence = f"'{contact}': the faces look {180 - angle:.4g} degrees apart, 180 are needed"
-        raise _refuse(file, case, key, sentence, "turn the part, or name faces that look at each other")
+        sentence = f"'{contact}': the faces look {180 - angle:.4g} degrees apart"
+        raise _refuse(file, case, key, sentence, "180 are needed: turn the part, or name faces that look at each other")
     gap = float(n_on @ (pose.apply(T_face, face.outline).mean(axis=0) - pose.apply(T_on, on.outline[:1])[0]))
     if abs(gap) > GAP_M:
-        sentence = (
-            f"'{contact}': the faces are {1e3 * abs(gap):.4g} mm {'apart' if gap > 0 else 'too deep'}, 0 is needed"
+        sentence = f"'{contact}': the faces are {1e3 * abs(gap):.4g} mm {'apart' if gap > 0 else 'too deep'}"
+        remedy = (
+            "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet exactly"
         )
-        remedy = "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet"
         raise _refuse(file, case, key, sentence, remedy)
     if not overlap(face, T_face, on, T_on):
         sentence = f"'{contact}': the faces lie in one plane but do not overlap"
-        raise _refuse(file, case, key, sentence, "move a goal until they do, or take the contact out")
+        remedy = "vary by less" if "vary" in case.key else "move a goal until they do, or take the contact out"
+        raise _refuse(file, case, key, sentence, remedy)
 
 
 def _check_intrusions(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...]) -> None:
