@@ -99,11 +99,11 @@ def save_film(frames: Iterable[Image], path: str | Path, fps: float) -> None:
     path = Path(path)
     if path.suffix.lower() not in VIDEO_ENDINGS:
         raise InputError(f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.")
-    extra = (
-        {"fps": fps, "macro_block_size": 8} if path.suffix.lower() == ".mp4" else {"duration": 1000.0 / fps, "loop": 0}
-    )
+    how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
+    if path.suffix.lower() == ".mp4":
+        how = {"fps": fps, "macro_block_size": 8}
     try:
-        imageio.imwrite(path, np.array(list(frames)), **(mp4 if path.suffix.lower() == ".mp4" else gif))
+        imageio.imwrite(path, np.array(list(frames)), **how)
     except OSError as error:
         raise InputError(f"the film '{path}' cannot be written: {error}.") from error
 
