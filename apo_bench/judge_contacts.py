@@ -58,10 +58,11 @@ def judged_contacts(
     out = []
     for k, (contact, made, lost) in enumerate(assembly.relations()):
         allowed = clearance_mm + thresholds.fit_margin_mm if assembly.is_fit(contact) else thresholds.support_mm
+        plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
         moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
-                gap, angle, area = _measured(assembly, contact, snapshot.poses)
+                gap, angle, area = _measured(assembly, contact, plane, normal, snapshot.poses)
                 share = area / true_area[k] if true_area[k] > 0.0 else 1.0
                 turned = not angle <= thresholds.loose_angle_deg
                 covering = gap is not None and share >= thresholds.overlap_fraction
@@ -84,17 +85,22 @@ def _true_areas(assembly: Assembly, after: Sequence[Snapshot | None], reference:
     return [_overlap(assembly, contact, history[made])[1] for contact, made, _ in assembly.relations()]
 
 
-def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float | None, float, float]:
-    """Largest |e| [mm], angle between the normals [degrees], area of the overlap [m^2]."""
+def _measured(
+    assembly: Assembly, contact: Contact, plane: Array, normal: Array, poses: Poses
+) -> tuple[float | None, float, float]:
+    """Largest |e| [mm], angle between the normals [degrees], area of the overlap [m^2].
+
+    Args:
+        plane: Of the manipulated face, (4,), in the frame of its part.
+        normal: Of the environment face, (3,), in the frame of its part.
+    """
     corners, area = _overlap(assembly, contact, poses)
-    (m, e) = contact
-    R_m, n_m, p_m = poses[m.part][:3, :3], assembly.face(m).plane, poses[m.part][:3, 3]
-    against = -(R_m @ n_m[:3]) @ poses[e.part][:3, :3] @ assembly.face(e).normal
-    angle = float(np.degrees(np.arccos(np.clip(against, -1.0, 1.0))))
+    T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]
+    n = T_m[:3, :3] @ plane[:3]
+    angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
     if not len(corners):
         return None, angle, 0.0
-    distance = ((corners - p_m) @ R_m) @ n_m[:3] + n_m[3]
-    return float(np.abs(distance).max()) * 1e3, angle, area
+    return float(np.abs((corners - T_m[:3, 3]) @ n + plane[3]).max()) * 1e3, angle, area
 
 
 def _overlap(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, float]:

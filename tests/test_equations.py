@@ -183,6 +183,7 @@ def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) 
 
 
 @given(st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
 def test_least_step_is_the_pseudo_inverse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     J, e = rng.standard_normal((8, 3)) @ rng.standard_normal((3, 6)), rng.standard_normal(8)
@@ -192,6 +193,7 @@ def test_least_step_is_the_pseudo_inverse(seed: int) -> None:
 
 
 @given(st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
 def test_displacement_is_the_product_of_the_appendix(seed: int) -> None:
     x, y, z, a, b, g = q = np.random.default_rng(seed).uniform(-3, 3, 6)
     P = pose.at((x, y, z))

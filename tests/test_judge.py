@@ -350,7 +350,7 @@ THRESHOLDS = st.builds(
 
 
 @given(st.sampled_from([TOWER, CASTLES]), st.integers(0, 10**6), SCALES, THRESHOLDS)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_strict_implies_loose_whatever_the_thresholds(build, seed: int, scale: float, thresholds: Thresholds) -> None:
     rng = np.random.default_rng(seed)
     edits = [
@@ -370,7 +370,7 @@ def test_some_strict_verdicts_of_the_law_are_true() -> None:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scene = TOWER()

@@ -25,7 +25,7 @@ CARELESS[1, 1, 1] = 0.0029**2
 def errors(level: Level, draws: int) -> Array:
     """Body twists of what was seen, from what was shown, (draws * n, 6)."""
     rng, shown = np.random.default_rng(11), scenes.shown(TOWER)
-    seen = [observe(shown, Isotropic(level), rng).goals for _ in range(draws)]
+    seen = [Isotropic(level)(shown.assembly, shown, rng).goals for _ in range(draws)]
     return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -80,6 +80,7 @@ TERMS = st.lists(st.builds(Term, st.integers(0, 3), st.booleans()), max_size=8)
 
 
 @given(TERMS, st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
 def test_products(odl: list[Term], seed: int) -> None:
     goals = pose.exp(np.random.default_rng(seed).standard_normal((4, 6)))
     assert_allclose(product(simplified(odl), goals), product(odl, goals), atol=1e-9)
