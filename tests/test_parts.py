@@ -114,7 +114,7 @@ cells = st.lists(st.tuples(*[st.integers(0, 3)] * 3, *[st.integers(1, 3)] * 3), 
 
 
 @given(cells)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_a_union_is_what_counted_cells_say(spans: list[tuple[int, ...]]):
     """An independent count on a grid of unit cells: volume, centroid, and the area that looks along each direction."""
     full = np.zeros((8, 8, 8), bool)

@@ -32,9 +32,10 @@ class Face:
     @property
     def normal(self) -> Array:
         """The outward unit normal, (3,) (Newell's formula: right for concave outlines too)."""
-        following = np.roll(self.outline, -1, axis=0)
-        n = np.cross(self.outline, following).sum(axis=0)
-        return n / np.linalg.norm(n)
+        corners = self.outline - self.outline[0]
+        M = corners.T @ np.concatenate([corners[1:], corners[:1]])
+        n = np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
+        return n / np.sqrt(n @ n)
 
     @property
     def plane(self) -> Array:
