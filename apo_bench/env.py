@@ -237,9 +237,11 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return tried.verdict.success, tried.verdict.loose_success, ending(tried)
 
     def _watch(self) -> Any:
-        if self.render_mode == "human" and self._window is None:
+        """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""
+        if self.render_mode == "human":
             from apo_bench.simulation.render import Viewer
 
+            self.close()
             self._window = Viewer(self._scene)
         return self._window
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, final
 
+import numpy as np
+
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
 from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, see, show, unseen
@@ -65,8 +67,8 @@ def run_trial(
 def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, watch: Any = None) -> Row:
     """Replay an observation that came from a file: its truth is not known.
 
-    The judge compares overlaps with those of the scenario's nominal goals; level, carelessness and pose errors of
-    the row are null, its noise is `measured`.
+    The judge compares overlaps with those of the scenario's nominal goals, put where the first part was seen; level,
+    carelessness and pose errors of the row are null, its noise is `measured`.
 
     Args:
         text: The content of the file, for the hash.
@@ -87,19 +89,28 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
         "demonstration": "ok",
     }
     planned = plan(spec.method, seen, None)
-    return head | _carry_out(planned, scene, scene.scenario.goals, None, watch)
+    return head | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch)
 
 
-def plan(method: str, seen: Observation, truth: Array | None) -> Planned:
+def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
+    """The nominal goals (n, 4, 4) shifted and turned on the table to where the first operation was seen."""
+    k = int(np.argmax(seen.seen))
+    T = seen.goals[k] @ pose.inverse(nominal[k])
+    flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
+    flat[:2, 3] = (seen.goals[k] - flat @ nominal[k])[:2, 3]
+    return np.asarray(flat @ nominal)
+
+
+def plan(method: Any, seen: Observation, truth: Array | None) -> Planned:
     """What a method would have the robot do.
 
     Args:
-        method: `oracle` takes the truth, `none` what was seen, anything else names a corrector.
+        method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
     """
-    if method == "oracle" and truth is not None:
+    if isinstance(method, str) and method == "oracle" and truth is not None:
         return _as_it_is(seen, truth, None)
-    if method == "none":
+    if isinstance(method, str) and method == "none":
         return _as_it_is(seen, seen.goals, unseen(seen))
     made = correct(seen, method)
     return Planned(

@@ -1,0 +1,151 @@
+"""Rates, intervals, the table and the figure."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench.benchmark.report import COLUMNS, report
+from apo_bench.benchmark.spec import ROW
+from apo_bench.benchmark.statistics import tally, wilson
+from apo_bench.errors import InputError
+
+
+def row(method: str = "none", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:
+    """What statistics looks at in a row."""
+    failed = success is False
+    return {
+        "schema": ROW,
+        "scenario": "stick_in_tower",
+        "clearance_mm": 0.25,
+        "careless": 0.0 if method == "oracle" else 1.0,
+        "level": 0.0 if method == "oracle" else 1.0,
+        "level_deg": 0.0 if method == "oracle" else 1.0,
+        "noise": "isotropic",
+        "grasp": "friction",
+        "method": method,
+        "seed": seed,
+        "demonstration": "demonstration_failed" if success is None else "ok",
+        "success": success,
+        "loose_success": success,
+        "failure_stage": "attach" if failed else None,
+        "failure_code": "force_stop" if failed else None,
+    } | more
+
+
+def write(folder: Path, rows: list[dict[str, Any]]) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "trials.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
+    return folder
+
+
+@settings(max_examples=50, deadline=None)
+@given(n=st.integers(1, 3000), data=st.data())
+def test_wilson_solves_its_equation(n: int, data: st.DataObject) -> None:
+    """Its ends are the rates p with (k/n - p)^2 = z^2 p (1 - p) / n."""
+    k = data.draw(st.integers(0, n))
+    low, high = wilson(k, n)
+    z2 = 1.959963984540054**2
+    assert 0.0 <= low <= k / n <= high <= 1.0
+    for p, at_border in ((low, k == 0), (high, k == n)):
+        if at_border:
+            assert p == pytest.approx(k / n, abs=1e-12)
+        else:
+            assert (k / n - p) ** 2 == pytest.approx(z2 * p * (1 - p) / n, rel=1e-9)
+
+
+def test_wilson_golden_values() -> None:
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert wilson(100, 100) == pytest.approx((0.9630, 1.0), abs=5e-5)
+    assert wilson(97, 100) == pytest.approx((0.9155, 0.9897), abs=5e-5)
+    assert wilson(1, 2) == pytest.approx((0.0945, 0.9055), abs=5e-5)
+
+
+def test_rows_are_counted_into_cells() -> None:
+    rows = [
+        row(seed=0),
+        row(seed=1, success=False, loose_success=True),
+        row(seed=2, success=False),
+        row(seed=3, success=None),
+        row(seed=4, success=False, failure_stage="judge", failure_code="gap"),
+        row("oracle", seed=0),
+        row(seed=0, level=None, level_deg=None, careless=None),
+    ]
+    ceiling, raw = tally(rows)
+    assert (ceiling.method, ceiling.trials, ceiling.rate) == ("oracle", 1, 1.0)
+    assert (raw.trials, raw.successes, raw.loose_successes, raw.excluded) == (4, 1, 2, 1)
+    assert list(raw.failures.items()) == [("attach: force_stop", 2), ("judge: gap", 1)]
+    assert raw.rate == 0.25
+    assert raw.interval == wilson(1, 4)
+
+
+def test_a_cell_whose_demonstrations_all_failed_has_no_rate() -> None:
+    (cell,) = tally([row(success=None)])
+    assert (cell.trials, cell.excluded, cell.rate, cell.loose_rate, cell.interval) == (0, 1, None, None, (0.0, 1.0))
+
+
+@settings(max_examples=30, deadline=None)
+@given(results=st.lists(st.sampled_from([True, False, None]), max_size=30), order=st.randoms())
+def test_every_row_is_counted_once_in_any_order(results: list[bool | None], order: Any) -> None:
+    rows = [row("paper" if i % 2 else "none", seed=i, success=s) for i, s in enumerate(results)]
+    shuffled = list(rows)
+    order.shuffle(shuffled)
+    cells = tally(rows)
+    assert sum(c.trials + c.excluded for c in cells) == len(rows)
+    assert [(c.method, c.trials, c.successes, c.excluded) for c in tally(shuffled)] == [
+        (c.method, c.trials, c.successes, c.excluded) for c in cells
+    ]
+
+
+def test_clearances_levels_and_carelessness_are_cells_of_their_own() -> None:
+    rows = [row(), row(clearance_mm=0.5), row(level_deg=0.0), row(careless=0.0), row(scenario="stick_on_castles")]
+    assert len(tally(rows)) == 5
+
+
+def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
+    rows = [row("oracle", seed=i) for i in range(4)]
+    for level in (0.0, 0.5, 1.0):
+        rows += [row(seed=i, success=i < 1, level=level, level_deg=level) for i in range(4)]
+        rows += [row("paper", seed=i, success=None if i == 3 else True, level=level, level_deg=level) for i in range(4)]
+    made = report(write(tmp_path / "run", rows))
+    table = list(csv.DictReader(made.table.open()))
+    assert tuple(table[0]) == COLUMNS
+    assert [(line["method"], line["level_mm"], line["trials"], line["successes"]) for line in table] == [
+        ("oracle", "0.0", "4", "4"),
+        *(("none", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
+        *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
+    ]
+    assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
+    assert made.figure.read_bytes().startswith(b"\x89PNG")
+    page = made.page.read_text()
+    assert made.figure.name in page
+    assert "| stick_in_tower | 0.25 mm | 1 | 0.5 | none | 25.0 % | 4.6 to 69.9 % | 4 |" in page
+
+
+def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) -> None:
+    from imageio.v3 import improps
+
+    few = report(write(tmp_path / "few", [row(), row("oracle")]))
+    more = [row(scenario=s, careless=f) for s in ("stick_in_tower", "stick_on_castles") for f in (0.0, 1.0)]
+    many = report(write(tmp_path / "many", more))
+    low, wide = improps(few.figure).shape[:2], improps(many.figure).shape[:2]
+    assert wide[0] > low[0] + 300
+    assert wide[1] > low[1] + 300
+
+
+def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        report(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no finished trial"):
+        report(write(tmp_path / "empty", []))
+    with pytest.raises(InputError, match=r"line 2: this is not a row"):
+        report(write(tmp_path / "bad", [row(), {"seed": 1}]))
+    with pytest.raises(InputError, match="row of schema 'apo-bench/row/0'"):
+        report(write(tmp_path / "old", [row(schema="apo-bench/row/0")]))
