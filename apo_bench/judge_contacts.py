@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Contact
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.overlap import NOTHING, Overlap, overlap
 from apo_bench.placement import placed
 from apo_bench.program import Poses, Snapshot
 from apo_bench.thresholds import Thresholds
@@ -30,7 +30,7 @@ class ContactVerdict(NamedTuple):
     angle_deg: float
     """Between the normals of the faces; 0 if they look straight at each other."""
     overlap: float
-    """Area of the overlap over that of the true one."""
+    """How much of the true overlap is covered, at its place on the environment face; elsewhere does not count."""
     touching: bool
     """Strict in gap, loose in angle; faces that look at each other but do not overlap leave this open, as true."""
     covering: bool
@@ -54,7 +54,7 @@ def judged_contacts(
 
     Moments of which there is no snapshot are left out. Args as for `apo_bench.judge.judge`.
     """
-    true_area = _true_areas(assembly, after, reference)
+    true = _true_overlaps(assembly, after, reference)
     out = []
     for k, (contact, made, lost) in enumerate(assembly.relations()):
         allowed = clearance_mm + thresholds.fit_margin_mm if assembly.is_fit(contact) else thresholds.support_mm
@@ -62,8 +62,8 @@ def judged_contacts(
         moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
-                gap, angle, area = _measured(assembly, contact, plane, normal, snapshot.poses)
-                share = area / true_area[k] if true_area[k] > 0.0 else 1.0
+                gap, angle, found = _measured(assembly, contact, plane, normal, snapshot.poses)
+                share = found.share(true[k])
                 turned = not angle <= thresholds.loose_angle_deg
                 covering = gap is not None and share >= thresholds.overlap_fraction
                 near = not turned and (gap is None or gap <= thresholds.loose_gap_mm)
@@ -73,38 +73,36 @@ def judged_contacts(
     return tuple(out)
 
 
-def _true_areas(assembly: Assembly, after: Sequence[Snapshot | None], reference: Array) -> list[float]:
-    """The area of the overlap of every contact when it is made at the true goals, [m^2].
+def _true_overlaps(assembly: Assembly, after: Sequence[Snapshot | None], reference: Array) -> list[Overlap]:
+    """The overlap of every contact when it is made at the true goals.
 
     A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
     """
     first = next((snapshot for snapshot in after if snapshot is not None), None)
     if first is None:
-        return [0.0] * len(assembly.relations())
+        return [NOTHING] * len(assembly.relations())
     history = placed(assembly, first.poses, reference)
-    return [_overlap(assembly, contact, history[made])[1] for contact, made, _ in assembly.relations()]
+    return [_overlap(assembly, contact, history[made]) for contact, made, _ in assembly.relations()]
 
 
 def _measured(
     assembly: Assembly, contact: Contact, plane: Array, normal: Array, poses: Poses
-) -> tuple[float | None, float, float]:
-    """Largest |e| [mm], angle between the normals [degrees], area of the overlap [m^2].
+) -> tuple[float | None, float, Overlap]:
+    """Largest |e| [mm], angle between the normals [degrees], and the overlap.
 
     Args:
         plane: Of the manipulated face, (4,), in the frame of its part.
         normal: Of the environment face, (3,), in the frame of its part.
     """
-    corners, area = _overlap(assembly, contact, poses)
+    found = _overlap(assembly, contact, poses)
     T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]
     n = T_m[:3, :3] @ plane[:3]
     angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
-    if not len(corners):
-        return None, angle, 0.0
-    return float(np.abs((corners - T_m[:3, 3]) @ n + plane[3]).max()) * 1e3, angle, area
+    if not found:
+        return None, angle, found
+    return float(np.abs((found.corners - T_m[:3, 3]) @ n + plane[3]).max()) * 1e3, angle, found
 
 
-def _overlap(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, float]:
-    """Corners (k, 3), world, on the plane of the environment face, and area."""
+def _overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
     m, e = contact
-    found = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])
-    return found.corners, found.area
+    return overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])

@@ -28,9 +28,17 @@ class Overlap:
     """Every corner of every piece, of holes too, (k, 3), world, [m], on the plane of the lower face; (0, 3) if none."""
     area: float
     """[m^2]."""
+    shape: Any = None
+    """The same as a shapely geometry in the frame of the lower face, so that overlaps on one face can be compared."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "corners", frozen(self.corners, None, 3))
+
+    def share(self, of: Overlap) -> float:
+        """How much of another overlap on the same lower face this one covers, 0 to 1; 1 if that one is empty."""
+        if not of:
+            return 1.0
+        return float(self.shape.intersection(of.shape).area / of.area) if self else 0.0
 
     def __bool__(self) -> bool:
         return self.area > 0.0
@@ -59,12 +67,13 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     frame = _plane_frame(on)
     lower = _polygon(on, pose.inverse(frame))
     upper = _polygon(face, pose.inverse(frame) @ T_on_face)
-    pieces = [piece for piece in _pieces(upper.intersection(lower)) if piece.area > SLIVER_M2]
+    common = upper.intersection(lower)
+    pieces = [piece for piece in _pieces(common) if piece.area > SLIVER_M2]
     if not pieces:
         return NOTHING
     flat = np.concatenate([_corners(piece) for piece in pieces])
     corners = pose.apply(T_on @ frame, np.column_stack([flat, np.zeros(len(flat))]))
-    return Overlap(corners, float(sum(piece.area for piece in pieces)))
+    return Overlap(corners, float(sum(piece.area for piece in pieces)), common)
 
 
 def area(face: Face) -> float:

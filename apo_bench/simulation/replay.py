@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from apo_bench.outcomes import sentence
-from apo_bench.program import Outcome, Plan, Reached, ReplayResult, Snapshot
+from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot
 from apo_bench.simulation.prepare import transfers, unreachable
 from apo_bench.simulation.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene import Scene
@@ -14,13 +14,14 @@ from apo_bench.stability import unstable
 SETTLE_S = 0.5
 
 
-def replay(plan: Plan, scene: Scene, watch: Watch | None = None) -> ReplayResult:
+def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses | None = None) -> ReplayResult:
     """Carry out a plan.
 
     Args:
         watch: Called with the `MjData` about every 10 ms of simulated time.
+        parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
     """
-    robot = Robot(scene, plan.start, watch)
+    robot = Robot(scene, plan.start if parts_at is None else parts_at, watch)
     after: list[Snapshot | None] = [None] * len(plan.assembly)
     moves = transfers(plan, scene)
     outcome = _refusal(plan, scene, moves) or _carry_out(plan, robot, moves, after)

@@ -1,0 +1,22 @@
+"""Scenes are compiled once per test run."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import pytest
+
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.scene import Scene, build_scene
+
+
+@pytest.fixture(scope="session")
+def tower() -> Scene:
+    return build_scene(load_scenario("stick_in_tower"))
+
+
+@pytest.fixture(scope="session")
+def castles() -> Scene:
+    return build_scene(load_scenario("stick_on_castles"))
