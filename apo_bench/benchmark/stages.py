@@ -61,7 +61,7 @@ def stream(seed: int, which: int) -> np.random.Generator:
 
 def show(scene: Scene, careless: float, seed: int) -> Shown:
     """Draw the truth of a trial and let the human demonstrate it."""
-    layout = draw_layout(scene.scenario, stream(seed, LAYOUT))
+    layout = draw_layout(scene.scenario, stream(seed, LAYOUT), scene.clearance_mm)
     return Shown(layout, demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION)))
 
 
