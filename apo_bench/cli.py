@@ -38,6 +38,10 @@ NoiseOption = Annotated[str | None, typer.Option(help="Noise model, or package.m
 Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
 
 
+class Interrupted(Exception):
+    """Ctrl-C, told apart from what the command line library makes of a `KeyboardInterrupt`."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -45,8 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(args=given or ["--help"], prog_name="apo-bench", standalone_mode=False)
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
-    except KeyboardInterrupt:
-        return _complain("interrupted; what had ended is kept, and the same command continues.", INTERRUPTED)
+    except (Interrupted, KeyboardInterrupt) as error:
+        return _complain(str(error) or "interrupted.", INTERRUPTED)
     except RuntimeError as error:
         return _complain(str(error), NO_RESULT)
     except Exception as error:
@@ -202,7 +206,10 @@ def sweep(
         timestep_s=timestep_ms * 1e-3,
     )
     command = shlex.join(["apo-bench", *sys.argv[1:]])
-    rows = runner.sweep(spec, out, workers=_cores() if workers is None else workers, command=command)
+    try:
+        rows = runner.sweep(spec, out, workers=_cores() if workers is None else workers, command=command)
+    except KeyboardInterrupt as error:
+        raise Interrupted("interrupted; what had ended is kept, and the same command continues.") from error
     print_cells(tally(rows))
     typer.echo(
         f"{len(rows)} rows in {out / 'trials.jsonl'}; table and figure: apo-bench report {shlex.quote(str(out))}"

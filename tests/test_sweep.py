@@ -1,0 +1,229 @@
+"""A sweep: which trials, resumed where it was left, the same rows however it is spread.
+
+Bookkeeping is tested with trials that cost nothing; `test_determinism.py` runs real ones.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from apo_bench.benchmark import sweep as runner
+from apo_bench.benchmark.grid import SweepSpec, load_all, row_key, trial_key, units
+from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.spec import ROW
+from apo_bench.errors import InputError
+from apo_bench.scenario_file import load_scenario
+
+SPEC = SweepSpec(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), trials=3, seed=10)
+ROWS = 3 * (1 + 2 * 2)
+LOAD = functools.cache(load_scenario)
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    """Trials without physics; counts what a worker did."""
+    did: Counter[str] = Counter()
+
+    def build(scenario: Any, **_: Any) -> Any:
+        did["scene"] += 1
+        return SimpleNamespace(scenario=scenario, arm=SimpleNamespace(mjcf=runner.find_arm("six_axis").mjcf))
+
+    def show(scene: Any, careless: float, seed: int) -> str:
+        did["demonstration"] += 1
+        return f"{scene.scenario.name} {careless} {seed}"
+
+    def run_trial(spec: Any, scene: Any, *, shown: str, content: str) -> dict[str, Any]:
+        did["trial"] += 1
+        assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed}"
+        key = trial_key(spec, scene.scenario.name)
+        names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "method")
+        return {"schema": ROW, **dict(zip(names, key, strict=True)), "success": spec.seed % 2 == 0}
+
+    monkeypatch.setattr("apo_bench.benchmark.grid.load_scenario", LOAD)
+    monkeypatch.setattr(runner, "load_scenario", LOAD)
+    monkeypatch.setattr(runner, "build_scene", build)
+    monkeypatch.setattr(runner, "show", show)
+    monkeypatch.setattr(runner, "run_trial", run_trial)
+    return did
+
+
+def test_the_grid_is_every_combination_once() -> None:
+    spec = SweepSpec(("stick_in_tower", "stick_on_castles"), (0, 1, 1), (0, 1), clearances_mm=(0.25, 0.5), trials=2)
+    loaded = load_all(spec)
+    keys = [trial_key(t, loaded[t.scenario].name) for unit in units(spec, loaded) for t in unit.trials]
+    assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
+    assert {key[2] for key in keys} == {0, 1}
+
+
+def test_the_oracle_runs_once_per_seed() -> None:
+    loaded = load_all(SPEC)
+    oracle = [t for unit in units(SPEC, loaded) for t in unit.trials if t.method == "oracle"]
+    assert [(t.seed, t.level_mm, t.level_deg, t.careless) for t in oracle] == [(k, 0.0, 0.0, 0.0) for k in (10, 11, 12)]
+
+
+def test_each_scenario_has_its_own_clearance_by_default() -> None:
+    loaded = load_all(SPEC)
+    clearance = loaded["stick_in_tower"].clearance_mm
+    assert {t.clearance_mm for unit in units(SPEC, loaded) for t in unit.trials} == {clearance}
+
+
+def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path: Path) -> None:
+    rows = runner.sweep(SPEC, tmp_path / "new" / "run", command="apo-bench sweep ...")
+    assert len(rows) == ROWS
+    assert read_rows(tmp_path / "new" / "run") == rows
+    timing = [json.loads(line) for line in (tmp_path / "new" / "run" / "timing.jsonl").open()]
+    assert [row_key(t) for t in timing] == [row_key(r) for r in rows]
+    assert {"trial_s", "demonstrate_s", "host", "worker"} <= set(timing[0])
+    run = json.loads((tmp_path / "new" / "run" / "run.json").read_text())
+    assert run["command"] == "apo-bench sweep ..."
+    assert run["specification"]["clearances_mm"] == {"stick_in_tower": [0.25]}
+    assert run["versions"]["mujoco"]
+
+
+def test_scenes_and_demonstrations_are_shared(counted: Counter[str], tmp_path: Path) -> None:
+    runner.sweep(SPEC, tmp_path)
+    assert counted == {"scene": 1, "demonstration": 3 * 2, "trial": ROWS}
+
+
+def test_a_finished_sweep_is_not_run_again(counted: Counter[str], tmp_path: Path) -> None:
+    first = runner.sweep(SPEC, tmp_path)
+    counted.clear()
+    assert runner.sweep(SPEC, tmp_path) == first
+    assert not counted
+
+
+def test_an_interrupted_sweep_goes_on_where_it_was_left(
+    counted: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = runner.sweep(SPEC, tmp_path / "whole")
+    quick = runner.run_trial
+
+    def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
+        if (spec.seed, spec.method, spec.level_mm) == (11, "paper", 0.0):
+            raise KeyboardInterrupt
+        return quick(spec, scene, **more)
+
+    monkeypatch.setattr(runner, "run_trial", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        runner.sweep(SPEC, tmp_path / "part")
+    left = read_rows(tmp_path / "part")
+    assert 0 < len(left) < ROWS
+    monkeypatch.setattr(runner, "run_trial", quick)
+    counted.clear()
+    assert runner.sweep(SPEC, tmp_path / "part") == whole
+    assert counted["trial"] == ROWS - len(left)
+
+
+@pytest.mark.parametrize("cut", [1, 40, 10_000])
+def test_a_torn_last_line_is_set_aside_and_made_again(cut: int, counted: Counter[str], tmp_path: Path) -> None:
+    whole = runner.sweep(SPEC, tmp_path)
+    path = tmp_path / "trials.jsonl"
+    text = path.read_bytes()
+    torn = text[: -min(cut, len(text) - 1)]
+    path.write_bytes(torn)
+    assert runner.sweep(SPEC, tmp_path) == whole
+    assert path.read_bytes() == text
+    assert (tmp_path / "torn.txt").read_bytes() == torn.rpartition(b"\n")[2] + b"\n"
+
+
+def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_path: Path) -> None:
+    first = runner.sweep(SPEC, tmp_path)
+    rows = runner.sweep(replace(SPEC, trials=5), tmp_path)
+    assert rows[: len(first)] == first
+    assert {row["seed"] for row in rows} == {10, 11, 12, 13, 14}
+    with pytest.raises(InputError, match="trials was 5, now 3"):
+        runner.sweep(SPEC, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"levels": (0.0, 2.0)}, "specification: levels was"),
+        ({"seed": 11}, "specification: seed was 10, now 11"),
+        ({"grasp": "weld"}, "specification: grasp"),
+        ({"clearances_mm": (0.5,)}, "specification: clearances_mm"),
+        ({"scenarios": ("stick_on_castles",)}, "content: stick_in_tower"),
+    ],
+)
+def test_a_folder_of_another_sweep_is_refused(
+    change: dict[str, Any], words: str, counted: Counter[str], tmp_path: Path
+) -> None:
+    runner.sweep(SPEC, tmp_path)
+    before = (tmp_path / "run.json").read_bytes()
+    with pytest.raises(InputError, match=words):
+        runner.sweep(replace(SPEC, **change), tmp_path)
+    assert (tmp_path / "run.json").read_bytes() == before
+
+
+def test_rows_made_by_other_versions_are_refused(counted: Counter[str], tmp_path: Path) -> None:
+    runner.sweep(SPEC, tmp_path)
+    run = json.loads((tmp_path / "run.json").read_text())
+    run["versions"]["mujoco"] = "3.16.0"
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    with pytest.raises(InputError, match=r'versions: mujoco was "3.16.0"'):
+        runner.sweep(SPEC, tmp_path)
+    (tmp_path / "run.json").unlink()
+    with pytest.raises(InputError, match=r"no readable run\.json"):
+        runner.sweep(SPEC, tmp_path)
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        runner.sweep(SPEC, tmp_path / "file" / "run")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"scenarios": ()}, "no scenarios"),
+        ({"levels": ()}, "no levels"),
+        ({"levels": (-1.0,)}, "level of -1"),
+        ({"levels": (float("nan"),)}, "level of nan"),
+        ({"careless": (99.0,)}, "carelessness of 99"),
+        ({"clearances_mm": (-0.1,)}, "clearance of -0.1"),
+        ({"methods": ("oracle", "papr")}, "did you mean 'paper'"),
+        ({"trials": 0}, "0 trials"),
+        ({"seed": -3}, "seed of -3"),
+    ],
+)
+def test_a_sweep_that_makes_no_sense_is_refused(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        replace(SPEC, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"scenarios": ("stick_in_towr",)}, "did you mean 'stick_in_tower'"),
+        ({"noise": "isotropc"}, "did you mean 'isotropic'"),
+        ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
+        ({"methods": ("json:nothing",)}, "unknown corrector in module json 'nothing'"),
+    ],
+)
+def test_names_are_checked_before_a_folder_is_made(change: dict[str, Any], words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words):
+        runner.sweep(replace(SPEC, **change), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_workers_are_counted(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="0 workers"):
+        runner.sweep(SPEC, tmp_path, workers=0)
+
+
+def test_two_scenarios_of_one_name_are_refused(tmp_path: Path) -> None:
+    from apo_bench.resources import folder
+
+    copy = tmp_path / "stick_in_tower.toml"
+    copy.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
+    with pytest.raises(InputError, match="two scenarios called 'stick_in_tower'"):
+        runner.sweep(replace(SPEC, scenarios=("stick_in_tower", str(copy))), tmp_path / "run")
