@@ -21,6 +21,8 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import World, fresh, place
 
 Image = NDArray[np.uint8]
+Camera = Any
+"""The name of a camera of the room, or a `mujoco.MjvCamera`."""
 VIDEO_ENDINGS = (".mp4", ".gif")
 
 
@@ -29,40 +31,38 @@ def picture(
     poses: Poses,
     width: int = 640,
     height: int = 480,
-    camera: str = "overview",
-    look_at: Array | None = None,
-    distance_m: float = 0.45,
-    azimuth_deg: float = 130.0,
-    elevation_deg: float = -22.0,
+    camera: Camera = "overview",
 ) -> Image:
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
 
     Args:
-        camera: `overview`, `close` or `top`; not used if `look_at` is given.
-        look_at: A point in the world, (3,), [m], to look at from `distance_m` and the two angles.
+        camera: `overview`, `close`, `top`, or a `view`.
     """
     world = scene.shown
     data = _at(world, scene, poses)
-    view: Any = camera
-    if look_at is not None:
-        view = mujoco.MjvCamera()
-        view.lookat[:], view.distance = look_at, distance_m
-        view.azimuth, view.elevation = azimuth_deg, elevation_deg
     with _renderer(world.model, width, height) as renderer:
-        renderer.update_scene(data, camera=view)
+        renderer.update_scene(data, camera=camera)
         return np.array(renderer.render())
+
+
+def view(look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0) -> Camera:
+    """A camera that looks at a point of the world, (3,), [m]."""
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance = look_at, distance_m
+    camera.azimuth, camera.elevation = azimuth_deg, elevation_deg
+    return camera
 
 
 class Film:
     """Takes pictures of a replay: pass it as `watch`."""
 
     def __init__(
-        self, scene: Scene, fps: float = 25.0, width: int = 640, height: int = 480, camera: str = "overview"
+        self, scene: Scene, fps: float = 25.0, width: int = 640, height: int = 480, camera: Camera = "overview"
     ) -> None:
         self.fps, self.camera = fps, camera
         self.frames: list[Image] = []
         self._renderer = _renderer(scene.work.model, width, height)
-        self._close = weakref.finalize(self, self._renderer.close)
+        self._close = weakref.finalize(self, _release, self._renderer)
         self._next = 0.0
 
     def __call__(self, data: Any) -> None:
@@ -139,6 +139,14 @@ def _at(world: World, scene: Scene, poses: Poses) -> Any:
     data.mocap_pos[:, 2] = -1.0
     mujoco.mj_forward(world.model, data)
     return data
+
+
+def _release(renderer: Any) -> None:
+    """Close a renderer in its own context: in another's it would free that one's pictures."""
+    context = renderer._gl_context
+    if context is not None:
+        context.make_current()
+    renderer.close()
 
 
 def _renderer(model: Any, width: int, height: int) -> Any:

@@ -1,0 +1,73 @@
+"""Draw the pictures of the README: `python docs/pictures.py` (about a minute, no display needed)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from apo_bench.benchmark.stages import attempt, see, show
+from apo_bench.correction.correct import correct
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.program import Plan
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.render import Film, picture, view
+from apo_bench.simulation.scene import Scene, build_scene
+
+HERE = Path(__file__).parent / "pictures"
+SEED, LEVEL = 7, 2.0
+CAPTIONS = ("castle 1 is put down", "castle 2 is put on it", "the stick comes", "it goes in, or not", "the end")
+
+
+def main() -> None:
+    scene = build_scene(load_scenario("stick_in_tower"))
+    shown = show(scene, 1.0, SEED)
+    seen = see(scene, shown, make_noise("isotropic", Level(LEVEL, LEVEL)), SEED)
+    corrected = correct(seen, "paper").goals
+    center = shown.layout.goals[0][:3, 3] + [0.0, 0.0, 0.05]
+    for name, goals, title in (
+        ("replay_none", seen.goals, "As it was seen, 2 mm and 2 degrees off"),
+        ("replay_paper", corrected, "The same observation, corrected by its face contacts"),
+    ):
+        film = Film(scene, fps=4, width=480, height=420, camera=view(center, 0.66, 118.0, -20.0))
+        tried = attempt(Plan(seen.assembly, seen.start, goals), scene, shown.layout.goals, film)
+        _strip(
+            HERE / f"{name}.png", film, f"{title}: {'right' if tried.verdict.success else tried.result.outcome.code}"
+        )
+    _believed(HERE / "believed.png", scene, seen.goals, corrected, center)
+
+
+def _strip(path: Path, film: Film, title: str) -> None:
+    """Five moments of a replay side by side."""
+    n = len(film.frames)
+    moments = [int(n * f) for f in (0.25, 0.57, 0.80, 0.885)] + [n - 1]
+    figure, axes = plt.subplots(1, 5, figsize=(15, 3.1), layout="constrained")
+    for axis, moment, caption in zip(axes, moments, CAPTIONS, strict=True):
+        axis.imshow(film.frames[moment])
+        axis.set_title(caption, fontsize=11)
+        axis.axis("off")
+    figure.suptitle(title, fontsize=13)
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
+
+
+def _believed(path: Path, scene: Scene, seen: np.ndarray, corrected: np.ndarray, center: np.ndarray) -> None:
+    """What the numbers say, drawn: Fig. 9 of the paper."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+    parts = [operation.main for operation in scene.scenario.assembly.operations]
+    for axis, goals, title in zip(axes, (seen, corrected), ("as seen", "corrected"), strict=True):
+        camera = view(center, 0.26, 196.0, -8.0)
+        axis.imshow(picture(scene, dict(zip(parts, goals, strict=True)), 560, 440, camera))
+        axis.set_title(f"What is believed: {title}")
+        axis.axis("off")
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
+
+
+if __name__ == "__main__":
+    main()
