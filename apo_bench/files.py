@@ -18,6 +18,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.layout import layout_at
 from apo_bench.program import Demonstration, Observation, Plan, Poses, Step
 from apo_bench.scenario import Scenario
 from apo_bench.strict_json import Node, read_json
@@ -114,7 +115,7 @@ def read_observation(path: str | Path, scenario: Scenario | None = None) -> Obse
     entries = _operations(root["operations"], found.assembly, (), stated)
     return Observation(
         assembly=found.assembly,
-        start=_poses(root["start"], found) if "start" in root else found.start,
+        start=_poses(root["start"], found) if "start" in root else _own_start(found),
         goals=np.array([_pose(entry) for entry in entries]),
         covariance=np.array([_stated(entry) for entry in entries]),
         seen=np.array([entry["seen"].flag() if "seen" in entry else True for entry in entries]),
@@ -133,6 +134,11 @@ def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
         goals=np.array([_pose(entry) for entry in entries]),
         schedule=tuple(_step(node, len(found.assembly)) for node in root["schedule"].items("schedule entry")),
     )
+
+
+def _own_start(scenario: Scenario) -> Poses:
+    """Where the scenario's parts start, those with clearance let down to rest."""
+    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
 def _head(schema: str, scenario: str, start: Poses) -> Form:

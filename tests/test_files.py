@@ -106,7 +106,9 @@ def test_a_measured_file_may_be_short(tmp_path: Path) -> None:
     assert np.diag(back.covariance[0]) == pytest.approx([4e-6] * 3 + [np.radians(0.5) ** 2] * 3)
     assert back.seen.all()
     assert back.gap_m == SCENARIO.gap_mm * 1e-3
-    np.testing.assert_array_equal(back.start["stick"], SCENARIO.start["stick"])
+    np.testing.assert_array_equal(back.start["castle1"], SCENARIO.start["castle1"])
+    lowered = SCENARIO.start["stick"][2, 3] - back.start["stick"][2, 3]
+    assert lowered == pytest.approx(SCENARIO.clearance_mm * 1e-3)
 
 
 def test_a_scenario_file_is_found_beside_the_observation(tmp_path: Path) -> None:

@@ -193,6 +193,21 @@ def test_streams_are_apart_and_the_key_is_seed_and_stage() -> None:
     assert (stages.LAYOUT, stages.DEMONSTRATION, stages.OBSERVATION, stages.ARM) == (0, 1, 2, 3)
 
 
+def test_returning_the_nominal_goals_fails(scene: Scene, shown: Shown) -> None:
+    """The truth varies: a corrector that knows the scenario does not know the trial."""
+    planned = plan(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
+    assert planned.plan is not None
+    assert planned.gap_after_m < 1e-9
+    tried = stages.attempt(planned.plan, scene, shown.layout.goals)
+    assert (tried.verdict.success, tried.verdict.loose_success) == (False, False)
+
+
+def test_a_measured_observation_is_judged_where_it_was_seen(scene: Scene, shown: Shown) -> None:
+    seen = observed(scene, shown)
+    row = run_measured(replace(SPEC, method="paper"), scene, seen, "text of the file")
+    assert row["success"] is True
+
+
 def test_a_measured_observation_has_no_truth(scene: Scene, shown: Shown) -> None:
     seen = observed(scene, shown, 40.0)
     row = run_measured(replace(SPEC, method="none"), scene, seen, "text of the file")
