@@ -231,8 +231,9 @@ def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep -
 
 def _numbers(text: str, option: str) -> tuple[float, ...]:
     """`0,0.5,1` as numbers; whether they are allowed is checked where they are used."""
+    words = _words(text, option)
     try:
-        return tuple(float(word) for word in _words(text, option))
+        return tuple(float(word) for word in words)
     except ValueError as error:
         raise InputError(
             f"{option} {text} was given; numbers with commas between them are allowed: 0,0.5,1."

@@ -51,9 +51,9 @@ def judge(
     Strict: at the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit
     contacts and `support_mm` for the others; the overlap is at least a part of the true one; no two geoms are too
     deep in each other; nothing holds a part; nothing moves; no part that was in place is pushed before it is moved
-    again. Loose: only the contacts, within `loose_gap_mm` and `loose_angle_deg`, with the same overlap. The true overlap
-    has a place on the environment face, so an assembly that is right in itself but stands elsewhere on the table is not
-    what was shown; beyond that overlap, directions that no contact fixes decide nothing.
+    again. Loose: only the contacts, within `loose_gap_mm` and `loose_angle_deg`, with the same overlap. The true
+    overlap has a place on the environment face, so an assembly that is right in itself but stands elsewhere on the
+    table is not what was shown; beyond that overlap, directions that no contact fixes decide nothing.
 
     Args:
         reached: Snapshots after each operation and at the end. One that is missing, or whose poses are not finite,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from apo_bench.outcomes import sentence
 from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot
 from apo_bench.simulation.prepare import transfers, unreachable
@@ -12,6 +14,10 @@ from apo_bench.simulation.world import snapshot
 from apo_bench.stability import unstable
 
 SETTLE_S = 0.5
+"""At the end, everything is left alone this long."""
+REST_M_S, REST_RAD_S = 5e-5, 1e-3
+"""Slower than this, all parts rest and the next operation may begin; a stick that rocks in its slot takes a while."""
+LOOK_S, PATIENCE_S = 0.04, 1.5
 
 
 def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses | None = None) -> ReplayResult:
@@ -52,6 +58,7 @@ def _carry_out(plan: Plan, robot: Robot, moves: tuple[Transfer, ...], after: lis
     for step, t in zip(plan.schedule, moves, strict=True):
         try:
             transfer(robot, t)
+            _until_rest(robot)
         except Halt as halt:
             if halt.code == "force_stop":
                 after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
@@ -60,9 +67,22 @@ def _carry_out(plan: Plan, robot: Robot, moves: tuple[Transfer, ...], after: lis
     return Outcome("done", "ok", None, sentence("ok"))
 
 
+def _until_rest(robot: Robot) -> None:
+    """The arm stands by until nothing moves at two looks in a row, with bounded patience; then the judge looks."""
+    parts = np.array([np.arange(v, v + 6) for v in robot.scene.work.dof.values()])
+    quiet = 0
+    for _ in range(round(PATIENCE_S / LOOK_S)):
+        speed = np.abs(robot.data.qvel[parts]).max(axis=0)
+        quiet = quiet + 1 if speed[:3].max() < REST_M_S and speed[3:].max() < REST_RAD_S else 0
+        if quiet == 2:
+            return
+        robot.wait(LOOK_S)
+
+
 def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
     try:
         robot.wait(SETTLE_S)
+        _until_rest(robot)
     except Halt as halt:
         if halt.code == "unstable_simulation":
             return None

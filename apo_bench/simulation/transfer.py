@@ -154,7 +154,6 @@ def _release(robot: Robot, t: Transfer) -> None:
     robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], DEPART_M), NEAR))
     robot.handle(None)
     robot.follow(smooth(robot.T, _at_height(robot.T, max(SAFE_M, robot.T[2, 3])), FREE))
-    robot.wait(0.1)
 
 
 def _check_grasp(robot: Robot, t: Transfer) -> None:
