@@ -1,0 +1,246 @@
+"""The command line: what it prints, where, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from apo_bench import cli
+from apo_bench.benchmark.journal import read_rows
+from apo_bench.scenario_file import scenario_names
+
+TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld")
+HOPELESS = ("--level", "40")
+"""Plans at this level are refused before the arm moves, so that a replay costs little."""
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout, stderr."""
+    capsys.readouterr()
+    code = cli.main(arguments)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "scenarios")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()[1:]] == list(scenario_names())
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["replay", "--help"], ["sweep", "--help"]])
+def test_help_is_a_result(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *arguments)
+    assert (code, err) == (0, "")
+    assert out.lstrip().startswith("Usage: apo-bench")
+
+
+def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
+    from importlib.metadata import version
+
+    assert run(capsys, "--version") == (0, f"apo-bench {version('apo_bench')}\n", "")
+
+
+def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    import mujoco
+
+    path = tmp_path / "scene.xml"
+    code, out, _ = run(capsys, "scene", "stick_in_tower", "--out", str(path), "--clearance", "0.4")
+    assert code == 0
+    assert str(path) in out
+    assert mujoco.MjModel.from_xml_path(str(path)).nbody > 5
+    (stick,) = (geom for geom in ElementTree.parse(path).iter("geom") if geom.get("name") == "stick/bar")
+    assert [float(x) for x in stick.get("size", "").split()] == pytest.approx([0.11, 0.0096, 0.0096])
+
+
+def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *TRIAL, "--method", "paper", "--json")
+    assert (code, err) == (0, "")
+    assert out.count("\n") == 1
+    row = json.loads(out)
+    assert (row["schema"], row["seed"], row["method"], row["success"]) == ("apo-bench/row/1", 5, "paper", True)
+
+
+def test_a_replay_that_fails_is_a_result(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *TRIAL, *HOPELESS)
+    assert (code, err) == (0, "")
+    assert "failure at stage" in out
+    assert "level 40, careless 1, seed 5" in out
+
+
+def test_levels_can_be_set_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, *TRIAL, *HOPELESS, "--level-deg", "0", "--json")
+    row = json.loads(out)
+    assert (row["level"], row["level_deg"]) == (40.0, 0.0)
+
+
+def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "seen.json"
+    _, drawn, _ = run(capsys, *TRIAL, *HOPELESS, "--json", "--save-observation", str(path))
+    code, measured, err = run(capsys, *TRIAL, "--observation", str(path), "--json")
+    assert (code, err) == (0, "")
+    before, after = json.loads(drawn), json.loads(measured)
+    for key in ("success", "failure_stage", "failure_code", "failure_operation"):
+        assert after[key] == before[key]
+    assert after["gap_before_mm"] == pytest.approx(before["gap_before_mm"], rel=1e-9)
+    assert (after["level"], after["noise"]) == (None, "measured")
+    assert after["spec_hash"] != before["spec_hash"]
+    _, out, _ = run(capsys, *TRIAL, "--observation", str(path))
+    assert "measured observation" in out
+
+
+def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from apo_bench.resources import folder
+
+    path = tmp_path / "mine.toml"
+    path.write_text((folder("scenarios") / "stick_in_tower.toml").read_text())
+    code, out, _ = run(capsys, "replay", str(path), "--seed", "5", "--grasp", "weld", *HOPELESS, "--json")
+    assert code == 0
+    assert json.loads(out)["scenario"] == "mine"
+
+
+def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "replay.gif"
+    code, _, err = run(capsys, *TRIAL, *HOPELESS, "--video", str(path))
+    assert (code, err) == (0, "")
+    assert path.read_bytes().startswith(b"GIF8")
+
+
+def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    seen, path = tmp_path / "seen.json", tmp_path / "replay.mp4"
+    run(capsys, *TRIAL, *HOPELESS, "--save-observation", str(seen))
+    document = json.loads(seen.read_text())
+    document["operations"][1]["seen"] = False
+    seen.write_text(json.dumps(document))
+    code, out, err = run(capsys, *TRIAL, "--observation", str(seen), "--video", str(path))
+    assert code == 0
+    assert "failure at stage observe: not_seen, operation 2" in out
+    assert err == f"apo-bench: nothing was replayed, so {path} was not written.\n"
+    assert not path.exists()
+
+
+def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    from apo_bench.benchmark import one
+
+    def fails(*arguments: Any) -> Any:
+        shown = show(*arguments)
+        return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
+
+    show = one.show
+    monkeypatch.setattr(one, "show", fails)
+    code, out, _ = run(capsys, *TRIAL, "--json")
+    assert code == 1
+    assert json.loads(out)["success"] is None
+
+
+def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out_folder = tmp_path / "run"
+    code, out, err = run(
+        capsys, "sweep", "stick_in_tower", "--levels", "40", "--careless", "0", "--methods", "none", "--trials", "2",
+        "--seed", "3", "--grasp", "weld", "--workers", "1", "--out", str(out_folder),
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert "0.0 to 65.8 %" in out
+    assert [row["seed"] for row in read_rows(out_folder)] == [3, 4]
+    code, out, err = run(capsys, "report", str(out_folder))
+    assert (code, err) == (0, "")
+    for name in ("table.csv", "success_over_level.png", "report.md"):
+        assert str(out_folder / name) in out
+        assert (out_folder / name).stat().st_size > 0
+
+
+WRONG = {
+    "negative level": (("--level", "-1"), "level in mm of -1"),
+    "level nan": (("--level", "nan"), "level in mm of nan"),
+    "level inf": (("--level", "inf"), "level in mm of inf"),
+    "level abc": (("--level", "abc"), "--level"),
+    "level-deg": (("--level-deg", "-0.5"), "level in degrees of -0.5"),
+    "careless": (("--careless", "-1"), "carelessness of -1"),
+    "seed": (("--seed", "-1"), "seed of -1"),
+    "seed is no number": (("--seed", "1.5"), "--seed"),
+    "method": (("--method", "papr"), "did you mean 'paper'"),
+    "module": (("--method", "no_such_module:corrector"), "cannot be imported"),
+    "noise": (("--noise", "isotropc"), "did you mean 'isotropic'"),
+    "grasp": (("--grasp", "glue"), "unknown grasp 'glue'"),
+    "arm": (("--arm", "seven_axis"), "did you mean 'six_axis'"),
+    "negative clearance": (("--clearance", "-0.1"), "clearance of -0.1"),
+    "clearance nan": (("--clearance", "nan"), "clearance of nan"),
+    "timestep": (("--timestep-ms", "5"), "0.1 to 1 ms"),
+    "film ending": (("--video", "film.txt"), ".mp4 or .gif"),
+    "film folder": (("--video", "/no/such/folder/film.mp4"), "cannot be written"),
+    "observation": (("--observation", "/no/such/file.json"), "cannot be read"),
+    "both": (("--observation", "x.json", "--level", "1"), "--level was given together with --observation"),
+    "oracle of a file": (("--observation", "SEEN", "--method", "oracle"), "truth is not known"),
+    "unknown option": (("--nois", "isotropic"), "--nois"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arguments, words = WRONG[case]
+    if "SEEN" in arguments:
+        path = tmp_path / "seen.json"
+        run(capsys, *TRIAL, *HOPELESS, "--save-observation", str(path))
+        arguments = tuple(str(path) if a == "SEEN" else a for a in arguments)
+    _refused(run(capsys, *TRIAL, *arguments), words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("replay", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("replay", "/no/such/file.toml"), "cannot be read"),
+        (("replay",), "scenario"),
+        (("replai", "stick_in_tower"), "replai"),
+        (("scene", "stick_in_tower", "--out", "/no/such/folder/a.xml"), "cannot be written"),
+        (("scene", "stick_in_tower", "--out", "a.txt"), "ends in .xml"),
+        (("scene", "stick_in_tower", "--out", "a.xml", "--clearance", "-1"), "clearance of -1"),
+        (("sweep", "stick_in_tower"), "out"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--trials", "0"), "0 trials"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--methods", "foo"), "unknown method 'foo'"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--methods", "none,,paper"), "single commas"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--levels", "0,abc"), "--levels 0,abc"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--levels", ""), "--levels ''"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--levels", "-1"), "level of -1"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--workers", "0"), "0 workers"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--clearance", "nan"), "clearance of nan"),
+        (("sweep", "stick_in_tower", "stick_in", "--out", "OUT"), "unknown scenario 'stick_in'"),
+        (("sweep", "stick_in_tower", "--out", "/proc/none", "--trials", "1"), "cannot be written"),
+        (("report", "/no/such/folder"), "cannot be read"),
+    ],
+)
+def test_a_wrong_request_is_one_sentence(
+    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    _refused(run(capsys, *(str(out) if a == "OUT" else a for a in arguments)), words)
+    assert not out.exists()
+
+
+def _refused(ended: tuple[int, str, str], words: str) -> None:
+    code, out, err = ended
+    assert code == 2
+    assert out == ""
+    assert words in err
+    assert err.startswith("apo-bench: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+
+
+def test_the_program_ends_with_its_exit_code() -> None:
+    def ended(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [str(Path(sys.executable).parent / "apo-bench"), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    assert ended("scenarios").returncode == 0
+    wrong = ended("replay", "stick_in_towr")
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert wrong.stderr.count("\n") == 1
