@@ -85,23 +85,31 @@ def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
 
 
 def test_an_episode_is_the_row_of_its_trial(env: APOReplay) -> None:
-    """Zeros, bare and corrected, are methods `none` and `paper` of `apo-bench replay --seed`."""
-    for method, made in (("none", env), ("paper", apo_bench.Corrected(env, "paper"))):
-        row = run_trial(TrialSpec("stick_in_tower", grasp="weld", method=method, seed=SEED), env._scene)
-        made.reset(seed=SEED)
-        _, reward, terminated, truncated, info = made.step(zeros(env))
-        assert (terminated, truncated) == (True, False)
-        assert (info["is_success"], info["loose_success"]) == (row["success"], row["loose_success"])
-        assert reward == float(row["success"]) == (1.0 if method == "paper" else 0.0)
-        stage, code = row["failure_stage"] or "done", row["failure_code"] or "ok"
-        assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
-        assert info["operation"] == row["failure_operation"]
-        reached = {part: [*(p[:3] * 1e3), *p[3:]] for part, p in _packed(env._poses).items()}
-        assert reached == row["reached"]
+    """Zeros, corrected, are method `paper` of `apo-bench replay --seed`."""
+    row = run_trial(TrialSpec("stick_in_tower", grasp="weld", method="paper", seed=SEED), env._scene)
+    assert row["success"] is True
+    _check_episode(apo_bench.Corrected(env, "paper"), row)
+    reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in env._poses.items()}
+    assert reached == row["reached"]
 
 
-def _packed(poses: Any) -> dict[str, Any]:
-    return {part: pose.pack(T) for part, T in poses.items()}
+def test_an_episode_that_fails_is_the_row_of_its_trial() -> None:
+    """Zeros, bare, are method `none`; at this level the plan is refused before the arm moves."""
+    env = APOReplay(grasp="weld", level=40)
+    spec = TrialSpec("stick_in_tower", level_mm=40.0, level_deg=40.0, grasp="weld", method="none", seed=SEED)
+    row = run_trial(spec, env._scene)
+    assert row["success"] is False
+    _check_episode(env, row)
+
+
+def _check_episode(env: Any, row: dict[str, Any]) -> None:
+    env.reset(seed=SEED)
+    _, reward, terminated, truncated, info = env.step(zeros(env))
+    assert (reward, terminated, truncated) == (float(row["success"]), True, False)
+    assert (info["is_success"], info["loose_success"]) == (row["success"], row["loose_success"])
+    stage, code = row["failure_stage"] or "done", row["failure_code"] or "ok"
+    assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
+    assert info["operation"] == row["failure_operation"]
 
 
 def test_an_action_moves_each_goal_in_the_frame_of_its_part(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
