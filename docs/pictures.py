@@ -34,7 +34,9 @@ def main() -> None:
         ("replay_none", seen.goals, "As it was seen, 2 mm and 2 degrees off"),
         ("replay_paper", corrected, "The same observation, corrected by its face contacts"),
     ):
-        film = Film(scene, fps=4, width=480, height=420, camera=view(center, 0.66, 118.0, -20.0))
+        film = Film(
+            scene, fps=4, speed=1.0, shadows=True, width=480, height=420, camera=view(center, 0.66, 118.0, -20.0)
+        )
         tried = attempt(Plan(seen.assembly, seen.start, goals), scene, shown.layout.goals, film)
         _strip(
             HERE / f"{name}.png", film, f"{title}: {'right' if tried.verdict.success else tried.result.outcome.code}"

@@ -57,18 +57,31 @@ class Film:
     """Takes pictures of a replay: pass it as `watch`."""
 
     def __init__(
-        self, scene: Scene, fps: float = 25.0, width: int = 640, height: int = 480, camera: Camera = "overview"
+        self,
+        scene: Scene,
+        fps: float = 20.0,
+        width: int = 640,
+        height: int = 480,
+        camera: Camera = "overview",
+        speed: float = 2.0,
+        shadows: bool = False,
     ) -> None:
+        """A film to be shown at `fps` pictures a second, `speed` times as fast as the replay was.
+
+        Args:
+            shadows: Nicer, and some times slower to draw without a graphics card.
+        """
         self.fps, self.camera = fps, camera
         self.frames: list[Image] = []
         self._renderer = _renderer(scene.work.model, width, height)
+        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._close = weakref.finalize(self, _release, self._renderer)
-        self._next = 0.0
+        self._every, self._next = speed / fps, 0.0
 
     def __call__(self, data: Any) -> None:
         if data.time >= self._next:
             self.frames.append(self.shot(data))
-            self._next = data.time + 1.0 / self.fps - 1e-9
+            self._next = data.time + self._every - 1e-9
 
     def shot(self, data: Any) -> Image:
         """One picture of the present state, not kept."""
