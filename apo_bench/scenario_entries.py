@@ -20,7 +20,7 @@ from apo_bench.scenario import Attach, Grasp, Shift
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
 from apo_bench.strict_json import Node
 
-TRAVEL_M = 0.05
+TRAVEL_M = 0.03
 """How far before its goal the line of attach begins, where the file does not say."""
 LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""

@@ -256,7 +256,7 @@ def test_what_the_tower_says():
 
 
 def test_what_is_left_out_has_a_default(tmp_path: Path):
-    """From straight above, 50 mm; held at the centroid across the narrower level axis; no site, nobody careless."""
+    """From straight above, 30 mm; held at the centroid across the narrower level axis; no site, nobody careless."""
     lines = SLOTS.split("\n[site]")[0].splitlines()
     optional = r"(grasp|vary|clearance_mm|gap_mm|paper|human|success|color) ="
     kept = [line for line in lines if not re.match(optional, line)]

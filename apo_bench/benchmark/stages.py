@@ -84,7 +84,7 @@ def attempt(plan: Plan, scene: Scene, reference: Array, watch: Any = None) -> Tr
 
     Args:
         reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
-        watch: Called with the `MjData` about every 10 ms of simulated time.
+        watch: Called with the `MjData` about every 20 ms of simulated time.
     """
     result = replay(plan, scene, watch)
     scenario = scene.scenario

@@ -48,7 +48,7 @@ def run_trial(
         scene: Compiled for the scenario, clearance, grasp, arm and time step of `spec`.
         shown: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
-        watch: Called with the `MjData` of the replay about every 10 ms of simulated time.
+        watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
 
     Raises:
         InputError: The noise model or the corrector is unknown or returned what it must not.

@@ -24,7 +24,7 @@ def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses
     """Carry out a plan.
 
     Args:
-        watch: Called with the `MjData` about every 10 ms of simulated time.
+        watch: Called with the `MjData` about every 20 ms of simulated time.
         parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
     """
     robot = Robot(scene, plan.start if parts_at is None else parts_at, watch)

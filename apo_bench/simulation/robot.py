@@ -6,6 +6,7 @@ never reads where a part is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from apo_bench.simulation.paths import Line
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import fresh, unstable
 
-TICK_S = 0.01
+TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 KNOT_M, KNOT_RAD = 0.03, 0.15
 """Inverse kinematics is solved this densely along a line; a cubic spline leads through."""
@@ -73,6 +74,8 @@ class Robot:
         Raises:
             Halt: The line leaves the arm's reach, or something went wrong on the way.
         """
+        if np.allclose(line.start, line.end, rtol=0.0, atol=1e-7):
+            return 0.0
         step = float(self.model.opt.timestep)
         n = max(1, round(line.seconds / step))
         path = self._joint_path(line)(line.progress(np.arange(1, n + 1) / n))
@@ -142,7 +145,7 @@ class Robot:
         for i, row in enumerate(rows, start=1):
             ctrl[:] = row
             step(model, data)
-            if guard is not None and -(self.force() @ guard.way) > guard.newton:
+            if guard is not None and self._pushed_back(guard):
                 self._look()
                 return i
             if i % every == 0:
@@ -153,13 +156,20 @@ class Robot:
         """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""
         if unstable(self.data):
             raise Halt(self.stage, "unstable_simulation")
-        if self._held is not None:
-            f = self.force()
-            self.peak_force_n = max(self.peak_force_n, float(np.sqrt(f @ f)))
+        self._feel()
         if self._hardest_blow() > COLLISION_N:
             raise Halt(self.stage, "collision")
         if self.watch is not None:
             self.watch(self.data)
+
+    def _feel(self) -> Array:
+        """The force on the part in the hand, remembered if it is the largest so far."""
+        f = self.force()
+        self.peak_force_n = max(self.peak_force_n, math.sqrt(f @ f))
+        return f
+
+    def _pushed_back(self, guard: Guard) -> bool:
+        return bool(-(self._feel() @ guard.way) > guard.newton)
 
     def _hardest_blow(self) -> float:
         """Largest force between the arm and a part that it does not handle, [N]."""

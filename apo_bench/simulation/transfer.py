@@ -12,11 +12,11 @@ from apo_bench.simulation.paths import moved, smooth, steady
 from apo_bench.simulation.robot import Guard, Halt, Robot
 
 UP = np.array([0.0, 0.0, 1.0])
-FREE, NEAR = 0.9, 0.35
+FREE, NEAR = 1.4, 0.55
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
 LIFT, CARRY, LOWER = 0.25, 0.35, 0.2
 """Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
-PLACE, TOUCH, INSERT = 0.06, 0.01, 0.05
+PLACE, TOUCH, INSERT = 0.06, 0.01, 0.06
 """Steady speeds [m/s]: down to just above the support, onto it, along an insertion."""
 SAFE_M = 0.15
 """Height of the tip at which parts are carried over the others."""
@@ -107,7 +107,6 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.way_out[2] < 0.5:
         robot.follow(smooth(robot.T, moved(robot.T, UP, t.raise_by), 0.01))
         robot.follow(smooth(robot.T, moved(robot.T, t.way_out, t.travel_out), 0.1))
-    robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.03))
     robot.follow(smooth(robot.T, _at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
 
 
