@@ -271,7 +271,7 @@ def test_what_is_left_out_has_a_default(tmp_path: Path):
     assert not plain.colors
     for attach in plain.attach:
         assert attach.direction == pytest.approx((0, 0, -1))
-        assert attach.travel_m == 0.05
+        assert attach.travel_m == 0.03
     stick = plain.assembly.solids["stick"]
     assert plain.grasps[2].point == pytest.approx(stick.centroid)
     assert plain.grasps[2].across == pytest.approx((0, 1, 0))

@@ -11,7 +11,9 @@ from xml.etree import ElementTree
 import mujoco
 
 from apo_bench.errors import InputError, unknown
+from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.layout import layout_at
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.arm import Arm, Kinematics, find_arm
@@ -103,7 +105,11 @@ def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Ar
     room = mjcf.from_path(str(folder("assets") / "room.xml"))
     room.model = scenario.name
     _set_physics(room, settings)
-    bodies = {part: _add_part(mjcf, room, scenario, part, clearance_mm, settings) for part in scenario.assembly.solids}
+    start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
+    bodies = {
+        part: _add_part(mjcf, room, scenario, part, start[part], clearance_mm, settings)
+        for part in scenario.assembly.solids
+    }
     movable = {part: body for part, body in bodies.items() if part not in scenario.assembly.fixed}
     if arm is None:
         _add_hands(room, movable)
@@ -137,8 +143,10 @@ def _set_contact(model: Any, s: Physics) -> None:
     geom.solref, geom.solimp, geom.condim = s.solref, s.solimp, s.condim
 
 
-def _add_part(mjcf: Any, room: Any, scenario: Scenario, part: str, clearance_mm: float, settings: Physics) -> Any:
-    """Attach a part's file, its fit faces receded; returns the body that has the mass (its frame has none)."""
+def _add_part(
+    mjcf: Any, room: Any, scenario: Scenario, part: str, T: Array, clearance_mm: float, settings: Physics
+) -> Any:
+    """Attach a part's file at T, its fit faces receded; returns the body that has the mass (its frame has none)."""
     model = mjcf.from_path(str(scenario.part_files[part]))
     model.model = part
     _set_contact(model, settings)
@@ -149,7 +157,6 @@ def _add_part(mjcf: Any, room: Any, scenario: Scenario, part: str, clearance_mm:
         for geom in model.find_all("geom"):
             geom.rgba = (*scenario.colors[part], 1.0)
     frame = room.attach(model)
-    T = scenario.start[part]
     frame.pos = T[:3, 3]
     frame.xyaxes = (*T[:3, 0], *T[:3, 1])
     if part not in scenario.assembly.fixed:
