@@ -53,8 +53,8 @@ def test_the_automatic_reset_is_off(tower: Scene) -> None:
 def test_contacts_of_parts_and_pads_have_the_checked_stiffness(tower: Scene) -> None:
     model = tower.work.model
     for name in ("castle1/base", "stick/bar", "table/slab", "arm/left_pad"):
-        assert model.geom(name).solref.tolist() == [0.004, 1.5]
-    assert build_scene(tower.scenario, timestep_s=0.0005).work.model.geom("stick/bar").solref.tolist() == [0.002, 1.5]
+        assert model.geom(name).solref.tolist() == [0.004, 2.0]
+    assert build_scene(tower.scenario, timestep_s=0.0005).work.model.geom("stick/bar").solref.tolist() == [0.002, 2.0]
 
 
 def test_a_snapshot_sees_what_is_inside_what(tower: Scene) -> None:
