@@ -178,8 +178,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         twist = np.asarray(action, dtype=np.float64)
         if not self.action_space.contains(twist):
             raise InputError(
-                f"an action of shape {twist.shape} was given; shape {self.action_space.shape} within 0.1 m and 0.5 rad "
-                "is allowed, as `env.action_space` says."
+                f"an action of shape {twist.shape} with numbers from {np.min(twist, initial=0):g} to "
+                f"{np.max(twist, initial=0):g} was given; shape {self.action_space.shape} within 0.1 m and 0.5 rad is "
+                "allowed, as `env.action_space` says."
             )
         self._over = True
         success, loose, end = self._replayed(self._shown, self._aim @ pose.exp(twist))
@@ -272,6 +273,10 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
             raise InputError(f"`Corrected` wraps an APOReplay environment, {env.unwrapped} was given.")
         self._base: APOReplay = env.unwrapped
         self._corrector = resolve(corrector, CORRECTORS, "corrector")
+        if not callable(self._corrector):
+            raise InputError(
+                f"the corrector {corrector!r} was given; give a name, 'package.module:name' or a function."
+            )
         self._correct = correct
         self._goals: Array | None = None
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+MOST = 20
+"""A longer list of names helps nobody."""
+
 
 class InputError(ValueError):
     """A request or a file that cannot be honoured; its message is one clear sentence (CLI: exit code 2)."""
@@ -15,4 +18,6 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     names = sorted(allowed)
     near = get_close_matches(given, names, n=1, cutoff=0.5)
     hint = f"; did you mean '{near[0]}'?" if near else "."
-    return f"unknown {kind} '{given}'{hint} Known: {', '.join(names) or 'none'}."
+    shown = names if len(names) <= MOST else get_close_matches(given, names, n=MOST, cutoff=0.3)
+    more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
+    return f"unknown {kind} '{given}'{hint} Known: {', '.join(shown) or 'none'}{more}."

@@ -27,10 +27,19 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
             raise InputError(unknown(kind, given, known) + " Or give your own as 'package.module:name'.")
         given = known[given]
     module_name, _, attribute = given.partition(":")
+    if not module_name or not attribute or module_name.startswith("."):
+        raise InputError(
+            f"the {kind} '{given}' is not of the form 'package.module:name'; name a module and what is in it."
+        )
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
-        raise InputError(f"the {kind} '{given}' cannot be imported: {error}.") from error
+        raise InputError(
+            f"the {kind} '{given}' cannot be imported ({error}); start in the folder of its module, "
+            "or put that on PYTHONPATH."
+        ) from error
+    except Exception as error:
+        raise InputError(f"the {kind} '{given}' cannot be imported: its module raised {error!r}.") from error
     try:
         value: Any = module
         for name in attribute.split("."):

@@ -21,7 +21,7 @@ CODES = MappingProxyType(
         # correct
         "inconsistent": "the contacts cannot all hold: the solver came to rest with a gap above the threshold",
         "not_converged": "the solver did not come to rest within its iterations",
-        "not_finite": "the solver met a number that is not finite",
+        "not_finite": "the correction holds a number that is not finite",
         # plan
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
         "unstable_goal": "at the goal of operation {operation} the centre of mass of {part} lies beside its support",

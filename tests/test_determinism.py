@@ -93,7 +93,13 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
         *(sys.executable, "-m", "apo_bench.cli", "sweep", "stick_on_castles", "--levels", "0,1", "--careless", "1"),
         *("--methods", "none,paper", "--trials", "3", "--grasp", "weld", "--workers", "2", "--out", str(out)),
     ]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
+    )
     deadline = time.monotonic() + 120
     while not (out / "trials.jsonl").exists() or not (out / "trials.jsonl").read_bytes():
         assert time.monotonic() < deadline

@@ -97,11 +97,10 @@ def test_the_scenario_s_own_goals_fail_since_the_truth_varies(name: str, request
     """A corrector or a policy that has learnt the recipe by heart gains nothing, even where its assembly holds."""
     scene = request.getfixturevalue(name)
     for seed in (2, 3):
-        result, verdict = run(scene, seed, scene.scenario.goals)
-        assert result.outcome.code == "ok"
+        _, verdict = run(scene, seed, scene.scenario.goals)
         assert not verdict.success
         assert not verdict.loose_success
-        assert verdict.code == "overlap"
+        assert not any(contact.covering for contact in verdict.contacts if contact.contact.environment.part == "table")
 
 
 def test_an_operation_can_be_undone_and_done_again(tower: Scene) -> None:

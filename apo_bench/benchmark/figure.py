@@ -38,7 +38,7 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
     figure.legend(
         handles.values(), handles.keys(), loc="outside upper center", ncols=max(1, len(handles)), frameon=False
     )
-    figure.savefig(path, dpi=150)
+    figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
 
 def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
@@ -56,10 +56,19 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
             x, [c.interval.low for c in line], [c.interval.high for c in line], color=color, alpha=0.18, linewidth=0
         )
         marker = MARKERS[i % len(MARKERS)]
-        axis.plot(x, [c.rate for c in line], color=color, marker=marker, markersize=5, linewidth=1.8, label=method)
+        rates = [float(c.rate or 0.0) for c in line]
+        below = [rate - c.interval.low for rate, c in zip(rates, line, strict=True)]
+        above = [c.interval.high - rate for rate, c in zip(rates, line, strict=True)]
+        axis.errorbar(x, rates, yerr=[below, above], color=color, fmt="none", capsize=3, linewidth=1.0, alpha=0.8)
+        axis.plot(x, rates, color=color, marker=marker, markersize=5, linewidth=1.8, label=method, clip_on=False)
+        for at, cell in zip(x, line, strict=True):
+            offset = (6, -12) if cell.rate > 0.5 else (6, 6)
+            axis.annotate(
+                f"n={cell.trials}", (at, cell.rate), offset, textcoords="offset points", fontsize=6, color=color
+            )
     axis.set_xticks(range(len(levels)), [level_label(*level) for level in levels])
-    axis.set_xlim(-0.25, max(len(levels) - 1, 0) + 0.25)
-    axis.set_ylim(-0.03, 1.03)
+    axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
+    axis.set_ylim(-0.04, 1.06)
     axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
     axis.grid(axis="y", alpha=0.3)
     axis.spines[["top", "right"]].set_visible(False)

@@ -100,7 +100,8 @@ def read_rows(folder: str | Path) -> list[dict[str, Any]]:
         text = path.read_bytes()
     except OSError as error:
         raise InputError(
-            f"'{path}' cannot be read ({error.strerror}); give the folder that `apo-bench sweep --out` wrote."
+            f"the folder '{folder}' holds no sweep ({error.strerror}: {path.name}); give the one that "
+            "`apo-bench sweep --out` wrote."
         ) from error
     whole, _, _ = text.rpartition(b"\n")
     return [_row(line, path, i) for i, line in enumerate(whole.split(b"\n"), start=1) if whole]

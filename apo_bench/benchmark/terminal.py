@@ -64,7 +64,9 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     if row["gap_before_mm"] is not None:
         gaps = f"{row['gap_before_mm']:.3f} mm as seen, {row['gap_after_mm'] or 0.0:.3f} mm as planned"
         lines.append(("contact gap", gaps))
-    if row["worst_gap_mm"] is not None:
+    if row["worst_gap_mm"] is not None and not row["loose_success"]:
+        lines.append(("reached", f"not every contact was made: least overlap {row['least_overlap']:.2f}"))
+    elif row["worst_gap_mm"] is not None:
         lines.append(("reached", f"worst contact gap {row['worst_gap_mm']:.3f} mm, overlap {row['least_overlap']:.2f}"))
     if row["pose_error_fixed_mm"] is not None:
         errors = f"{row['pose_error_fixed_mm']:.3f} mm fixed by contacts, {row['pose_error_free_mm']:.3f} mm free"
@@ -86,4 +88,5 @@ def _result(row: Mapping[str, Any]) -> str:
 
 def _console() -> Console:
     """As wide as the terminal, and wide enough to keep lines whole where there is none."""
-    return Console(width=None if sys.stdout.isatty() else 160, highlight=False, markup=False)
+    narrowest = 110 if sys.stdout.isatty() else 160
+    return Console(width=max(narrowest, Console().width), highlight=False, markup=False)

@@ -42,7 +42,12 @@ def correct(seen: Observation, corrector: Any = "paper") -> Correction:
             f"the corrector '{name}' is {_kind(chosen)}; give a function that takes an Observation "
             "and returns a Correction, or an object with such a __call__."
         )
-    found = chosen(seen)
+    try:
+        found = chosen(seen)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"the corrector '{name}' failed: it raised {error!r}; mend it, or use another.") from error
     if not isinstance(found, Correction):
         return _wrapped(seen, _bare(found, len(seen.goals), name))
     if found.status not in STATUSES:

@@ -72,7 +72,12 @@ def find_arm(given: str | Arm) -> Arm:
         from apo_bench.names import resolve
 
         made = resolve(given, {}, "arm")
-        made = made() if callable(made) else made
+        try:
+            made = made() if callable(made) else made
+        except Exception as error:
+            raise InputError(
+                f"the arm '{given}' failed: it raised {error!r}; give a function without arguments."
+            ) from error
         if not isinstance(made, Arm):
             raise InputError(f"the arm '{given}' is a {type(made).__name__}; an `Arm`, or a function that returns one.")
         return made

@@ -62,16 +62,18 @@ class Film:
         fps: float = 20.0,
         width: int = 640,
         height: int = 480,
-        camera: Camera = "overview",
+        camera: Camera | None = None,
         speed: float = 2.0,
         shadows: bool = False,
     ) -> None:
         """A film to be shown at `fps` pictures a second, `speed` times as fast as the replay was.
 
         Args:
+            camera: By default one that looks at the middle of the assembly.
             shadows: Nicer, and some times slower to draw without a graphics card.
         """
-        self.fps, self.camera = fps, camera
+        middle = np.array([*scene.scenario.site.center_m, 0.08])
+        self.fps, self.camera = fps, camera or view(middle, 0.85, 128.0, -24.0)
         self.frames: list[Image] = []
         self._renderer = _renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
