@@ -214,7 +214,7 @@ def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture
         (("sweep", "stick_in_tower", "--out", "OUT", "--clearance", "nan"), "clearance of nan"),
         (("sweep", "stick_in_tower", "stick_in", "--out", "OUT"), "unknown scenario 'stick_in'"),
         (("sweep", "stick_in_tower", "--out", "/proc/none", "--trials", "1"), "cannot be written"),
-        (("report", "/no/such/folder"), "cannot be read"),
+        (("report", "/no/such/folder"), "holds no sweep"),
     ],
 )
 def test_a_wrong_request_is_one_sentence(

@@ -141,7 +141,7 @@ def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) ->
 
 
 def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="holds no sweep"):
         report(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no finished trial"):
         report(write(tmp_path / "empty", []))

@@ -61,11 +61,9 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
         above = [c.interval.high - rate for rate, c in zip(rates, line, strict=True)]
         axis.errorbar(x, rates, yerr=[below, above], color=color, fmt="none", capsize=3, linewidth=1.0, alpha=0.8)
         axis.plot(x, rates, color=color, marker=marker, markersize=5, linewidth=1.8, label=method, clip_on=False)
-        for at, cell in zip(x, line, strict=True):
-            offset = (6, -12) if cell.rate > 0.5 else (6, 6)
-            axis.annotate(
-                f"n={cell.trials}", (at, cell.rate), offset, textcoords="offset points", fontsize=6, color=color
-            )
+        for at, rate, cell in zip(x, rates, line, strict=True):
+            offset = (6, -12) if rate > 0.5 else (6, 6)
+            axis.annotate(f"n={cell.trials}", (at, rate), offset, textcoords="offset points", fontsize=6, color=color)
     axis.set_xticks(range(len(levels)), [level_label(*level) for level in levels])
     axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
     axis.set_ylim(-0.04, 1.06)
