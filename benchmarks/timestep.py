@@ -1,4 +1,4 @@
-"""Does the time step decide verdicts? `python benchmarks/timestep.py [WORKERS]` (about 20 minutes on two cores).
+"""Does the time step decide verdicts? `python benchmarks/timestep.py [WORKERS [SEEDS]]` (34 seeds: about 20 minutes on two cores).
 
 The same trials, replayed as seen by a careful human at levels near the border of the clearance, with 1 ms and with
 0.5 ms steps; prints how many verdicts differ and writes `benchmarks/results/timestep.json`.
@@ -23,7 +23,7 @@ from apo_bench.benchmark.trial import run_trial
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
 
-SCENARIOS, LEVELS, SEEDS = ("stick_in_tower", "stick_on_castles"), (0.05, 0.1, 0.2), range(34)
+SCENARIOS, LEVELS = ("stick_in_tower", "stick_on_castles"), (0.05, 0.1, 0.2)
 STEPS = (0.001, 0.0005)
 RESULT = Path(__file__).parent / "results" / "timestep.json"
 
@@ -49,8 +49,8 @@ def _spec(case: Case, step: float) -> TrialSpec:
     return TrialSpec(scenario=case.scenario, seed=case.seed, careless=0.0, method="none", timestep_s=step, **level)
 
 
-def main(workers: int) -> None:
-    cases = [Case(*values) for values in product(SCENARIOS, LEVELS, SEEDS)]
+def main(workers: int = 2, seeds: int = 34) -> None:
+    cases = [Case(*values) for values in product(SCENARIOS, LEVELS, range(seeds))]
     with ProcessPoolExecutor(workers) as pool:
         pairs = list(pool.map(verdicts, cases, chunksize=3))
     lines = []
@@ -65,8 +65,10 @@ def main(workers: int) -> None:
     differ = sum(line["differ"] for line in lines)
     print(f"{differ} of {len(pairs)} verdicts differ ({differ / len(pairs):.1%})")
     RESULT.parent.mkdir(exist_ok=True)
-    RESULT.write_text(json.dumps({"command": "python benchmarks/timestep.py", "cells": lines}, indent=1) + "\n")
+    RESULT.write_text(
+        json.dumps({"command": f"python benchmarks/timestep.py {workers} {seeds}", "cells": lines}, indent=1) + "\n"
+    )
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 2)
+    main(*map(int, sys.argv[1:3]))
