@@ -1,4 +1,4 @@
-"""Does the time step decide verdicts? `python benchmarks/timestep.py [WORKERS [SEEDS]]` (34 seeds: about 20 minutes on two cores).
+"""Does the time step decide verdicts? `python benchmarks/timestep.py [WORKERS [SEEDS]]` (34 seeds: some 20 minutes).
 
 The same trials, replayed as seen by a careful human at levels near the border of the clearance, with 1 ms and with
 0.5 ms steps; prints how many verdicts differ and writes `benchmarks/results/timestep.json`.
