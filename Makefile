@@ -3,7 +3,7 @@
 #   make test    set up, check style and types, run every test
 
 PYTHON ?= python3
-TRIALS ?= 6
+TRIALS ?= 4
 WORKERS ?= 2
 OUT ?= runs/sweep
 
