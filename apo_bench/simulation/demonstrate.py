@@ -10,7 +10,7 @@ from apo_bench.judge import judge
 from apo_bench.program import Demonstration, Layout, Reached, Snapshot
 from apo_bench.scenario import Carelessness, Scenario
 from apo_bench.simulation.hands import Hands
-from apo_bench.simulation.paths import Line, minimum_jerk, moved, smooth
+from apo_bench.simulation.paths import Line, at_height, minimum_jerk, moved, smooth
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import snapshot, unstable
 
@@ -87,7 +87,7 @@ def _operate(hands: Hands, scenario: Scenario, layout: Layout, k: int, target: A
     before = moved(target, way, -attach.travel_m)
     T = hands.grab(0, part)
     safe = max(SAFE_M, before[2, 3])
-    for end in (_at_height(T, max(safe, T[2, 3])), _at_height(before, safe), before):
+    for end in (at_height(T, max(safe, T[2, 3])), at_height(before, safe), before):
         hands.move((0, smooth(T, end, SPEED, turn_speed=4.0)))
         T = end
     stop = moved(target, UP, DROP_M) if way[2] < -0.5 else target
@@ -119,12 +119,6 @@ def _first(stroke: Line, fraction: float) -> Line:
     """The first part of a stroke, as a motion of its own."""
     end = stroke.poses(np.array([fraction]))[0]
     return Line(stroke.start, end, stroke.seconds * 0.5, minimum_jerk)
-
-
-def _at_height(T: Array, height: float) -> Array:
-    out = np.array(T)
-    out[2, 3] = height
-    return out
 
 
 def _right(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> bool:

@@ -73,3 +73,10 @@ def moved(T: Array, along: Array, by: float) -> Array:
     out = np.array(T)
     out[:3, 3] += by * np.asarray(along)
     return out
+
+
+def at_height(T: Array, height: float) -> Array:
+    """The pose lifted or lowered to a height in the world, [m]."""
+    out = np.array(T)
+    out[2, 3] = height
+    return out

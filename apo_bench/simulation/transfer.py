@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.paths import moved, smooth, steady
+from apo_bench.simulation.paths import at_height, moved, smooth, steady
 from apo_bench.simulation.robot import Guard, Halt, Robot
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -81,15 +81,15 @@ def key_poses(t: Transfer) -> tuple[Array, ...]:
     """Tip poses that must be in reach for the transfer to be possible."""
     pick, goal = t.T_world_start @ t.T_part_tip, t.T_world_goal @ t.T_part_tip
     before = moved(goal, t.way_in, -t.travel)
-    return (_at_height(pick, _hover(pick)), pick, _at_height(before, max(SAFE_M, before[2, 3])), before, goal)
+    return (at_height(pick, _hover(pick)), pick, at_height(before, max(SAFE_M, before[2, 3])), before, goal)
 
 
 def _pick(robot: Robot, t: Transfer) -> None:
     robot.stage = "pick"
     grasp = t.T_world_start @ t.T_part_tip
-    hover = _at_height(grasp, _hover(grasp))
-    robot.follow(smooth(robot.T, _at_height(robot.T, max(robot.T[2, 3], hover[2, 3])), NEAR))
-    robot.follow(smooth(robot.T, _at_height(hover, robot.T[2, 3]), FREE, turn_speed=3.0))
+    hover = at_height(grasp, _hover(grasp))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], hover[2, 3])), NEAR))
+    robot.follow(smooth(robot.T, at_height(hover, robot.T[2, 3]), FREE, turn_speed=3.0))
     robot.handle(t.part)
     robot.fingers(min(t.half_width + OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
     robot.follow(smooth(robot.T, grasp, NEAR))
@@ -107,7 +107,7 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.way_out[2] < 0.5:
         robot.follow(smooth(robot.T, moved(robot.T, UP, t.raise_by), 0.01))
         robot.follow(smooth(robot.T, moved(robot.T, t.way_out, t.travel_out), 0.1))
-    robot.follow(smooth(robot.T, _at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
 
 
 def _carry(robot: Robot, t: Transfer) -> None:
@@ -115,7 +115,7 @@ def _carry(robot: Robot, t: Transfer) -> None:
     before = moved(t.T_world_goal @ t.T_part_tip, t.way_in, -t.travel)
     if not t.from_above:
         before = moved(before, UP, t.raise_by)
-    robot.follow(smooth(robot.T, _at_height(before, max(SAFE_M, before[2, 3])), CARRY))
+    robot.follow(smooth(robot.T, at_height(before, max(SAFE_M, before[2, 3])), CARRY))
     robot.follow(smooth(robot.T, before, LOWER))
     robot.wait(0.1)
     _check_grasp(robot, t)
@@ -152,7 +152,7 @@ def _release(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
     robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], DEPART_M), NEAR))
     robot.handle(None)
-    robot.follow(smooth(robot.T, _at_height(robot.T, max(SAFE_M, robot.T[2, 3])), FREE))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(SAFE_M, robot.T[2, 3])), FREE))
 
 
 def _check_grasp(robot: Robot, t: Transfer) -> None:
@@ -162,9 +162,3 @@ def _check_grasp(robot: Robot, t: Transfer) -> None:
 
 def _hover(grasp: Array) -> float:
     return float(grasp[2, 3]) + HOVER_M
-
-
-def _at_height(T: Array, height: float) -> Array:
-    out = np.array(T)
-    out[2, 3] = height
-    return out
