@@ -93,6 +93,10 @@ class Assembly:
         """Whether the physical faces stay apart by the clearance when the nominal ones touch."""
         return self.face(contact.manipulated).fit or self.face(contact.environment).fit
 
+    def first(self, n: int) -> Assembly:
+        """What is known after n operations: the same parts, no later operation."""
+        return Assembly(self.solids, self.operations[:n], self.fixed)
+
     def odls(self) -> tuple[Mapping[str, ODL], ...]:
         """The ODL of every part moved so far, after each operation (Section 3.2.1).
 

@@ -98,6 +98,11 @@ class Step(NamedTuple):
     undo: bool = False
 
 
+def once_each(n: int) -> tuple[Step, ...]:
+    """The plain schedule: every operation once, in order."""
+    return tuple(Step(k) for k in range(n))
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -106,15 +111,22 @@ class Plan:
     assembly: Assembly
     start: Poses
     goals: Array
+    """(n, 4, 4): where every operation puts its main part in the end."""
     schedule: tuple[Step, ...] = field(default=())
     """Empty stands for: every operation once, in order."""
+    targets: Array = field(default=None)  # type: ignore[assignment]
+    """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
+    that it undoes. Left out, it is filled in from `goals`."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
         object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
         object.__setattr__(self, "start", frozen_poses(self.start))
         if not self.schedule:
-            object.__setattr__(self, "schedule", tuple(Step(k) for k in range(n)))
+            object.__setattr__(self, "schedule", once_each(n))
+        filled = self.goals[[step.operation for step in self.schedule]]
+        targets = filled if self.targets is None else self.targets
+        object.__setattr__(self, "targets", frozen(targets, len(self.schedule), 4, 4))
 
 
 class Iterate(NamedTuple):
@@ -125,6 +137,17 @@ class Iterate(NamedTuple):
     rank: int
     step: float
     """Length of the scaled step, [m]."""
+
+
+class Try(NamedTuple):
+    """One trial of the iterative correction (Section 4.2)."""
+
+    step: int
+    """The operation that had just been observed, counted from 0."""
+    free: tuple[int, ...]
+    """The operations whose motion parameters were free, most recent first."""
+    gap_m: float
+    """Largest |e| over the equations of the trial, after solving."""
 
 
 @final
@@ -142,9 +165,17 @@ class Correction:
     gap_after_m: float
     rank: int
     trace: tuple[Iterate, ...] = ()
+    tried: tuple[Try, ...] = ()
+    """Every set of motion parameters that was tried, in order."""
+    schedule: tuple[Step, ...] = ()
+    """What to do and undo, in order; empty stands for: every operation once."""
+    targets: Array | None = None
+    """(steps, 4, 4) as in `Plan`; None stands for `goals` throughout."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
+        if self.targets is not None:
+            object.__setattr__(self, "targets", frozen(self.targets, len(self.schedule), 4, 4))
 
     @property
     def ok(self) -> bool:
