@@ -114,7 +114,7 @@ class Plan:
     """(n, 4, 4): where every operation puts its main part in the end."""
     schedule: tuple[Step, ...] = field(default=())
     """Empty stands for: every operation once, in order."""
-    targets: Array = field(default=None)  # type: ignore[assignment]
+    targets: Array = None  # type: ignore[assignment]
     """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
     that it undoes. Left out, it is filled in from `goals`."""
 
