@@ -14,19 +14,31 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     Separating axes: two boxes are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
-    centers_a, R_a, halves_a = _posed(a.boxes, T_a)
-    centers_b, R_b, halves_b = _posed(b.boxes, T_b)
-    axes = _axes(R_a, R_b)
-    reach_a, reach_b = halves_a @ np.abs(axes @ R_a).T, halves_b @ np.abs(axes @ R_b).T
-    apart = np.abs((centers_a[:, None] - centers_b[None]) @ axes.T)
-    depth = (reach_a[:, None] + reach_b[None] - apart).min(axis=-1)
-    return max(0.0, float(depth.max()))
+    return max(0.0, float(depths(a.boxes, T_a[:3, :3], T_a[None, :3, 3], b.boxes, T_b)[0]))
 
 
-def _posed(boxes: tuple[Box, ...], T: Array) -> tuple[Array, Array, Array]:
-    """Centres (k, 3) in the world, the common rotation (3, 3), half sizes (k, 3)."""
-    centers = np.array([box.center for box in boxes]) @ T[:3, :3].T + T[:3, 3]
-    return centers, T[:3, :3], np.array([box.half for box in boxes])
+def depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: Array) -> Array:
+    """As `intrusion`, of boxes that keep their orientation at k places; negative where they are apart.
+
+    Args:
+        R_a: (3, 3), the orientation of `a`.
+        at: (k, 3), the places of the frame of `a`, [m].
+
+    Returns:
+        (k,), [m].
+    """
+    centers_a, halves_a = _boxes(a)
+    centers_b, halves_b = _boxes(b)
+    axes = _axes(R_a, T_b[:3, :3])
+    reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
+    between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
+    apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
+    return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
+
+
+def _boxes(boxes: tuple[Box, ...]) -> tuple[Array, Array]:
+    """Centres and half sizes, (k, 3) each, in the frame of their solid."""
+    return np.array([box.center for box in boxes]), np.array([box.half for box in boxes])
 
 
 def _axes(R_a: Array, R_b: Array) -> Array:

@@ -2,40 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import ODL, Contact, product
+from apo_bench.assembly import Assembly, Contact
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.overlap import overlap
 from apo_bench.program import Plan, Poses, Step
-from apo_bench.scenario import Grasp
+from apo_bench.scenario import Attach, Grasp
+from apo_bench.simulation.grasping import Grips, Place, Stroke, grasp_at, grips_along, obstacles, tip_frame
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.transfer import UP, Transfer, key_poses
+from apo_bench.simulation.transfer import Grip, Line, Transfer, key_poses
 
 GRAVITY = 9.81
-PLACE_WEIGHTS, INSERT_WEIGHTS = 6.0, 2.5
-"""Guards in weights: of the part that is put down; of the lightest part that an insertion could push along."""
+PLACE_WEIGHTS, INSERT_WEIGHTS, SLIDE_WEIGHTS = 6.0, 2.5, 0.5
+"""Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
+part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
 SLOW_M = 0.003
 WALL_MARGIN_M = 0.002
+PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
+"""How a part that was taken off is put down, in the world."""
 
 
-def transfers(plan: Plan, scene: Scene) -> tuple[Transfer, ...]:
-    """One transfer per step of the schedule."""
-    believed = dict(plan.start)
-    before: dict[int, Array] = {}
+class Move(NamedTuple):
+    """A step of the schedule with its transfer; undoing and doing again at once is one move."""
+
+    step: Step
+    transfer: Transfer
+
+
+class _Task(NamedTuple):
+    """One transfer to be prepared, in terms of the plan."""
+
+    step: Step
+    was: int | None
+    """The operation that had put the part where it is, None if it stands where it started."""
+    target: Array
+
+
+def moves(plan: Plan, scene: Scene) -> tuple[Move, ...]:
+    """What to do for each step of the schedule; what moves with a part is believed to stay with it."""
+    believed: Poses = dict(plan.start)
     made = []
-    for step in plan.schedule:
-        part = plan.assembly.operations[step.operation].main
-        if step.undo:
-            target = before[step.operation]
-        else:
-            before[step.operation] = believed[part]
-            target = plan.goals[step.operation]
-        made.append(_transfer(plan, scene, step, believed, target))
-        believed[part] = target
+    for task in _tasks(plan, scene):
+        operation = plan.assembly.operations[task.step.operation]
+        made.append(Move(task.step, _transfer(plan, scene, task, believed)))
+        T = task.target @ pose.inverse(believed[operation.main])
+        believed = {**believed, **{part: T @ believed[part] for part in operation.moves}}
     return tuple(made)
 
 
@@ -50,43 +66,108 @@ def unreachable(scene: Scene, transfer: Transfer) -> bool:
     return False
 
 
-def _transfer(plan: Plan, scene: Scene, step: Step, believed: Poses, target: Array) -> Transfer:
-    operation = plan.assembly.operations[step.operation]
-    attach = scene.scenario.attach[step.operation]
-    way = plan.goals[step.operation][:3, :3] @ attach.direction
-    out = UP
-    if step.undo:
-        way, out = -UP, (-way if abs(way[2]) < 0.5 else UP)
-    part, start = operation.main, believed[operation.main]
-    grasp = scene.scenario.grasps[step.operation]
-    weight = GRAVITY * np.array([_mass(scene, p) for p in (part, *_neighbours(scene, operation.contacts, part))])
+def _tasks(plan: Plan, scene: Scene) -> list[_Task]:
+    """The schedule with its targets: an undone part goes back to where it was, unless it is done again at once."""
+    at: Poses = dict(plan.start)
+    put: dict[str, int] = {}
+    before: dict[int, tuple[Array, int | None]] = {}
+    tasks = []
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+        k = step.operation
+        operation = plan.assembly.operations[k]
+        again = i + 1 < len(plan.schedule) and plan.schedule[i + 1] == Step(k) and not _is_level(plan, scene, k)
+        if step.undo and again:
+            continue
+        if step.undo:
+            target, was = before.pop(k)
+        else:
+            was = put.get(operation.main)
+            before.setdefault(k, (at[operation.main], was))
+        tasks.append(_Task(step, put.get(operation.main), target))
+        T = target @ pose.inverse(at[operation.main])
+        at = {**at, **{part: T @ at[part] for part in operation.moves}}
+        put[operation.main] = k
+        if step.undo:
+            put.pop(operation.main)
+            if was is not None:
+                put[operation.main] = was
+    return tasks
+
+
+def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfer:
+    k, undo = task.step
+    operation = plan.assembly.operations[k]
+    part, start, target = operation.main, believed[operation.main], task.target
+    T = target @ pose.inverse(start)
+    after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
+    contacts = _restored(plan.assembly, k) if undo else operation.contacts
+    out = _line(scene, task.was, start)
+    into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m) if undo else _line(scene, k, target)
+    grips, out, into = _grips(scene, task, part, out, into, believed, after)
+    sides = () if into.level else _sides(plan.assembly, contacts, operation.moves, after)
+    weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
+    held = sum(weight[p] for p in operation.moves)
+    near = [weight[p] for p in _neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
         part=part,
+        carried=operation.carries,
         T_world_start=start,
         T_world_goal=target,
-        T_part_tip=_tip(scene, grasp, start, target),
-        half_width=_half_width(scene, part, grasp),
-        way_in=way,
-        travel=0.05 if step.undo else attach.travel_m,
-        way_out=out,
-        travel_out=attach.travel_m,
-        slow=SLOW_M if step.undo else _slow(plan, step.operation, way),
-        place_n=PLACE_WEIGHTS * float(weight[0]),
-        insert_n=INSERT_WEIGHTS * float(weight[1:].min(initial=weight[0])),
-        raise_by=0.5e-3 * scene.clearance_mm,
+        grips=grips,
+        out=out,
+        into=into,
+        sides=sides,
+        slow=_slow(plan.assembly, contacts, after, into),
+        place_n=PLACE_WEIGHTS * held,
+        insert_n=INSERT_WEIGHTS * min(near, default=held),
+        slide_n=SLIDE_WEIGHTS * min(near, default=held),
+        clearance=1e-3 * scene.clearance_mm,
     )
 
 
-def _tip(scene: Scene, grasp: Grasp, start: Array, goal: Array) -> Array:
-    """The tip in the part's frame: looking down, closing along `across`; of the two ways round, the easier one."""
-    ahead = -start[:3, :3].T @ UP
-    candidates = []
-    for across in (grasp.across, -grasp.across):
-        T = np.eye(4)
-        T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = across, np.cross(ahead, across), ahead, grasp.point
-        candidates.append(T)
+def _line(scene: Scene, k: int | None, T: Array) -> Line:
+    """The line of attach of an operation whose part stands at T; straight down if none put it there."""
+    if k is None:
+        return Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
+    attach = scene.scenario.attach[k]
+    return Line(T[:3, :3] @ attach.direction, attach.travel_m)
+
+
+def _is_level(plan: Plan, scene: Scene, k: int) -> bool:
+    return _line(scene, k, plan.goals[k]).level
+
+
+def _grips(
+    scene: Scene, task: _Task, part: str, out: Line, into: Line, believed: Poses, after: Poses
+) -> tuple[tuple[Grip, ...], Line, Line]:
+    """Where to hold the part, and both lines with the place where the grip changes."""
+    solids, preferred = scene.scenario.assembly.solids, scene.scenario.grasps[task.step.operation]
+    if task.was is not None and out.level:
+        preferred = scene.scenario.grasps[task.was]
+    start = Place(believed[part], obstacles(solids, believed, (part,)))
+    goal = Place(after[part], obstacles(solids, after, (part,)))
+    if into.level:
+        stroke = Stroke(goal.T, into.way, into.travel, goal.around)
+        found = grips_along(scene, part, preferred, (start,), stroke)
+        into = Line(into.way, into.travel, found.left)
+    elif out.level:
+        stroke = Stroke(start.T, out.way, out.travel, start.around)
+        backwards = grips_along(scene, part, preferred, (goal,), stroke)
+        found = Grips(backwards.second or backwards.first, backwards.left, backwards.first)
+        out = Line(out.way, out.travel, backwards.left)
+    else:
+        found = Grips(grasp_at(scene, part, preferred, (start, goal)))
+    grasps = (found.first, found.second) if found.left is not None and found.second is not None else (found.first,)
+    return tuple(_grip(scene, part, grasp, start.T, goal.T) for grasp in grasps), out, into
+
+
+def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> Grip:
+    """The grasp as a pose of the tip; of the two ways round, the one that turns the wrist less."""
+    other = Grasp(grasp.point, -grasp.across)
     rest = scene.kinematics.forward(scene.arm.home)
-    return min(candidates, key=lambda T: max(_turn(rest, start @ T), _turn(rest, goal @ T)))
+    tips = [tip_frame(each, start) for each in (grasp, other)]
+    tip = min(tips, key=lambda T: max(_turn(rest, start @ T), _turn(rest, goal @ T)))
+    return Grip(tip, _half_width(scene, part, grasp))
 
 
 def _turn(rest: Array, T: Array) -> float:
@@ -96,34 +177,49 @@ def _turn(rest: Array, T: Array) -> float:
 
 
 def _half_width(scene: Scene, part: str, grasp: Grasp) -> float:
+    """Half the physical width between the fingers, [m]."""
     boxes = physical_boxes(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3)
     far = max(float(grasp.across @ box.center + np.abs(grasp.across) @ box.half) for box in boxes)
     near = min(float(grasp.across @ box.center - np.abs(grasp.across) @ box.half) for box in boxes)
     return (far - near) / 2
 
 
-def _slow(plan: Plan, k: int, way: Array) -> float:
+def _restored(assembly: Assembly, k: int) -> tuple[Contact, ...]:
+    """The contacts that operation k broke: undoing it makes them again."""
+    return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)
+
+
+def _sides(
+    assembly: Assembly, contacts: tuple[Contact, ...], moved: tuple[str, ...], poses: Poses
+) -> tuple[Array, ...]:
+    """The level directions in which the moved part comes to lie against another one, none twice."""
+    sides: list[Array] = []
+    for contact in contacts:
+        if assembly.is_fit(contact):
+            continue
+        rests = contact.environment if contact.manipulated.part in moved else contact.manipulated
+        side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
+        if abs(side[2]) < 0.5 and not any(side @ other > 0.99 for other in sides):
+            sides.append(side)
+    return tuple(sides)
+
+
+def _slow(assembly: Assembly, contacts: tuple[Contact, ...], poses: Poses, into: Line) -> float:
     """How far before the goal a motion from above turns slow: where the first wall begins, or just above the floor."""
-    odls = plan.assembly.odls()[k]
     depth = SLOW_M
-    for contact in plan.assembly.operations[k].contacts:
-        T, on = plan.goals[k], _pose(plan, odls, contact.environment.part)
-        environment = plan.assembly.face(contact.environment)
-        if abs(on[:3, :3] @ environment.normal @ way) < 0.5:
-            corners = overlap(plan.assembly.face(contact.manipulated), T, environment, on).corners
+    for contact in contacts:
+        m, e = contact
+        wall = assembly.face(e)
+        if assembly.is_fit(contact) and abs(poses[e.part][:3, :3] @ wall.normal @ into.way) < 0.5:
+            corners = overlap(assembly.face(m), poses[m.part], wall, poses[e.part]).corners
             if len(corners):
-                depth = max(depth, float(np.ptp(corners @ way)) + WALL_MARGIN_M)
+                depth = max(depth, float(np.ptp(corners @ into.way)) + WALL_MARGIN_M)
     return depth
 
 
-def _pose(plan: Plan, odls: Mapping[str, ODL], part: str) -> Array:
-    return product(odls[part], plan.goals) if part in odls else plan.start[part]
-
-
-def _neighbours(scene: Scene, contacts: tuple[Contact, ...], part: str) -> list[str]:
-    fixed = scene.scenario.assembly.fixed
-    ends = {contact.environment.part for contact in contacts}
-    return sorted(end for end in ends if end not in fixed and end != part)
+def _neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:
+    """What the moved part touches."""
+    return {of.part for contact in contacts for of in contact} - set(moved)
 
 
 def _mass(scene: Scene, part: str) -> float:

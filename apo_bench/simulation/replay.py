@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from apo_bench.geometry.arrays import Array
 from apo_bench.outcomes import sentence
 from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot
-from apo_bench.simulation.prepare import transfers, unreachable
+from apo_bench.simulation.prepare import Move, moves, unreachable
 from apo_bench.simulation.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.transfer import Transfer, transfer
+from apo_bench.simulation.transfer import transfer
 from apo_bench.simulation.world import snapshot
 from apo_bench.stability import unstable
 
@@ -29,8 +30,8 @@ def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses
     """
     robot = Robot(scene, plan.start if parts_at is None else parts_at, watch)
     after: list[Snapshot | None] = [None] * len(plan.assembly)
-    moves = transfers(plan, scene)
-    outcome = _refusal(plan, scene, moves) or _carry_out(plan, robot, moves, after)
+    todo = moves(plan, scene)
+    outcome = _refusal(plan, scene, todo) or _carry_out(plan, robot, todo, after)
     final = None
     if outcome.code != "unstable_simulation":
         final = _settled(robot, plan)
@@ -42,25 +43,37 @@ def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses
     )
 
 
-def _refusal(plan: Plan, scene: Scene, moves: tuple[Transfer, ...]) -> Outcome | None:
+def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    k = unstable(plan.assembly, plan.start, plan.goals)
-    if k is not None:
-        return _outcome(plan, "plan", "unstable_goal", k)
-    for step, t in zip(plan.schedule, moves, strict=True):
-        if unreachable(scene, t):
-            return _outcome(plan, "plan", "unreachable", step.operation)
+    for upto, goals in _stages(plan):
+        k = unstable(plan.assembly.first(upto), plan.start, goals[:upto])
+        if k is not None:
+            return _outcome(plan, "plan", "unstable_goal", k)
+    for move in todo:
+        if unreachable(scene, move.transfer):
+            return _outcome(plan, "plan", "unreachable", move.step.operation)
     return None
 
 
-def _carry_out(plan: Plan, robot: Robot, moves: tuple[Transfer, ...], after: list[Snapshot | None]) -> Outcome:
+def _stages(plan: Plan) -> list[tuple[int, Array]]:
+    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
+    goals, done, found = np.array(plan.goals), 0, []
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+        if not step.undo:
+            goals[step.operation], done = target, step.operation + 1
+        if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
+            found.append((done, np.array(goals)))
+    return found
+
+
+def _carry_out(plan: Plan, robot: Robot, todo: tuple[Move, ...], after: list[Snapshot | None]) -> Outcome:
     robot.wait(0.05)
-    for step, t in zip(plan.schedule, moves, strict=True):
+    for step, t in todo:
         try:
             transfer(robot, t)
             _until_rest(robot)
         except Halt as halt:
-            if halt.code == "force_stop":
+            if halt.code == "force_stop" and not step.undo:
                 after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
             return _outcome(plan, halt.stage, halt.code, step.operation)
         after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)

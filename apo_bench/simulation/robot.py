@@ -53,7 +53,7 @@ class Robot:
         self.scene, self.watch = scene, watch
         self.model, self.arm = scene.work.model, scene.arm
         self.stage = "plan"
-        self._held: int | None = None
+        self._held: list[int] = []
         self._handled: int | None = None
         self.peak_force_n = 0.0
         self._find_joints()
@@ -103,14 +103,17 @@ class Robot:
         return float(self.data.qpos[self._fingers].min())
 
     def force(self) -> Array:
-        """The net force of everything but the gripper on the part in the hand, (3,) world, [N]."""
-        if self._held is None:
-            return np.zeros(3)
-        return np.asarray(self._on_arm[self._held] - self._on_all[self._held])
+        """The net force of everything but the gripper on what is in the hand, (3,) world, [N].
 
-    def hold(self, part: str | None) -> None:
-        """Say which part is in the hand."""
-        self._held = None if part is None else self.scene.work.free.index(part)
+        What the parts of a group exert on each other cancels.
+        """
+        if not self._held:
+            return np.zeros(3)
+        return np.asarray((self._on_arm[self._held] - self._on_all[self._held]).sum(axis=0))
+
+    def hold(self, *parts: str) -> None:
+        """Say which parts are in the hand: the held one and what it carries, or none."""
+        self._held = [self.scene.work.free.index(part) for part in parts]
 
     def weld(self, part: str, on: bool) -> None:
         """The ideal gripper: hold the part exactly as it now is, or let go."""
