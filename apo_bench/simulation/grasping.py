@@ -75,6 +75,15 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place])
     return preferred
 
 
+def clear_across(scene: Scene, part: str, across: Array, place: Place) -> Grasp | None:
+    """The first clear grasp that closes along a direction of the part, or None."""
+    for margin in MARGINS_M:
+        for grasp in _candidates(scene, part, place.T):
+            if abs(grasp.across @ across) > 0.99 and _clear(scene, part, grasp, place, margin):
+                return grasp
+    return None
+
+
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place], stroke: Stroke) -> Grips:
     """The grasp for a stroke; if the gripper would strike something on the way, one to begin and one to end with.
 

@@ -13,7 +13,16 @@ from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.overlap import overlap
 from apo_bench.program import Plan, Poses, Step
 from apo_bench.scenario import Attach, Grasp
-from apo_bench.simulation.grasping import Grips, Place, Stroke, grasp_at, grips_along, obstacles, tip_frame
+from apo_bench.simulation.grasping import (
+    Grips,
+    Place,
+    Stroke,
+    clear_across,
+    grasp_at,
+    grips_along,
+    obstacles,
+    tip_frame,
+)
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.transfer import Grip, Line, Transfer, key_poses
 
@@ -101,7 +110,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     T = target @ pose.inverse(start)
     after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
     contacts = _restored(plan.assembly, k) if undo else operation.contacts
-    out = _line(scene, task.was, start)
+    out = _line(scene, _held_by(plan.assembly, task.was, operation.moves), start)
     into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m) if undo else _line(scene, k, target)
     grips, out, into = _grips(scene, task, part, out, into, believed, after)
     sides = () if into.level else _sides(plan.assembly, contacts, operation.moves, after)
@@ -114,6 +123,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         T_world_start=start,
         T_world_goal=target,
         grips=grips,
+        centring=() if undo or into.level else _centring(plan.assembly, scene, k, grips[-1], sides, after),
         out=out,
         into=into,
         sides=sides,
@@ -131,6 +141,13 @@ def _line(scene: Scene, k: int | None, T: Array) -> Line:
         return Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
     attach = scene.scenario.attach[k]
     return Line(T[:3, :3] @ attach.direction, attach.travel_m)
+
+
+def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
+    """The operation out of whose contacts a part must be brought; none if all of them move along."""
+    if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
+        return None
+    return was
 
 
 def _is_level(plan: Plan, scene: Scene, k: int) -> bool:
@@ -182,6 +199,40 @@ def _half_width(scene: Scene, part: str, grasp: Grasp) -> float:
     far = max(float(grasp.across @ box.center + np.abs(grasp.across) @ box.half) for box in boxes)
     near = min(float(grasp.across @ box.center - np.abs(grasp.across) @ box.half) for box in boxes)
     return (far - near) / 2
+
+
+def _centring(
+    assembly: Assembly, scene: Scene, k: int, grip: Grip, sides: tuple[Array, ...], after: Poses
+) -> tuple[Grip, ...]:
+    """Grips across the level directions in which the part's place will matter and nothing has settled it.
+
+    Closing fingers centre a part in their own direction only; along them it has drifted in the hand. What fits into
+    or onto the part later needs it in its place across the walls of that fit.
+    """
+    part, T = assembly.operations[k].main, after[assembly.operations[k].main]
+    settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
+    place = Place(T, obstacles(assembly.solids, after, (part,)))
+    grips = []
+    for wall in _later_walls(assembly, k, part):
+        if abs((T[:3, :3] @ wall)[2]) < 0.5 and all(abs(T[:3, :3] @ wall @ way) < 0.5 for way in settled):
+            settled.append(T[:3, :3] @ wall)
+            grasp = clear_across(scene, part, np.abs(wall), place)
+            grips += [] if grasp is None else [_grip(scene, part, grasp, T, T)]
+    return tuple(grips)
+
+
+def _later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
+    """Normals of the part's faces, (3,) each, that later operations fit or slide something against.
+
+    Only those before the part is moved by itself again.
+    """
+    walls = []
+    for operation in assembly.operations[k + 1 :]:
+        if operation.main == part:
+            break
+        for contact in operation.contacts:
+            walls += [assembly.face(of).normal for of in contact if of.part == part]
+    return walls
 
 
 def _restored(assembly: Assembly, k: int) -> tuple[Contact, ...]:

@@ -71,6 +71,8 @@ class Transfer:
     out: Line
     """The way out of where it is, as it was once attached there: it is gone backwards."""
     into: Line
+    centring: tuple[Grip, ...]
+    """After it was put down, the fingers close and open again here: closing, they centre the part between them."""
     sides: tuple[Array, ...]
     """Directions in which the part is slid onto another one at its side, (3,) each."""
     slow: float
@@ -112,6 +114,8 @@ def transfer(robot: Robot, t: Transfer) -> None:
     _depart(robot)
     if left > ARRIVED_M:
         raise Halt("attach", "force_stop")
+    for other in t.centring:
+        _centre(robot, t, other)
 
 
 def key_poses(t: Transfer) -> tuple[Array, ...]:
@@ -241,6 +245,14 @@ def _release(robot: Robot, t: Transfer, grip: Grip) -> None:
         robot.weld(t.part, False)
     robot.fingers(min(grip.half_width + OPEN_TO_RELEASE_M, robot.arm.opening_m), 0.25)
     robot.hold()
+
+
+def _centre(robot: Robot, t: Transfer, grip: Grip) -> None:
+    """Close the fingers on the part where it should stand, and open them again."""
+    robot.stage = "release"
+    _grasp(robot, t, grip, t.T_world_goal @ grip.T_part_tip)
+    _release(robot, t, grip)
+    _depart(robot)
 
 
 def _depart(robot: Robot) -> None:
