@@ -81,7 +81,7 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
         if off > allowed_mm:
             why = f"faces that fit are planned {off:.2f} mm off, {allowed_mm:g} mm are allowed"
             return _fails(plan, doing, "residual", off, why)
-        deep = 1e3 * _depth(doing, how, physical)
+        deep = 1e3 * float(_depth(doing, how, physical))
         if deep > thresholds.pushed_mm:
             why = f"it would be {deep:.2f} mm deep in another part, {thresholds.pushed_mm:g} mm are allowed"
             return _fails(plan, doing, "interference", deep, why)

@@ -64,7 +64,7 @@ def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
     assert (code, err) == (0, "")
     assert out.count("\n") == 1
     row = json.loads(out)
-    assert (row["schema"], row["seed"], row["method"], row["success"]) == ("apo-bench/row/1", 5, "paper", True)
+    assert (row["schema"], row["seed"], row["method"], row["success"]) == ("apo-bench/row/2", 5, "paper", True)
 
 
 def test_a_replay_that_fails_is_a_result(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,6 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from apo_bench.benchmark.confusion import Confusion, confusions
+from apo_bench.benchmark.confusion_table import summary
+from apo_bench.benchmark.figure import OTHERS, STYLES, draw
 from apo_bench.benchmark.report import COLUMNS, report
 from apo_bench.benchmark.spec import ROW
 from apo_bench.benchmark.statistics import tally, wilson
@@ -37,7 +40,15 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "loose_success": success,
         "failure_stage": "attach" if failed else None,
         "failure_code": "force_stop" if failed else None,
+        "failure_operation": 3 if failed else None,
+        "predicted": None if success is None else foretold(failed),
     } | more
+
+
+def foretold(fails: bool, operation: int = 3) -> dict[str, Any]:
+    """What a plan said about itself."""
+    code, size = ("residual", 2.0) if fails else ("ok", 0.1)
+    return {"fails": fails, "operation": operation if fails else None, "code": code, "size_mm": size}
 
 
 def write(folder: Path, rows: list[dict[str, Any]]) -> Path:
@@ -86,6 +97,62 @@ def test_rows_are_counted_into_cells() -> None:
     assert raw.interval == wilson(1, 4)
 
 
+def test_methods_are_sorted_as_a_reader_looks_for_them() -> None:
+    given = ("minimal", "paper-track", "last-only", "paper", "none", "oracle")
+    assert [c.method for c in tally([row(method) for method in given])] == [
+        *("oracle", "none", "paper", "paper-track", "last-only", "minimal")
+    ]
+
+
+def test_predictions_are_counted_against_physics() -> None:
+    rows = [
+        row(seed=0),
+        row(seed=1, predicted=foretold(True)),
+        row(seed=2, success=False),
+        row(seed=3, success=False, predicted=foretold(True, 2)),
+        row(seed=4, success=False, failure_stage="judge", failure_code="gap", failure_operation=None),
+        row(seed=5, success=False, predicted=foretold(False)),
+        row(seed=6, success=False, failure_stage="correct", failure_operation=None, predicted=None),
+        row(seed=7, success=None),
+        row("oracle", seed=0),
+        row(seed=0, scenario="stick_on_castles", level=None, level_deg=None, careless=None),
+    ]
+    ceiling, raw, measured, everything = confusions(rows)
+    assert raw == Confusion(
+        *("stick_in_tower", "none"), fit_fitted=1, fit_failed=1, fail_fitted=1, fail_failed=3, same_operation=1,
+        stopped=2, not_executed=1, excluded=1,
+    )  # fmt: skip
+    assert (raw.executed, raw.right, raw.agreement) == (6, 4, 4 / 6)
+    assert (ceiling.method, ceiling.agreement, measured.scenario) == ("oracle", 1.0, "stick_on_castles")
+    assert (everything.scenario, everything.method, everything.executed) == ("all", "all", 8)
+    assert everything.agreement == 6 / 8
+    assert summary(everything) == (
+        "Predicted: 75.0 % of 8 executed trials ended as foretold; failures that were not foretold: 1, warnings that "
+        "were wrong: 1."
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    results=st.lists(st.tuples(st.sampled_from([True, False, None]), st.booleans(), st.booleans()), max_size=20),
+)
+def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | None, bool, bool]]) -> None:
+    rows = [
+        row("paper" if i % 2 else "none", seed=i, success=s, predicted=foretold(fails) if s or said else None)
+        for i, (s, fails, said) in enumerate(results)
+    ]
+    *parts, everything = confusions(rows)
+    assert everything.executed + everything.not_executed + everything.excluded == len(rows)
+    for field in ("fit_fitted", "fit_failed", "fail_fitted", "fail_failed", "not_executed", "excluded"):
+        assert sum(getattr(c, field) for c in parts) == getattr(everything, field)
+
+
+def test_without_an_executed_trial_nothing_agrees() -> None:
+    (_, everything) = confusions([row(success=None)])
+    assert (everything.agreement, everything.excluded) == (None, 1)
+    assert "nothing" in summary(everything)
+
+
 def test_a_cell_whose_demonstrations_all_failed_has_no_rate() -> None:
     (cell,) = tally([row(success=None)])
     assert (cell.trials, cell.excluded, cell.rate, cell.loose_rate, cell.interval) == (0, 1, None, None, (0.0, 1.0))
@@ -126,7 +193,13 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
     assert made.figure.read_bytes().startswith(b"\x89PNG")
     page = made.page.read_text()
     assert made.figure.name in page
-    assert "| stick_in_tower | 0.25 mm | 1 | 0.5 | none | 25.0 % | 4.6 to 69.9 % | 4 |" in page
+    assert "| stick_in_tower | 0.25 mm | 1 | 0.5 | none | 25.0 % | 4.6 to 69.9 % | 4 | 0 |" in page
+    assert "| stick_in_tower | 0.25 mm | 1 | 0.5 | paper | 100.0 % | 43.9 to 100.0 % | 3 | 1 |" in page
+    assert "| stick_in_tower | none | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
+    assert "| all | all | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
+    confusion = list(csv.DictReader(made.confusion.open()))
+    assert [line["method"] for line in confusion] == ["oracle", "none", "paper", "all"]
+    assert (confusion[1]["predicted_fail_failed"], confusion[2]["excluded"]) == ("9", "3")
 
 
 def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) -> None:
@@ -140,6 +213,14 @@ def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) ->
     assert wide[1] > low[1] + 300
 
 
+def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
+    every = [*STYLES.values(), *OTHERS]
+    assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
+    methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
+    draw(tally([row(method) for method in methods]), tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds no sweep"):
         report(tmp_path / "nowhere")
@@ -147,5 +228,5 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
         report(write(tmp_path / "empty", []))
     with pytest.raises(InputError, match=r"line 2: this is not a row"):
         report(write(tmp_path / "bad", [row(), {"seed": 1}]))
-    with pytest.raises(InputError, match="row of schema 'apo-bench/row/0'"):
-        report(write(tmp_path / "old", [row(schema="apo-bench/row/0")]))
+    with pytest.raises(InputError, match="row of schema 'apo-bench/row/1'"):
+        report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))

@@ -13,13 +13,15 @@ import pytest
 from apo_bench import outcomes
 from apo_bench.benchmark import stages
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+from apo_bench.benchmark.planning import plan
 from apo_bench.benchmark.spec import ENV_ID, LARGEST_SEED, ROW, TrialSpec, level_pair
 from apo_bench.benchmark.stages import Shown, see, show, stream
-from apo_bench.benchmark.trial import nominal_where_seen, plan, run_measured, run_trial
+from apo_bench.benchmark.trial import nominal_where_seen, run_measured, run_trial
+from apo_bench.correction.correct import correct
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.program import Correction, Observation
+from apo_bench.program import Correction, Observation, Step, Try
 from apo_bench.resources import folder
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
@@ -29,7 +31,15 @@ KEYS = (
     *("schema", "env_id", "spec_hash", "scenario", "level", "careless", "clearance_mm", "noise", "grasp"),
     *("relations", "method", "seed", "timestep_s", "thresholds", "demonstration", "success", "loose_success"),
     *("failure_stage", "failure_code", "conditions", "freed", "gap_before_mm", "gap_after_mm", "reached"),
-    *("pose_error_fixed_mm", "pose_error_free_mm", "peak_force_n", "sim_seconds"),
+    *(
+        "tried",
+        "extra_operations",
+        "predicted",
+        "pose_error_fixed_mm",
+        "pose_error_free_mm",
+        "peak_force_n",
+        "sim_seconds",
+    ),
 )
 
 
@@ -50,7 +60,18 @@ def rows(scene: Scene, shown: Shown) -> dict[str, dict[str, Any]]:
 
 def refuses(seen: Observation) -> Correction:
     """A corrector that never converges."""
-    return Correction(seen.goals, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13)
+    tried = (Try(2, (2,), float("inf")),)
+    return Correction(seen.goals, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13, tried=tried)
+
+
+def rebuilds(seen: Observation) -> Correction:
+    """Tracking as the paper shows it for example 5.1: castle 2 is put down as seen, taken off and put down rightly."""
+    made = correct(seen, "paper")
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = made.goals[[step.operation for step in schedule]]
+    targets[1:3] = seen.goals[1]
+    tried = (Try(np.int64(2), (np.int64(2),), 1.5e-3), Try(2, (2, 1), 1e-5))  # type: ignore[arg-type]
+    return replace(made, freed=(2, 1), tried=tried, schedule=schedule, targets=targets)
 
 
 def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) -> None:
@@ -81,6 +102,38 @@ def test_the_row_says_what_the_corrector_did(rows: dict[str, dict[str, Any]]) ->
     assert rows["none"]["freed"] == []
     assert rows["paper"]["gap_before_mm"] == rows["none"]["gap_before_mm"] == rows["none"]["gap_after_mm"]
     assert rows["oracle"]["gap_before_mm"] < 1e-9
+
+
+def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None:
+    """A careless human put castle 2 aside by 1.5 mm and more: the stick will not go in."""
+    said = rows["none"]["predicted"]
+    assert (said["fails"], said["operation"], said["code"]) == (True, 3, "residual")
+    assert said["size_mm"] > 1.0
+    for method in ("oracle", "paper"):
+        fits = rows[method]["predicted"]
+        assert (fits["fails"], fits["operation"], fits["code"]) == (False, None, "ok")
+        assert fits["size_mm"] < 0.1
+    assert [rows[method]["tried"] for method in rows] == [[], [], []]
+    assert [rows[method]["extra_operations"] for method in rows] == [0, 0, 0]
+
+
+def test_a_schedule_is_carried_out_and_counted(scene: Scene, shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = observed(scene, shown)
+    made = rebuilds(seen)
+    planned = plan(rebuilds, seen, None).plan
+    assert planned is not None
+    assert planned.schedule == made.schedule
+    np.testing.assert_array_equal(planned.targets, made.targets)
+    monkeypatch.setattr("apo_bench.benchmark.planning.correct", lambda seen, method: made)
+    row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
+    assert row["tried"] == [
+        {"step": 3, "free": [3], "gap_mm": pytest.approx(1.5)},
+        {"step": 3, "free": [3, 2], "gap_mm": pytest.approx(0.01)},
+    ]
+    assert (row["freed"], row["extra_operations"], row["predicted"]["fails"]) == ([3, 2], 2, False)
+    assert row["success"] is True
+    assert row["pushed_mm"] < 1.0
+    assert json.loads(json.dumps(row, allow_nan=False)) == row
 
 
 def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> None:
@@ -158,10 +211,12 @@ def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: Shown) 
 def test_a_row_without_replay_is_a_failure_with_null_physics(
     scene: Scene, shown: Shown, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("apo_bench.benchmark.trial.correct", lambda seen, method: refuses(seen))
+    monkeypatch.setattr("apo_bench.benchmark.planning.correct", lambda seen, method: refuses(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
     assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
     assert (row["freed"], row["gap_after_mm"]) == ([3, 2], 1.0)
+    assert row["tried"] == [{"step": 3, "free": [3], "gap_mm": None}]
+    assert row["predicted"] is row["extra_operations"] is None
     assert row["reached"] is row["sim_seconds"] is row["conditions"] is None
 
 

@@ -4,14 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from apo_bench.benchmark.statistics import Cell
 
-COLORS = {"none": "#D55E00", "paper": "#0072B2"}
-OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 CEILING = "#444444"
+DODGE = 0.07
+"""Methods stand this far from each other at one level, so that equal rates do not hide each other."""
+MANY = 3
+"""With more methods than this in a panel, the numbers of trials are left to the table."""
+
+
+class Style(NamedTuple):
+    """How the line of a method looks; told apart without colour too."""
+
+    color: str
+    marker: str
+    dashes: Any
+
+
+STYLES = {
+    "none": Style("#D55E00", "o", "-"),
+    "paper": Style("#0072B2", "s", "-"),
+    "paper-track": Style("#009E73", "D", "-"),
+    "last-only": Style("#E69F00", "v", (0, (4, 1.5))),
+    "no-history": Style("#CC79A7", "^", (0, (4, 1.5))),
+    "no-disappeared": Style("#56B4E9", "P", (0, (4, 1.5))),
+    "minimal": Style("#8C6BB1", "X", (0, (1, 1))),
+}
+OTHERS = (Style("#6B6B6B", "h", (0, (1, 1))), Style("#A6761D", "*", (0, (1, 1))), Style("#332288", "<", (0, (1, 1))))
 
 
 def draw(cells: Sequence[Cell], path: Path) -> None:
@@ -36,7 +57,11 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
     figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
     handles = {label: h for axis in axes.flat for h, label in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(
-        handles.values(), handles.keys(), loc="outside upper center", ncols=max(1, len(handles)), frameon=False
+        handles.values(),
+        handles.keys(),
+        loc="outside upper center",
+        ncols=min(4 * columns, max(1, len(handles))),
+        frameon=False,
     )
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
@@ -48,28 +73,43 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
     place = {level: x for x, level in enumerate(levels)}
     for ceiling in (c for c in cells if c.method == "oracle" and c.rate is not None):
         axis.axhline(ceiling.rate, color=CEILING, linestyle="--", linewidth=1.2, label="oracle")
-    for i, method in enumerate(dict.fromkeys(c.method for c in here)):
+    methods = list(dict.fromkeys(c.method for c in here))
+    for i, (method, style) in enumerate(_styles(methods).items()):
         line = [c for c in here if c.method == method and c.rate is not None]
-        x = [place[c.level, c.level_deg] for c in line]
-        color = COLORS.get(method, OTHERS[i % len(OTHERS)])
-        axis.fill_between(
-            x, [c.interval.low for c in line], [c.interval.high for c in line], color=color, alpha=0.18, linewidth=0
-        )
-        marker = MARKERS[i % len(MARKERS)]
-        rates = [float(c.rate or 0.0) for c in line]
-        below = [rate - c.interval.low for rate, c in zip(rates, line, strict=True)]
-        above = [c.interval.high - rate for rate, c in zip(rates, line, strict=True)]
-        axis.errorbar(x, rates, yerr=[below, above], color=color, fmt="none", capsize=3, linewidth=1.0, alpha=0.8)
-        axis.plot(x, rates, color=color, marker=marker, markersize=5, linewidth=1.8, label=method, clip_on=False)
-        for at, rate, cell in zip(x, rates, line, strict=True):
-            offset = (6, -12) if rate > 0.5 else (6, 6)
-            axis.annotate(f"n={cell.trials}", (at, rate), offset, textcoords="offset points", fontsize=6, color=color)
+        aside = DODGE * (i - (len(methods) - 1) / 2)
+        _line(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, method)
+        if len(methods) <= MANY:
+            _counts(axis, line, [place[c.level, c.level_deg] + aside for c in line], style)
     axis.set_xticks(range(len(levels)), [level_label(*level) for level in levels])
     axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
     axis.set_ylim(-0.04, 1.06)
     axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
     axis.grid(axis="y", alpha=0.3)
     axis.spines[["top", "right"]].set_visible(False)
+
+
+def _styles(methods: Sequence[str]) -> dict[str, Style]:
+    """One each; a method of one's own takes the next that is left."""
+    own = [method for method in methods if method not in STYLES]
+    return {m: STYLES[m] if m in STYLES else OTHERS[own.index(m) % len(OTHERS)] for m in methods}
+
+
+def _line(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style, method: str) -> None:
+    rates = [float(c.rate or 0.0) for c in cells]
+    below = [rate - c.interval.low for rate, c in zip(rates, cells, strict=True)]
+    above = [c.interval.high - rate for rate, c in zip(rates, cells, strict=True)]
+    bars = {"fmt": "none", "capsize": 2, "linewidth": 0.9, "alpha": 0.7}
+    axis.errorbar(x, rates, yerr=[below, above], color=style.color, **bars)
+    shape = {"color": style.color, "marker": style.marker, "linestyle": style.dashes}
+    axis.plot(x, rates, markersize=5, linewidth=1.6, label=method, clip_on=False, **shape)
+
+
+def _counts(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style) -> None:
+    for at, cell in zip(x, cells, strict=True):
+        rate = float(cell.rate or 0.0)
+        offset = (6, -12) if rate > 0.5 else (6, 6)
+        text = {"textcoords": "offset points", "fontsize": 6, "color": style.color}
+        axis.annotate(f"n={cell.trials}", (at, rate), offset, **text)
 
 
 def level_label(level: float, level_deg: float) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from apo_bench.benchmark.confusion import confusions
+from apo_bench.benchmark.confusion_table import WORDS, confusion_lines, write_confusions
 from apo_bench.benchmark.figure import draw, level_label
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.statistics import Cell, tally
@@ -24,10 +26,11 @@ class Report(NamedTuple):
     table: Path
     figure: Path
     page: Path
+    confusion: Path
 
 
 def report(folder: str | Path) -> Report:
-    """Write `table.csv`, `success_over_level.png` and `report.md` beside the rows of a sweep.
+    """Write `table.csv`, `confusion.csv`, `success_over_level.png` and `report.md` beside the rows of a sweep.
 
     Raises:
         InputError: No rows there, or the folder cannot be written.
@@ -37,9 +40,12 @@ def report(folder: str | Path) -> Report:
     if not rows:
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     cells = tally(rows)
-    made = Report(folder / "table.csv", folder / "success_over_level.png", folder / "report.md")
+    made = Report(
+        folder / "table.csv", folder / "success_over_level.png", folder / "report.md", folder / "confusion.csv"
+    )
     try:
         _write_table(cells, made.table)
+        write_confusions(confusions(rows), made.confusion)
         draw(cells, made.figure)
         made.page.write_text(_page(rows, cells, made), encoding="utf-8")
     except OSError as error:
@@ -88,12 +94,19 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
         "",
         f"![Success over level]({made.figure.name})",
         "",
-        "| scenario | clearance | careless | level | method | strict success | 95 % interval | n | loose | failures |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| scenario | clearance | careless | level | method | strict success | 95 % interval | n | excluded | loose "
+        "| failures |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
         *(_line(cell) for cell in cells),
         "",
         "Strict and loose are the judge's; intervals are Wilson's; the same numbers stand in "
-        f"[{made.table.name}]({made.table.name}).",
+        f"[{made.table.name}]({made.table.name}). Excluded are trials whose demonstration was not right.",
+        "",
+        "## Prediction and physics",
+        "",
+        WORDS,
+        "",
+        *confusion_lines(confusions(rows)),
     ]
     return "\n".join(lines) + "\n"
 
@@ -103,5 +116,5 @@ def _line(c: Cell) -> str:
     return (
         f"| {c.scenario} | {c.clearance_mm:g} mm | {'any' if ceiling else f'{c.careless:g}'} "
         f"| {'any' if ceiling else level_label(c.level, c.level_deg)} | {c.method} | {percent(c.rate)} "
-        f"| {interval(c)} | {c.trials} | {percent(c.loose_rate)} | {failures(c)} |"
+        f"| {interval(c)} | {c.trials} | {c.excluded} | {percent(c.loose_rate)} | {failures(c)} |"
     )

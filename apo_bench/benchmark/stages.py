@@ -13,6 +13,7 @@ from apo_bench.layout import draw_layout
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observe import observe
 from apo_bench.outcomes import sentence
+from apo_bench.prediction import predict
 from apo_bench.program import Demonstration, Layout, Observation, Plan, ReplayResult
 from apo_bench.simulation.demonstrate import demonstrate
 from apo_bench.simulation.replay import replay
@@ -77,6 +78,13 @@ def unseen(seen: Observation) -> Ending | None:
         return None
     k = int(np.argmin(seen.seen))
     return Ending("observe", "not_seen", k, sentence("not_seen", operation=k))
+
+
+def foretold(plan: Plan, scene: Scene) -> dict[str, Any]:
+    """What the plan says about itself before it is carried out, as it stands in a row: operations from 1, mm."""
+    said = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
+    operation = None if said.operation is None else said.operation + 1
+    return {"fails": said.fails, "operation": operation, "code": said.code, "size_mm": said.size_mm}
 
 
 def attempt(plan: Plan, scene: Scene, reference: Array, watch: Any = None) -> Tried:

@@ -67,6 +67,12 @@ def wilson(successes: int, trials: int) -> Interval:
     return Interval(float(found.low), float(found.high))
 
 
+def rank(method: str) -> int:
+    """The ceiling first, then what has no correction, then the paper's two ways, then all others."""
+    first = ("oracle", "none", "paper", "paper-track")
+    return first.index(method) if method in first else len(first)
+
+
 def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
     """Count rows into cells, sorted by scenario, clearance, carelessness, method (`oracle` first), level.
 
@@ -108,5 +114,4 @@ def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
 
 def _order(key: Place) -> tuple[Any, ...]:
     scenario, clearance, careless, level, level_deg, method = key
-    rank = {"oracle": 0, "none": 1}.get(method, 2)
-    return (scenario, clearance, careless, rank, method, level, level_deg)
+    return (scenario, clearance, careless, rank(method), method, level, level_deg)

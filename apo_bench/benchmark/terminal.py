@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from apo_bench.benchmark.confusion import confusions
+from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.report import failures, interval, percent
 from apo_bench.benchmark.statistics import Cell
@@ -49,6 +51,11 @@ def print_cells(cells: Sequence[Cell]) -> None:
         _console().print(f"{excluded} rows are left out, since the demonstration itself was not right.")
 
 
+def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:
+    """In one line, how often plans foretold what happened."""
+    _console().print(summary(confusions(rows)[-1]))
+
+
 def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     if row["level"] is None:
         asked = "measured observation"
@@ -64,6 +71,14 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     if row["gap_before_mm"] is not None:
         gaps = f"{row['gap_before_mm']:.3f} mm as seen, {row['gap_after_mm'] or 0.0:.3f} mm as planned"
         lines.append(("contact gap", gaps))
+    for attempt in row["tried"] or ():
+        lines.append((f"after step {attempt['step']}", _attempt(attempt)))
+    if row["freed"]:
+        lines.append(("freed", _braced(row["freed"])))
+    if row["extra_operations"]:
+        lines.append(("schedule", f"{row['extra_operations']} operations beyond doing each once"))
+    if row["predicted"] is not None:
+        lines.append(("predicted", _predicted(row["predicted"])))
     if row["worst_gap_mm"] is not None and not row["loose_success"]:
         lines.append(("reached", f"not every contact was made: least overlap {row['least_overlap']:.2f}"))
     elif row["worst_gap_mm"] is not None:
@@ -74,6 +89,23 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     if row["sim_seconds"] is not None:
         lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
     return lines
+
+
+def _attempt(attempt: Mapping[str, Any]) -> str:
+    left = "did not come to rest" if attempt["gap_mm"] is None else f"leaves {attempt['gap_mm']:.3f} mm"
+    return f"{_braced(attempt['free'])} {left}"
+
+
+def _braced(operations: Iterable[int]) -> str:
+    """`{5,4,3}`, as the paper writes sets of operations."""
+    return "{" + ",".join(map(str, operations)) + "}"
+
+
+def _predicted(said: Mapping[str, Any]) -> str:
+    if not said["fails"]:
+        return f"it fits, {said['size_mm']:.2f} mm off at most"
+    size = "" if said["size_mm"] is None else f", {said['size_mm']:.2f} mm"
+    return f"operation {said['operation']} fails: {said['code']}{size}"
 
 
 def _result(row: Mapping[str, Any]) -> str:

@@ -3,40 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, final
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
-from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, see, show, unseen
-from apo_bench.correction.correct import correct
-from apo_bench.correction.equations import gap
+from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, see, show
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.outcomes import sentence
 from apo_bench.pose_error import pose_errors
-from apo_bench.program import Correction, Observation, Plan, Snapshot
+from apo_bench.program import Observation, Plan, Snapshot
 from apo_bench.simulation.scene import Scene
 
 Row = dict[str, Any]
 """One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Planned:
-    """What a method made of an observation: a plan, or why there is none."""
-
-    plan: Plan | None
-    refused: Ending | None
-    freed: tuple[int, ...]
-    gap_before_m: float
-    gap_after_m: float
 
 
 def run_trial(
@@ -101,49 +88,33 @@ def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
     return np.asarray(flat @ nominal)
 
 
-def plan(method: Any, seen: Observation, truth: Array | None) -> Planned:
-    """What a method would have the robot do.
-
-    Args:
-        method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one.
-        truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
-    """
-    if isinstance(method, str) and method == "oracle" and truth is not None:
-        return _as_it_is(seen, truth, None)
-    if isinstance(method, str) and method == "none":
-        return _as_it_is(seen, seen.goals, unseen(seen))
-    made = correct(seen, method)
-    return Planned(
-        plan=Plan(seen.assembly, seen.start, made.goals) if made.ok else None,
-        refused=None if made.ok else refusal(made),
-        freed=made.freed,
-        gap_before_m=made.gap_before_m,
-        gap_after_m=made.gap_after_m,
-    )
-
-
-def refusal(made: Correction) -> Ending:
-    """A correction that did not converge is not executed."""
-    return Ending("correct", made.status, None, made.sentence)
-
-
-def _as_it_is(seen: Observation, goals: Array, refused: Ending | None) -> Planned:
-    open_m = gap(seen.assembly, seen.start, goals)
-    made = None if refused else Plan(seen.assembly, seen.start, goals)
-    return Planned(made, refused, (), open_m, open_m)
-
-
 def _carry_out(planned: Planned, scene: Scene, reference: Array, truth: Array | None, watch: Any) -> Row:
-    correction = {
-        "freed": [k + 1 for k in planned.freed],
+    said = _correction(planned)
+    if planned.plan is None:
+        assert planned.refused is not None
+        return _result(planned.refused, success=False) | said
+    said |= {"predicted": foretold(planned.plan, scene)}
+    tried = attempt(planned.plan, scene, reference, watch)
+    return _result(ending(tried), success=tried.verdict.success) | said | _physics(tried, planned.plan, truth)
+
+
+def _correction(planned: Planned) -> Row:
+    """What the method did, and what carrying it out would take beyond doing every operation once."""
+    extra = None if planned.plan is None else len(planned.plan.schedule) - len(planned.plan.assembly)
+    return {
+        "freed": _numbers(planned.freed),
+        "tried": [
+            {"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in planned.tried
+        ],
+        "extra_operations": extra,
         "gap_before_mm": _mm(planned.gap_before_m),
         "gap_after_mm": _mm(planned.gap_after_m),
     }
-    if planned.plan is None:
-        assert planned.refused is not None
-        return _result(planned.refused, success=False) | correction
-    tried = attempt(planned.plan, scene, reference, watch)
-    return _result(ending(tried), success=tried.verdict.success) | correction | _physics(tried, planned.plan, truth)
+
+
+def _numbers(operations: Iterable[int]) -> list[int]:
+    """Counted from 1, as whole numbers that JSON can hold."""
+    return [int(k) + 1 for k in operations]
 
 
 def _head(spec: TrialSpec, scene: Scene, hashed: str) -> Row:
@@ -183,6 +154,9 @@ def _result(end: Ending, *, success: bool | None) -> Row:
         "penetration_mm": None,
         "pushed_mm": None,
         "freed": None,
+        "tried": None,
+        "extra_operations": None,
+        "predicted": None,
         "gap_before_mm": None,
         "gap_after_mm": None,
         "reached": None,

@@ -1,0 +1,55 @@
+"""The confusion table of a sweep: for the page, for a file, and in one line."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+from apo_bench.benchmark.confusion import Confusion
+
+COLUMNS = (
+    *("scenario", "method", "predicted_fit_fitted", "predicted_fit_failed", "predicted_fail_fitted"),
+    *("predicted_fail_failed", "agreement", "same_operation", "stopped", "not_executed", "excluded"),
+)
+HEADER = (
+    "| scenario | method | fit: fitted | fit: failed | fail: fitted | fail: failed | agreement | right operation "
+    "| not executed | excluded |",
+    "|---|---|---|---|---|---|---|---|---|---|",
+)
+WORDS = (
+    "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides (strict). An operation "
+    "is right where the robot stopped at the one that was predicted. A method that gave no plan has nothing executed."
+)
+
+
+def write_confusions(found: Sequence[Confusion], path: Path) -> None:
+    """One line per scenario and method, and one of them all."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for c in found:
+            counts = (c.fit_fitted, c.fit_failed, c.fail_fitted, c.fail_failed, c.agreement)
+            writer.writerow([c.scenario, c.method, *counts, c.same_operation, c.stopped, c.not_executed, c.excluded])
+
+
+def confusion_lines(found: Sequence[Confusion]) -> list[str]:
+    """A Markdown table."""
+    return [*HEADER, *map(_line, found)]
+
+
+def summary(c: Confusion) -> str:
+    """`Predicted: 96.3 % of 134 executed trials ended as foretold; failures that were not foretold: 3, ...`"""
+    if c.agreement is None:
+        return "Predicted: nothing, since no trial was executed."
+    return (
+        f"Predicted: {100 * c.agreement:.1f} % of {c.executed} executed trials ended as foretold; "
+        f"failures that were not foretold: {c.fit_failed}, warnings that were wrong: {c.fail_fitted}."
+    )
+
+
+def _line(c: Confusion) -> str:
+    agreement = "–" if c.agreement is None else f"{100 * c.agreement:.1f} %"
+    operation = f"{c.same_operation} of {c.stopped}" if c.stopped else "–"
+    counts = f"{c.fit_fitted} | {c.fit_failed} | {c.fail_fitted} | {c.fail_failed}"
+    return f"| {c.scenario} | {c.method} | {counts} | {agreement} | {operation} | {c.not_executed} | {c.excluded} |"

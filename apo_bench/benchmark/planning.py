@@ -1,0 +1,64 @@
+"""What a method makes of an observation: a plan, or why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+from apo_bench.benchmark.stages import Ending, unseen
+from apo_bench.correction.correct import correct
+from apo_bench.correction.equations import gap
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Correction, Observation, Plan, Try
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """What a method made of an observation: a plan, or why there is none."""
+
+    plan: Plan | None
+    refused: Ending | None
+    freed: tuple[int, ...]
+    tried: tuple[Try, ...]
+    gap_before_m: float
+    gap_after_m: float
+
+
+def plan(method: Any, seen: Observation, truth: Array | None) -> Planned:
+    """What a method would have the robot do.
+
+    Args:
+        method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one.
+        truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
+    """
+    if isinstance(method, str) and method == "oracle" and truth is not None:
+        return _as_it_is(seen, truth, None)
+    if isinstance(method, str) and method == "none":
+        return _as_it_is(seen, seen.goals, unseen(seen))
+    made = correct(seen, method)
+    return Planned(
+        plan=_planned(seen, made) if made.ok else None,
+        refused=None if made.ok else refusal(made),
+        freed=made.freed,
+        tried=made.tried,
+        gap_before_m=made.gap_before_m,
+        gap_after_m=made.gap_after_m,
+    )
+
+
+def _planned(seen: Observation, made: Correction) -> Plan:
+    if made.targets is None:
+        return Plan(seen.assembly, seen.start, made.goals, made.schedule)
+    return Plan(seen.assembly, seen.start, made.goals, made.schedule, made.targets)
+
+
+def refusal(made: Correction) -> Ending:
+    """A correction that did not converge is not executed."""
+    return Ending("correct", made.status, None, made.sentence)
+
+
+def _as_it_is(seen: Observation, goals: Array, refused: Ending | None) -> Planned:
+    open_m = gap(seen.assembly, seen.start, goals)
+    made = None if refused else Plan(seen.assembly, seen.start, goals)
+    return Planned(made, refused, (), (), open_m, open_m)
