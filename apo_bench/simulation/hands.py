@@ -1,4 +1,4 @@
-"""Human hands: mocap bodies that hold a part by a soft weld and move it along straight lines."""
+"""Human hands: mocap bodies that hold parts by soft welds and move them along straight lines."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
 from apo_bench.simulation.paths import Line
@@ -21,18 +22,26 @@ class Hands:
         self.world = world
         self.data: Any = fresh(world, start)
         self._mocap = [int(world.model.body(hand).mocapid[0]) for hand in HANDS]
+        self._at = [np.eye(4) for _ in HANDS]
+
+    def pose(self, part: str) -> Array:
+        """Where a movable part is, (4, 4)."""
+        return part_pose(self.world, self.data, part)
 
     def grab(self, hand: int, part: str) -> Array:
-        """Hold a part where it is; returns its pose."""
-        T = part_pose(self.world, self.data, part)
+        """Take a part where it is, at its frame; returns its pose."""
+        T = self.pose(part)
         self._put(hand, T)
-        weld = self._weld(hand, part)
-        self.world.model.eq_data[weld, :11] = (0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1)
-        self.data.eq_active[weld] = 1
+        self._hold(hand, part, np.eye(4))
         return T
 
-    def let_go(self, hand: int, part: str) -> None:
-        self.data.eq_active[self._weld(hand, part)] = 0
+    def add(self, hand: int, part: str) -> None:
+        """Hold one more part, as it lies now beside what the hand holds."""
+        self._hold(hand, part, pose.inverse(self._at[hand]) @ self.pose(part))
+
+    def let_go(self, hand: int, *parts: str) -> None:
+        for part in parts:
+            self.data.eq_active[self._weld(hand, part)] = 0
 
     def move(self, *moves: tuple[int, Line]) -> None:
         """Move hands together; a hand whose line ends early waits at its end."""
@@ -46,14 +55,23 @@ class Hands:
                 self.data.mocap_pos[self._mocap[hand]] = positions[j]
                 self.data.mocap_quat[self._mocap[hand]] = quaternions[j]
             mujoco.mj_step(self.world.model, self.data)
+        for (hand, _), path in zip(moves, paths, strict=True):
+            self._at[hand] = path[-1]
 
     def wait(self, seconds: float) -> None:
         mujoco.mj_step(self.world.model, self.data, round(seconds / self.world.model.opt.timestep))
+
+    def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
+        weld = self._weld(hand, part)
+        quaternion = _quaternions(T_hand_part[None])[0]
+        self.world.model.eq_data[weld, :11] = (0, 0, 0, *T_hand_part[:3, 3], *quaternion, 1)
+        self.data.eq_active[weld] = 1
 
     def _weld(self, hand: int, part: str) -> int:
         return int(self.world.model.equality(f"{HANDS[hand]}_{part}").id)
 
     def _put(self, hand: int, T: Array) -> None:
+        self._at[hand] = T
         self.data.mocap_pos[self._mocap[hand]] = T[:3, 3]
         self.data.mocap_quat[self._mocap[hand]] = _quaternions(T[None])[0]
 

@@ -1,0 +1,95 @@
+"""From a scenario to what two hands are to do in one operation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Contact
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Poses
+from apo_bench.scenario import Scenario
+
+SIDE_M = 0.002
+"""A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Act:
+    """One operation as the hands do it; poses and directions in the world, [m]."""
+
+    part: str
+    carries: tuple[str, ...]
+    target: Array
+    """(4, 4), of the part."""
+    way: Array
+    """Unit vector of the last motion, (3,)."""
+    travel: float
+    out: Array
+    """(3,), the first motion: away from what the part lies against or sticks in; zero: straight up."""
+    aside: Array
+    """(3,), how far beside its target it comes down; zero if it comes to lie against nothing."""
+    true: Poses
+    """Where every part should be when all is done."""
+    bearing: tuple[str, ...]
+    """The moved parts that make contacts."""
+    late: tuple[str, ...]
+    """Parts that are displaced and now brought to their true places by the other hand."""
+
+    @property
+    def from_above(self) -> bool:
+        return bool(self.way[2] < -0.5)
+
+
+def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], late: tuple[str, ...]) -> Act:
+    """Operation k for the hands.
+
+    Args:
+        target: (4, 4), where the hands put the main part, right or wrong.
+        stages: Where every part should be before the first operation and after each.
+        late: Displaced parts that the other hand corrects.
+    """
+    operation, attach = scenario.assembly.operations[k], scenario.attach[k]
+    way = target[:3, :3] @ attach.direction
+    beside = _away(scenario.assembly, operation.contacts, operation.moves, stages[k + 1])
+    return Act(
+        part=operation.main,
+        carries=operation.carries,
+        target=target,
+        way=way,
+        travel=attach.travel_m,
+        out=_out(scenario, k, stages[k]),
+        aside=SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
+        true=stages[k + 1],
+        bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
+        late=late,
+    )
+
+
+def _out(scenario: Scenario, k: int, poses: Poses) -> Array:
+    """The motion, (3,) [m], that frees what operation k moves: back out of where it sticks, or off what is beside."""
+    operations = scenario.assembly.operations
+    main, moves = operations[k].main, operations[k].moves
+    put = max((j for j in range(k) if operations[j].main == main), default=None)
+    if put is not None and any(contact.environment.part not in moves for contact in operations[put].contacts):
+        way = poses[main][:3, :3] @ scenario.attach[put].direction
+        if abs(way[2]) < 0.5:
+            return np.asarray(-scenario.attach[put].travel_m * way)
+    standing = (relation.contact for relation in scenario.assembly.first(k).relations() if relation.lost is None)
+    return SIDE_M * _away(scenario.assembly, standing, moves, poses)
+
+
+def _away(assembly: Assembly, contacts: Iterable[Contact], moves: tuple[str, ...], poses: Poses) -> Array:
+    """The sum of the level unit vectors, (3,), that lead what moves off what stands beside it, fits left out."""
+    found: list[Array] = []
+    for contact in contacts:
+        rests = [of for of in contact if of.part not in moves]
+        if len(rests) == 1 and not assembly.is_fit(contact):
+            normal = poses[rests[0].part][:3, :3] @ assembly.face(rests[0]).normal
+            if abs(normal[2]) < 0.5 and not any(normal @ other > 0.99 for other in found):
+                found.append(normal)
+    return np.asarray(sum(found, np.zeros(3)))
