@@ -19,7 +19,7 @@ gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.env:APOReplay")
 def __getattr__(name: str) -> Any:
     """`apo_bench.Corrected`, imported when it is first asked for."""
     if name == "Corrected":
-        from apo_bench.env import Corrected
+        from apo_bench.corrected import Corrected
 
         return Corrected
     raise AttributeError(f"module 'apo_bench' has no attribute '{name}'")

@@ -1,8 +1,9 @@
-"""The door for learners: `APOReplay-v0`, and the wrapper that corrects what was seen."""
+"""The door for learners: `APOReplay-v0`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, final
 
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
 from apo_bench.benchmark.spec import check_careless, check_clearance, check_seed, level_pair
-from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, see, show, unseen
+from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, foretold, see, show, unseen
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array
+from apo_bench.infos import predicted_info, whole
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.outcomes import sentence
-from apo_bench.program import Observation, Plan, Poses
+from apo_bench.program import Observation, Plan, Poses, Step
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.arm import Arm
@@ -70,7 +72,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     ## Episode End
     Every step terminates. `info` then holds `is_success`, `loose_success`, `stage` and `code` (`done` and `ok`, or
-    out of `apo_bench.outcomes`), `operation` (numbered from 1, or None) and `sentence`; never the truth.
+    out of `apo_bench.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
+    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth.
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
     keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
@@ -83,8 +86,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
     - `arm`: by name, or an `Arm`.
     - `timestep_s`: of the physics.
-    - `render_mode`: `rgb_array` shows the parts before the step and what was reached after it, without a display;
-      `human` opens a window when the replay begins.
+    - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
+      display; `human` opens a window when the replay begins.
 
     ## Version History
     - v0: first version.
@@ -129,10 +132,11 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
         self._shown: Shown | None = None
         self._seen: Observation | None = None
-        self._aim: Array | None = None
+        self._aim: Plan | None = None
         self._refused: Ending | None = None
         self._over = False
         self._poses: Poses = self._scene.scenario.start
+        self._state: Array | None = None
         self._window: Any = None
 
     @property
@@ -162,8 +166,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             trial = self._next_trial()
             shown = show(self._scene, self._careless, trial)
         self._shown, self._seen = shown, see(self._scene, shown, self._noise, trial)
-        self._aim, self._refused, self._over = self._seen.goals, unseen(self._seen), False
-        self._poses = shown.layout.start
+        self.aim(self._seen.goals)
+        self._refused, self._over = unseen(self._seen), False
+        self._poses, self._state = shown.layout.start, None
         return self._observation(), {"trial": trial, "demonstration": shown.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
@@ -183,20 +188,29 @@ class APOReplay(gymnasium.Env[Seen, Action]):
                 "allowed, as `env.action_space` says."
             )
         self._over = True
-        success, loose, end = self._replayed(self._shown, self._aim @ pose.exp(twist))
+        success, loose, end, said = self._replayed(self._shown, _moved(self._aim, pose.exp(twist)))
         info = {
             "is_success": success,
             "loose_success": loose,
             "stage": end.stage,
             "code": end.code,
-            "operation": None if end.operation is None else end.operation + 1,
+            "operation": whole(None if end.operation is None else end.operation + 1),
             "sentence": end.sentence,
+            **({} if said is None else {"predicted": predicted_info(said)}),
         }
         return self._observation(), float(success), True, False, info
 
-    def aim(self, goals: Array) -> None:
-        """Replay these goals (n, 4, 4) on zeros, until the next reset; for wrappers."""
-        self._aim, self._refused = frozen(goals, len(self.assembly), 4, 4), None
+    def aim(self, goals: Array, schedule: Sequence[Step] = (), targets: Array | None = None) -> None:
+        """Replay this on zeros, until the next reset; for wrappers.
+
+        Args:
+            goals: (n, 4, 4), where every operation puts its part in the end.
+            schedule: What to do and undo; empty stands for every operation once, in order.
+            targets: (steps, 4, 4), as in `apo_bench.program.Plan`; None stands for `goals` throughout.
+        """
+        plan = Plan(self.assembly, self.seen.start, goals, tuple(schedule))
+        self._aim = plan if targets is None else replace(plan, targets=targets)
+        self._refused = None
 
     def refuse(self, code: str, why: str) -> None:
         """Do not replay at all: the next step fails at stage `correct`; for wrappers."""
@@ -206,9 +220,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         """The scene as an array (480, 640, 3) of uint8; None in mode `human`, which shows the replay itself."""
         if self.render_mode != "rgb_array":
             return None
-        from apo_bench.simulation.render import picture
+        from apo_bench.simulation.render import picture_with_arm
 
-        return picture(self._scene, self._poses, PICTURE[1], PICTURE[0])
+        return picture_with_arm(self._scene, self._poses, self._state, PICTURE[1], PICTURE[0])
 
     def close(self) -> None:
         """Close the window, if one is open."""
@@ -225,17 +239,18 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         goals[:, 3:] = np.clip(goals[:, 3:], -1.0, 1.0)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
-    def _replayed(self, shown: Shown, goals: Array) -> tuple[bool, bool, Ending]:
-        """Strict success, loose success, and where it ended."""
+    def _replayed(self, shown: Shown, plan: Plan) -> tuple[bool, bool, Ending, dict[str, Any] | None]:
+        """Strict success, loose success, where it ended, and what the plan had said."""
         code = shown.demonstration.code
         if code != "ok":
-            return False, False, Ending("demonstrate", code, None, sentence(code))
+            return False, False, Ending("demonstrate", code, None, sentence(code)), None
         if self._refused is not None:
-            return False, False, self._refused
-        tried = attempt(Plan(self.assembly, self.seen.start, goals), self._scene, shown.layout.goals, self._watch())
+            return False, False, self._refused, None
+        said = foretold(plan, self._scene)
+        tried = attempt(plan, self._scene, shown.layout.goals, self._watch())
         if tried.result.reached.final is not None:
             self._poses = tried.result.reached.final.poses
-        return tried.verdict.success, tried.verdict.loose_success, ending(tried)
+        return tried.verdict.success, tried.verdict.loose_success, ending(tried), said
 
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""
@@ -244,59 +259,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
             self.close()
             self._window = Viewer(self._scene)
-        return self._window
+        return self._remember if self.render_mode == "rgb_array" else self._window
+
+    def _remember(self, data: Any) -> None:
+        self._state = np.array(data.qpos)
 
 
-@final
-class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
-    """Correct what was seen, at every reset: the with-correction arm of an experiment.
-
-    The observation then holds the corrected goals, zeros replay them, and an action composes on top. A correction
-    that does not converge is not executed: the step ends with reward 0 at stage `correct`.
-    """
-
-    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = "paper") -> None:
-        """Wrap an `APOReplay` environment.
-
-        Args:
-            corrector: A name, `"package.module:name"`, or a callable `Observation -> Correction`.
-
-        Raises:
-            InputError: There is no such corrector, or the environment is another one.
-        """
-        from apo_bench.correction.correct import CORRECTORS, correct
-        from apo_bench.names import resolve
-
-        gymnasium.utils.RecordConstructorArgs.__init__(self, corrector=corrector)
-        super().__init__(env)
-        if not isinstance(env.unwrapped, APOReplay):
-            raise InputError(f"`Corrected` wraps an APOReplay environment, {env.unwrapped} was given.")
-        self._base: APOReplay = env.unwrapped
-        self._corrector = resolve(corrector, CORRECTORS, "corrector")
-        if not callable(self._corrector):
-            raise InputError(
-                f"the corrector {corrector!r} was given; give a name, 'package.module:name' or a function."
-            )
-        self._correct = correct
-        self._goals: Array | None = None
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Watch another demonstration and correct it."""
-        seen, info = self.env.reset(seed=seed, options=options)
-        made = self._correct(self._base.seen, self._corrector)
-        if made.ok:
-            self._base.aim(made.goals)
-        else:
-            self._base.refuse(made.status, made.sentence)
-        self._goals = pose.pack(made.goals)
-        self._goals[:, 3:] = np.clip(self._goals[:, 3:], -1.0, 1.0)
-        return self._with_goals(seen), {**info, "correction": made.status}
-
-    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
-        """Replay the corrected goals, each moved by its twist."""
-        seen, reward, terminated, truncated, info = self.env.step(action)
-        return self._with_goals(seen), float(reward), terminated, truncated, info
-
-    def _with_goals(self, seen: Seen) -> Seen:
-        assert self._goals is not None
-        return {**seen, "goals": self._goals.copy()}
+def _moved(plan: Plan, twists: Array) -> Plan:
+    """Every goal and every target of an operation with the displacement of that operation, (n, 4, 4), on its right."""
+    done = [step.operation for step in plan.schedule]
+    return replace(plan, goals=plan.goals @ twists, targets=plan.targets @ twists[done])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import gymnasium
@@ -17,10 +17,12 @@ import apo_bench
 from apo_bench import outcomes
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.trial import run_trial
+from apo_bench.correction.correct import correct
 from apo_bench.env import APOReplay
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.program import Correction, Observation
+from apo_bench.infos import predicted_info, whole
+from apo_bench.program import Correction, Observation, Step
 
 SEED = 5
 
@@ -110,6 +112,7 @@ def _check_episode(env: Any, row: dict[str, Any]) -> None:
     stage, code = row["failure_stage"] or "done", row["failure_code"] or "ok"
     assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
     assert info["operation"] == row["failure_operation"]
+    assert info["predicted"] == row["predicted"]
 
 
 def test_an_action_moves_each_goal_in_the_frame_of_its_part(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,11 +159,56 @@ def test_a_correction_that_fails_is_not_executed(env: APOReplay, monkeypatch: py
     np.testing.assert_array_equal(seen["goals"], pose.pack(env.seen.goals))
     _, reward, terminated, _, info = corrected.step(zeros(env))
     assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "correct", "inconsistent")
+    assert "predicted" not in info
+
+
+def rebuilds(seen: Observation) -> Correction:
+    """Example 5.1: castle 2 is put down as it was seen, taken off, and put down rightly."""
+    made = correct(seen, "paper")
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = made.goals[[step.operation for step in schedule]]
+    targets[1:3] = seen.goals[1]
+    return replace(made, schedule=schedule, targets=targets)
+
+
+def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
+    env: APOReplay, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_: asked.append(plan) or _nothing())
+    corrected = apo_bench.Corrected(env, rebuilds)
+    corrected.reset(seed=SEED)
+    made = rebuilds(env.seen)
+    twist = np.linspace(-0.02, 0.02, 18).reshape(3, 6)
+    corrected.step(twist)
+    corrected.reset(seed=SEED)
+    corrected.step(zeros(env))
+    assert asked[0].schedule == asked[1].schedule == made.schedule
+    moved = made.targets @ pose.exp(twist)[[0, 1, 1, 1, 2]]  # type: ignore[operator]
+    np.testing.assert_allclose(asked[0].targets, moved, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(asked[0].goals, made.goals @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].targets, made.targets)
+
+
+def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
+    """One episode ends without an operation to name, the other with one, in either order."""
+    many: Any = gymnasium.vector.VectorEnv()
+    many.num_envs = 2
+    endings = [
+        {"operation": whole(k), "predicted": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x})}
+        for k, x in ((3, 1.5), (None, None))
+    ]
+    for order in (endings, endings[::-1]):
+        infos = many._add_info(many._add_info({}, order[0], 0), order[1], 1)
+        assert infos["operation"].tolist() == [info["operation"] for info in order]
+        assert infos["predicted"]["size_mm"].tolist() == [info["predicted"]["size_mm"] for info in order]
 
 
 def test_info_never_holds_the_truth(env: APOReplay) -> None:
     _, first = env.reset(seed=SEED)
     _, _, _, _, info = env.step(np.full((3, 6), 0.05))
+    said = info.pop("predicted")
+    assert set(said) == {"fails", "operation", "code", "size_mm"}
     assert set(info) == {"is_success", "loose_success", "stage", "code", "operation", "sentence"}
     assert set(first) == {"trial", "demonstration"}
     assert info["stage"] in (*outcomes.STAGES, "done")
@@ -210,8 +258,6 @@ def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.Monk
 def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     env: APOReplay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dataclasses import replace
-
     import apo_bench.env as module
 
     real, calls = module.show, []
@@ -284,6 +330,8 @@ def test_a_picture_without_a_display(env: APOReplay) -> None:
         env.render_mode = None
     assert (before.shape, before.dtype) == ((480, 640, 3), np.uint8)
     assert before.std() > 10
+    assert env._state is not None
+    assert env._state.shape == env._scene.work.model.qpos0.shape
     assert np.abs(before.astype(int) - after.astype(int)).max() > 50
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import apo_bench
 
 PACKAGE = Path(apo_bench.__file__).parent
-IMPURE = ("simulation", "benchmark", "env", "cli")
+IMPURE = ("simulation", "benchmark", "env", "corrected", "cli")
 
 
 def pure_modules() -> list[str]:

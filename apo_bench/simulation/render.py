@@ -38,11 +38,31 @@ def picture(
     Args:
         camera: `overview`, `close`, `top`, or a `view`.
     """
-    world = scene.shown
-    data = _at(world, scene, poses)
-    with _renderer(world.model, width, height) as renderer:
-        renderer.update_scene(data, camera=camera)
-        return np.array(renderer.render())
+    return _drawn(scene.shown, _at(scene.shown, scene, poses), width, height, camera)
+
+
+def picture_with_arm(
+    scene: Scene,
+    poses: Poses,
+    state: Array | None = None,
+    width: int = 640,
+    height: int = 480,
+    camera: Camera = "overview",
+) -> Image:
+    """The same with the arm, at home with its fingers open, (height, width, 3).
+
+    Args:
+        state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.
+    """
+    data = _at(scene.work, scene, poses)
+    for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
+        data.joint(f"arm/{joint}").qpos = q
+    for finger in scene.arm.fingers:
+        data.joint(f"arm/{finger}").qpos = scene.arm.opening_m
+    if state is not None:
+        data.qpos[:] = state
+    mujoco.mj_forward(scene.work.model, data)
+    return _drawn(scene.work, data, width, height, camera)
 
 
 def view(look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0) -> Camera:
@@ -145,6 +165,12 @@ class Viewer:
         if self._window is not None:
             self._window.close()
             self._window = None
+
+
+def _drawn(world: World, data: Any, width: int, height: int, camera: Camera) -> Image:
+    with _renderer(world.model, width, height) as renderer:
+        renderer.update_scene(data, camera=camera)
+        return np.array(renderer.render())
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
