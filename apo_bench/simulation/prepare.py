@@ -76,7 +76,10 @@ def unreachable(scene: Scene, transfer: Transfer) -> bool:
 
 
 def _tasks(plan: Plan, scene: Scene) -> list[_Task]:
-    """The schedule with its targets: an undone part goes back to where it was, unless it is done again at once."""
+    """The schedule with its targets: an undone part goes back to where it was, unless it is done again at once.
+
+    Operations are undone in reverse order, so the place a part came from is free again, and the arm has reached it.
+    """
     at: Poses = dict(plan.start)
     put: dict[str, int] = {}
     before: dict[int, tuple[Array, int | None]] = {}
@@ -128,6 +131,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         into=into,
         sides=sides,
         slow=_slow(plan.assembly, contacts, after, into),
+        weight_n=held,
         place_n=PLACE_WEIGHTS * held,
         insert_n=INSERT_WEIGHTS * min(near, default=held),
         slide_n=SLIDE_WEIGHTS * min(near, default=held),

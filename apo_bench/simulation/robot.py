@@ -111,6 +111,10 @@ class Robot:
             return np.zeros(3)
         return np.asarray((self._on_arm[self._held] - self._on_all[self._held]).sum(axis=0))
 
+    def load(self) -> float:
+        """The weight that the gripper feels, [N]: of the held part and of what really hangs on it."""
+        return -float(self._on_arm[:, 2].sum())
+
     def hold(self, *parts: str) -> None:
         """Say which parts are in the hand: the held one and what it carries, or none."""
         self._held = [self.scene.work.free.index(part) for part in parts]

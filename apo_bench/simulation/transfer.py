@@ -29,6 +29,8 @@ ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
 LOST_M = 0.002
 """Fingers that close this far beyond the part's surface hold nothing."""
+LOST_LOAD = 0.8
+"""A hand that feels less than this part of the weight of a group has lost some of it."""
 ASIDE_M, BEYOND_M, OFF_M = 0.006, 0.004, 0.0003
 """A slide begins this far from the side it shall touch, may go this much beyond the goal, this high over the floor."""
 
@@ -77,6 +79,8 @@ class Transfer:
     """Directions in which the part is slid onto another one at its side, (3,) each."""
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
+    weight_n: float
+    """Of the part and what it carries, [N]."""
     place_n: float
     """Guard of a motion onto a support, [N]."""
     insert_n: float
@@ -182,6 +186,8 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.follow(smooth(robot.T, before, LOWER))
     robot.wait(0.1)
     _check_grasp(robot, grip)
+    if t.carried and robot.scene.grasp == "friction" and robot.load() < LOST_LOAD * t.weight_n:
+        raise Halt("carry", "lost_grasp")
 
 
 def _aim(t: Transfer) -> Array:
