@@ -18,6 +18,7 @@ from apo_bench.layout import layout_at
 from apo_bench.placement import placed
 from apo_bench.program import Layout, Poses
 from apo_bench.scenario import Scenario
+from apo_bench.scenario_order import check_order
 
 GAP_M = 1e-6
 """Faces that are said to touch are nearer than this."""
@@ -47,6 +48,8 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     """
     for case in _cases(scenario):
         stages = (case.layout.start, *placed(scenario.assembly, case.layout.start, case.layout.goals))
+        if not case.key:
+            check_order(scenario.assembly, stages, file)
         _check_turns(scenario, file, case, stages)
         _check_contacts(scenario, file, case, stages)
         _check_intrusions(scenario, file, case, stages)

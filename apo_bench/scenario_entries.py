@@ -116,8 +116,10 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
     main = _movable(keys["move"], parts)
     carries = tuple(_movable(n, parts) for n in _items(keys["carries"], "entry")) if "carries" in keys else ()
     for name in carries:
-        if name == main or carries.count(name) > 1:
-            refuse(keys["carries"], f"'{name}' stands here twice or is the moved part itself; name it once")
+        if name == main:
+            refuse(keys["carries"], f"'{name}' would carry itself, it is the moved part; leave it out of this list")
+        if carries.count(name) > 1:
+            refuse(keys["carries"], f"'{name}' stands here twice; name it once")
         if name not in there:
             refuse(keys["carries"], f"'{name}' is carried before any operation has moved it; move it first")
     goal = read_pose(keys["goal"])

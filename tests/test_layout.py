@@ -20,14 +20,17 @@ from apo_bench.geometry.solid import Box, Solid
 from apo_bench.layout import draw_layout, layout_at
 from apo_bench.placement import placed
 from apo_bench.program import Poses
-from apo_bench.scenario import Scenario, Site
+from apo_bench.scenario import Grasp, Scenario, Site
 from apo_bench.scenario_file import load_scenario, scenario_names
+from tests import scenes
 
 NAMES = scenario_names()
 SCENARIOS = {name: load_scenario(name) for name in NAMES}
 BASE_M = np.array([-0.42, 0.0])
 """Where the robot stands."""
 GENERATOR_SEEDS = range(200)
+FINGERS_M = (0.06, 0.025)
+"""Half of what the open gripper takes up along its closing direction and across it."""
 
 
 def gap_m(assembly: Assembly, contact: Contact, poses: Poses) -> float:
@@ -43,8 +46,45 @@ def overlap_m2(assembly: Assembly, contact: Contact, poses: Poses) -> float:
     return overlap(face, poses[contact.manipulated.part], on, poses[contact.environment.part]).area
 
 
-def test_both_scenes_are_shipped():
-    assert {"stick_in_tower", "stick_on_castles"} <= set(NAMES)
+EXAMPLES = {
+    "bridge_cycle": scenes.bridge,
+    "stick_on_castles": scenes.stick_on_castles,
+    "stick_in_tower": scenes.stick_in_tower,
+    "carried_bridge": scenes.subassembly_on_castles,
+    "vanished_fixture": scenes.fixture,
+    "pocket_table": scenes.pockets,
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_scenes_of_the_paper_are_those_of_the_paper(name: str):
+    """Who moves, whom it carries, which faces meet and where: as written out by hand."""
+    scenario, example = SCENARIOS[name], EXAMPLES[name]()
+    assert [o.moves for o in scenario.assembly.operations] == [o.moves for o in example.assembly.operations]
+    for mine, paper in zip(scenario.assembly.operations, example.assembly.operations, strict=True):
+        assert set(mine.contacts) == set(paper.contacts)
+    assert scenario.assembly.odls() == example.assembly.odls()
+    assert scenario.goals == pytest.approx(example.goals, abs=1e-12)
+
+
+def test_all_eight_are_shipped():
+    assert set(NAMES) == {*EXAMPLES, "block_on_block", "fixture_alignment"}
+
+
+def test_who_is_careless_and_how():
+    """Along y at operation 2, along x where two pockets decide; nobody in the first figures."""
+    axes = {name: s.careless and (s.careless.operation, s.careless.axis.tolist()) for name, s in SCENARIOS.items()}
+    along_y = (1, [0.0, 1.0, 0.0])
+    assert axes == {
+        "block_on_block": None,
+        "bridge_cycle": None,
+        "fixture_alignment": None,
+        "stick_in_tower": along_y,
+        "stick_on_castles": along_y,
+        "carried_bridge": along_y,
+        "vanished_fixture": along_y,
+        "pocket_table": (1, [1.0, 0.0, 0.0]),
+    }
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -134,6 +174,8 @@ def test_starts_are_those_of_the_file(name: str):
     for clearance_mm in (0.0, 0.25):
         start = draw_layout(scenario, np.random.default_rng([5, 0]), clearance_mm).start
         for part, T in scenario.start.items():
+            if part in scenario.follows_site:
+                continue
             drop = 1e-3 * clearance_mm if part == "stick" else 0.0
             assert start[part] == pytest.approx(pose.at((0, 0, -drop)) @ T, abs=1e-15)
 
@@ -165,18 +207,53 @@ def extremes(scenario: Scenario):
             yield layout_at(scenario, x, y, yaw, [getattr(shift, end) for shift in scenario.shifts])
 
 
+def open_fingers(grasp: Grasp, T: Array):
+    """What the open gripper takes up around a part at T, seen from above."""
+    x = (T[:3, :3] @ grasp.across)[:2]
+    y = np.array([-x[1], x[0]])
+    middle = pose.apply(T, grasp.point[None])[0, :2]
+    return MultiPoint(
+        [middle + u * FINGERS_M[0] * x + v * FINGERS_M[1] * y for u in (-1, 1) for v in (-1, 1)]
+    ).convex_hull
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_no_start_is_in_the_way_of_the_assembly(name: str):
-    """Every start is 60 mm clear of every goal and of the line that leads to it."""
+    """What has not been moved yet is clear of all that moves, on the line to its goal, and of the fingers there."""
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
-    starts = {part: footprint(assembly.solids[part], scenario.start[part]) for part in scenario.start}
     for layout in extremes(scenario):
-        for T, operation, attach in zip(layout.goals, assembly.operations, scenario.attach, strict=True):
-            solid = assembly.solids[operation.main]
-            swept = footprint(solid, T).union(footprint(solid, T @ pose.at(-attach.travel_m * attach.direction)))
-            for part in set(starts) - assembly.fixed:
-                assert swept.convex_hull.distance(starts[part]) > 0.06
+        stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        waiting = set(assembly.solids) - assembly.fixed
+        for k, operation in enumerate(assembly.operations):
+            waiting -= set(operation.moves)
+            T, attach = layout.goals[k], scenario.attach[k]
+            back = T @ pose.at(-attach.travel_m * attach.direction) @ pose.inverse(T)
+            fingers = open_fingers(scenario.grasps[k], T)
+            here = open_fingers(scenario.grasps[k], stages[k][operation.main])
+            for other in waiting:
+                standing = footprint(assembly.solids[other], layout.start[other])
+                for part in operation.moves:
+                    ends = [footprint(assembly.solids[part], each @ stages[k + 1][part]) for each in (np.eye(4), back)]
+                    assert ends[0].union(ends[1]).convex_hull.distance(standing) > 0.04
+                assert fingers.distance(standing) > 0.025
+                assert here.distance(standing) > 0.025
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_fingers_find_room_where_a_part_waits(name: str):
+    """Nothing that was put down before is within reach of the fingers that take a part from its start."""
+    scenario = SCENARIOS[name]
+    assembly = scenario.assembly
+    for layout in extremes(scenario):
+        stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        moved: set[str] = set()
+        for k, operation in enumerate(assembly.operations):
+            if operation.main not in moved:
+                fingers = open_fingers(scenario.grasps[k], stages[k][operation.main])
+                for other in moved:
+                    assert fingers.distance(footprint(assembly.solids[other], stages[k][other])) > 0.02
+            moved |= set(operation.moves)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -26,6 +26,8 @@ DROP_M = 0.0002
 LIFT_M = 0.0003
 """How far a part is lifted while it is adjusted, so that it does not drag the one below."""
 REST_S = 0.3
+SETTLE_S = 0.15
+"""A group trails behind a quick hand by a millimetre; so long it takes to catch up."""
 
 
 def perform(hands: Hands, act: Act, clearance_m: float) -> None:
@@ -41,9 +43,9 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
     for end in (at_height(T, max(safe, T[2, 3])), at_height(before, safe), before):
         hands.move((0, smooth(T, end, SPEED, turn_speed=4.0)))
         T = end
-    for part in act.late:
-        if part in act.carries:
-            _shift_carried(hands, act, part, clearance_m)
+    for part in (part for part in act.late if part in act.carries):
+        hands.wait(SETTLE_S)
+        _shift_carried(hands, act, part, clearance_m)
     _bring(hands, act, smooth(before, beside, STROKE))
     if act.aside.any():
         hands.move((0, smooth(beside, goal, SHIFT)))
