@@ -19,6 +19,7 @@ from apo_bench.benchmark import sweep as runner
 from apo_bench.benchmark.grid import SweepSpec, load_all, row_key, trial_key, units
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.spec import ROW
+from apo_bench.correction.correct import CORRECTORS
 from apo_bench.errors import InputError
 from apo_bench.scenario_file import load_scenario
 
@@ -61,6 +62,12 @@ def test_the_grid_is_every_combination_once() -> None:
     keys = [trial_key(t, loaded[t.scenario].name) for unit in units(spec, loaded) for t in unit.trials]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
     assert {key[2] for key in keys} == {0, 1}
+
+
+def test_by_default_the_ceiling_the_raw_and_the_papers_way_are_compared() -> None:
+    assert SPEC.methods == ("oracle", "none", "paper")
+    for method in CORRECTORS:
+        assert replace(SPEC, methods=(method,)).methods == (method,)
 
 
 def test_the_oracle_runs_once_per_seed() -> None:

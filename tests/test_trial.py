@@ -16,6 +16,7 @@ from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import plan
 from apo_bench.benchmark.spec import ENV_ID, LARGEST_SEED, ROW, TrialSpec, level_pair
 from apo_bench.benchmark.stages import Shown, see, show, stream
+from apo_bench.benchmark.terminal import print_row
 from apo_bench.benchmark.trial import nominal_where_seen, run_measured, run_trial
 from apo_bench.correction.correct import correct
 from apo_bench.errors import InputError
@@ -134,6 +135,18 @@ def test_a_schedule_is_carried_out_and_counted(scene: Scene, shown: Shown, monke
     assert row["success"] is True
     assert row["pushed_mm"] < 1.0
     assert json.loads(json.dumps(row, allow_nan=False)) == row
+
+
+def test_a_person_reads_what_was_tried_and_foretold(
+    rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    tried = [{"step": 3, "free": [3], "gap_mm": 1.528}, {"step": 3, "free": [3, 2], "gap_mm": None}]
+    print_row(rows["none"] | {"tried": tried, "freed": [3, 2], "extra_operations": 2})
+    said = " ".join(capsys.readouterr().out.split())
+    assert "after step 3 {3} leaves 1.528 mm after step 3 {3,2} did not come to rest freed {3,2}" in said
+    assert "schedule 2 operations beyond doing each once predicted operation 3 fails: residual, " in said
+    print_row(rows["paper"])
+    assert "predicted it fits, 0.00 mm off at most" in " ".join(capsys.readouterr().out.split())
 
 
 def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> None:

@@ -79,7 +79,7 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
         aside = DODGE * (i - (len(methods) - 1) / 2)
         _line(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, method)
         if len(methods) <= MANY:
-            _counts(axis, line, [place[c.level, c.level_deg] + aside for c in line], style)
+            _counts(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, i, len(methods))
     axis.set_xticks(range(len(levels)), [level_label(*level) for level in levels])
     axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
     axis.set_ylim(-0.04, 1.06)
@@ -104,12 +104,14 @@ def _line(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style, me
     axis.plot(x, rates, markersize=5, linewidth=1.6, label=method, clip_on=False, **shape)
 
 
-def _counts(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style) -> None:
+def _counts(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style, i: int, methods: int) -> None:
+    """`n=100` beside every point, of the first methods on the left, of the others on the right and apart in height."""
+    side, align = (-6, "right") if i < methods // 2 else (6, "left")
     for at, cell in zip(x, cells, strict=True):
         rate = float(cell.rate or 0.0)
-        offset = (6, -12) if rate > 0.5 else (6, 6)
-        text = {"textcoords": "offset points", "fontsize": 6, "color": style.color}
-        axis.annotate(f"n={cell.trials}", (at, rate), offset, **text)
+        away = (-12 - 7 * (i // 2)) if rate > 0.5 else (6 + 7 * (i // 2))
+        text = {"textcoords": "offset points", "fontsize": 6, "color": style.color, "ha": align}
+        axis.annotate(f"n={cell.trials}", (at, rate), (side, away), **text)
 
 
 def level_label(level: float, level_deg: float) -> str:
