@@ -117,7 +117,7 @@ def test_the_tip_looks_down_however_the_part_lies() -> None:
         assert np.linalg.det(tip[:3, :3]) == pytest.approx(1.0)
 
 
-def test_side_contacts_are_slid_onto_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
+def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
     schedule = (*(Step(k) for k in range(4)), Step(3, undo=True))
     done = moves(nominal(fixture, schedule), fixture)
     towards = fixture_side(fixture)
@@ -127,6 +127,9 @@ def test_side_contacts_are_slid_onto_and_a_fixture_comes_back_the_same_way(fixtu
     np.testing.assert_allclose(back, -towards, atol=1e-9)
     assert not done[0].transfer.sides
     assert not done[3].transfer.sides
+    (away,) = done[3].transfer.away
+    np.testing.assert_allclose(away, towards, atol=1e-9)
+    assert not any(move.transfer.away for move in (*done[:3], done[4]))
 
 
 def fixture_side(scene: Scene) -> Array:

@@ -117,6 +117,8 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m) if undo else _line(scene, k, target)
     grips, out, into = _grips(scene, task, part, out, into, believed, after)
     sides = () if into.level else _sides(plan.assembly, contacts, operation.moves, after)
+    leaves = operation.contacts if undo or task.was == k else _restored(plan.assembly, k)
+    away = () if out.level else tuple(-side for side in _sides(plan.assembly, leaves, operation.moves, believed))
     weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     near = [weight[p] for p in _neighbours(contacts, operation.moves) if p in weight]
@@ -130,6 +132,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         out=out,
         into=into,
         sides=sides,
+        away=away,
         slow=_slow(plan.assembly, contacts, after, into),
         weight_n=held,
         place_n=PLACE_WEIGHTS * held,

@@ -32,7 +32,8 @@ LOST_M = 0.002
 LOST_LOAD = 0.8
 """A hand that feels less than this part of the weight of a group has lost some of it."""
 ASIDE_M, BEYOND_M, OFF_M = 0.006, 0.004, 0.0003
-"""A slide begins this far from the side it shall touch, may go this much beyond the goal, this high over the floor."""
+"""A slide begins this far from the side it shall touch, may go this much beyond the goal, this high over the floor;
+what touches at its side is moved off as far before it is lifted, since in the hand it drifts into its neighbour."""
 
 
 class Grip(NamedTuple):
@@ -77,6 +78,8 @@ class Transfer:
     """After it was put down, the fingers close and open again here: closing, they centre the part between them."""
     sides: tuple[Array, ...]
     """Directions in which the part is slid onto another one at its side, (3,) each."""
+    away: tuple[Array, ...]
+    """Directions in which the part is first moved off another one at its side, (3,) each."""
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
     weight_n: float
@@ -174,6 +177,10 @@ def _lift(robot: Robot, t: Transfer) -> None:
     robot.stage = "lift"
     if t.carried:
         robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.02))
+    if t.away:
+        robot.follow(smooth(robot.T, moved(robot.T, UP, OFF_M), 0.01))
+    for side in t.away:
+        robot.follow(smooth(robot.T, moved(robot.T, side, ASIDE_M), 0.03))
     robot.follow(smooth(robot.T, at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
 
 
