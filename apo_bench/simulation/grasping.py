@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -66,21 +67,22 @@ def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str])
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place]) -> Grasp:
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
-    if _clear_everywhere(scene, part, preferred, places, MARGINS_M[-1]):
+    if _clear(scene, part, [preferred], places, MARGINS_M[-1]):
         return preferred
     for margin in MARGINS_M:
-        for grasp in _candidates(scene, part, places[0].T):
-            if _clear_everywhere(scene, part, grasp, places, margin):
-                return grasp
+        clear = _clear(scene, part, _candidates(scene, part, places[0].T), places, margin)
+        if clear:
+            return clear[0]
     return preferred
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: Place) -> Grasp | None:
     """The first clear grasp that closes along a direction of the part, or None."""
+    able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ across) > 0.99]
     for margin in MARGINS_M:
-        for grasp in _candidates(scene, part, place.T):
-            if abs(grasp.across @ across) > 0.99 and _clear(scene, part, grasp, place, margin):
-                return grasp
+        clear = _clear(scene, part, able, [place], margin)
+        if clear:
+            return clear[0]
     return None
 
 
@@ -90,22 +92,22 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Plac
     Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
 
     Args:
-        places: Where the part is picked up or put down besides, clear for either grasp that is used there.
+        places: Where the part is picked up or put down besides, clear for the grasp that is used there.
     """
     ends = (*places, Place(stroke.T, stroke.around))
     least = MARGINS_M[-1]
-    if _clear_everywhere(scene, part, preferred, ends, least) and not _nearest(scene, part, preferred, stroke, least):
+    if _clear(scene, part, [preferred], ends, least) and not _nearest(scene, part, preferred, stroke, least):
         return Grips(preferred)
+    everything = _candidates(scene, part, places[0].T)
     for margin in MARGINS_M:
         able = [
-            (grasp, _nearest(scene, part, grasp, stroke, margin))
-            for grasp in _candidates(scene, part, places[0].T)
-            if _clear_everywhere(scene, part, grasp, places, margin)
+            (_nearest(scene, part, grasp, stroke, margin), grasp)
+            for grasp in _clear(scene, part, everything, places, margin)
         ]
-        for grasp, left in able:
-            if left == 0.0 and _clear_everywhere(scene, part, grasp, ends, margin):
-                return Grips(grasp)
-        found = _pair(scene, part, stroke, sorted(able, key=lambda pair: pair[1])[:8], margin)
+        whole = _clear(scene, part, [grasp for left, grasp in able if left == 0.0], ends, margin)
+        if whole:
+            return Grips(whole[0])
+        found = _pair(scene, part, stroke, sorted(able, key=lambda pair: pair[0])[:8], margin)
         if found is not None:
             return found
     return Grips(preferred)
@@ -125,23 +127,21 @@ def half_width(solid: Solid, grasp: Grasp) -> float:
     return float(np.abs(grasp.across) @ (high - low)) / 2
 
 
-def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[Grasp, float]], margin: float) -> Grips | None:
+def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
+    """Begin with a grasp that comes near to the end, and end with one that is clear from there on."""
     goal = Place(stroke.T, stroke.around)
-    for first, left in able:
-        if left >= stroke.travel:
-            continue
+    last = _clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin)
+    for left, first in able:
         change = Place(_back(stroke, left), stroke.around)
-        if not _clear(scene, part, first, change, margin):
-            continue
-        for second in _candidates(scene, part, stroke.T):
-            if _clear_everywhere(scene, part, second, (goal, change), margin):
-                near = Stroke(stroke.T, stroke.way, left, stroke.around)
+        if left < stroke.travel and _clear(scene, part, [first], [change], margin):
+            near = Stroke(stroke.T, stroke.way, left, stroke.around)
+            for second in _clear(scene, part, last, [change], margin):
                 if _nearest(scene, part, second, near, margin) == 0.0:
                     return Grips(first, left, second)
     return None
 
 
-def _candidates(scene: Scene, part: str, T: Array) -> Iterator[Grasp]:
+def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
     """Across either level axis, the narrower one first, from the middle outwards."""
     solid = scene.scenario.assembly.solids[part]
     low, high = solid.bounds
@@ -149,45 +149,48 @@ def _candidates(scene: Scene, part: str, T: Array) -> Iterator[Grasp]:
     up = int(np.abs(T[2, :3]).argmax())
     rise = np.sign(T[2, up]) * (HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
-    for axis in level:
-        if size[axis] / 2 + STAND_OFF_M / 2 > scene.arm.opening_m:
-            continue
-        along = next(other for other in level if other != axis)
+    found = []
+    for axis, along in (level, level[::-1]):
         reach = max(0.0, size[along] / 2 - END_M)
-        for offset in sorted(np.arange(-reach, reach + 1e-9, GRID_M) if reach > GRID_M else [0.0], key=abs):
-            yield Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis])
+        offsets = np.arange(-reach, reach + 1e-9, GRID_M) if reach > GRID_M else np.zeros(1)
+        if size[axis] / 2 + STAND_OFF_M / 2 <= scene.arm.opening_m:
+            for offset in sorted(offsets, key=abs):
+                found.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
+    return found
 
 
-def _clear_everywhere(scene: Scene, part: str, grasp: Grasp, places: Sequence[Place], margin: float) -> bool:
-    return all(_clear(scene, part, grasp, place, margin) for place in places)
-
-
-def _clear(scene: Scene, part: str, grasp: Grasp, place: Place, margin: float) -> bool:
-    """Whether the open gripper, about to close or having let go, strikes nothing."""
-    width = half_width(scene.scenario.assembly.solids[part], grasp)
-    opening = min(width + STAND_OFF_M, scene.arm.opening_m)
-    return bool(_depth(scene, grasp, opening, place.T[None], place.around, margin)[0] <= 0.0)
+def _clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place], margin: float) -> list[Grasp]:
+    """Those at which the open gripper, about to close or having let go, strikes nothing at any place."""
+    kept = []
+    for across, those in groupby(grasps, key=lambda grasp: tuple(grasp.across)):
+        same = list(those)
+        width = half_width(scene.scenario.assembly.solids[part], same[0])
+        opening = min(width + STAND_OFF_M, scene.arm.opening_m)
+        points = np.array([grasp.point for grasp in same])
+        struck = np.zeros(len(same), dtype=np.bool_)
+        for place in places:
+            R = (place.T @ tip_frame(Grasp(np.zeros(3), np.array(across)), place.T))[:3, :3]
+            at = points @ place.T[:3, :3].T + place.T[:3, 3]
+            struck |= _depth(scene, opening, R, at, place.around, margin) > 0.0
+        kept += [grasp for grasp, hit in zip(same, struck, strict=True) if not hit]
+    return kept
 
 
 def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
     width = half_width(scene.scenario.assembly.solids[part], grasp)
     lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / GRID_M) + 1))
-    poses = np.array([_back(stroke, left) for left in lefts])
-    struck = _depth(scene, grasp, width, poses, stroke.around, margin) > 0.0
+    tip = stroke.T @ tip_frame(grasp, stroke.T)
+    at = tip[:3, 3] - lefts[:, None] * stroke.way
+    struck = _depth(scene, width, tip[:3, :3], at, stroke.around, margin) > 0.0
     if not struck.any():
         return 0.0
-    first = int(np.argmax(struck))
-    return float(lefts[max(0, first - 1)])
+    return float(lefts[max(0, int(np.argmax(struck)) - 1)])
 
 
-def _depth(
-    scene: Scene, grasp: Grasp, opening: float, T_part: Array, around: Sequence[Obstacle], margin: float
-) -> Array:
-    """How deep the gripper is in what stands around, at each of the poses of the part, (k,), [m]."""
+def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
+    """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world."""
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
-    T_tip = T_part @ tip_frame(grasp, T_part[0])
-    at, R = T_tip[:, :3, 3], T_tip[0, :3, :3]
     return np.max([depths(boxes, R, at, each.boxes, each.T) for each in around], axis=0, initial=-1.0)
 
 

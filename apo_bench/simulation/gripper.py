@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -14,6 +15,7 @@ UPRIGHT_M = 0.001
 """Room above and below: supports are where they are known to be."""
 
 
+@lru_cache(maxsize=64)
 def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: float = 0.0) -> tuple[Box, ...]:
     """The geoms of the gripper in the frame of the tip, each as the box around it.
 
