@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from apo_bench import outcomes
+from apo_bench.correction.ending import sentence
 from apo_bench.correction.equations import equations, gap, largest
 from apo_bench.correction.newton import CUT_OFF, LENGTH_M, least_step
-from apo_bench.correction.paper import sentence
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
@@ -21,7 +21,16 @@ from apo_bench.program import Correction, Observation
 Corrector = Callable[[Observation], Correction]
 """Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
 
-CORRECTORS = MappingProxyType({"paper": "apo_bench.correction.paper:paper"})
+CORRECTORS = MappingProxyType(
+    {
+        "paper": "apo_bench.correction.paper:paper",
+        "paper-track": "apo_bench.correction.track:paper_track",
+        "last-only": "apo_bench.correction.ablations:last_only",
+        "minimal": "apo_bench.correction.ablations:minimal",
+        "no-history": "apo_bench.correction.no_history:no_history",
+        "no-disappeared": "apo_bench.correction.ablations:no_disappeared",
+    }
+)
 STATUSES = ("converged", "not_seen", "inconsistent", "not_converged", "not_finite")
 
 

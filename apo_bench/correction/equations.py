@@ -36,6 +36,8 @@ class Equations:
     """(c, w): the word D_a^-1 D_b of each contact; p start poses, then n goals, then the identity as padding."""
     inverse: NDArray[np.bool_]
     """(c, w): which letters of the words are inverted."""
+    made: NDArray[np.intp]
+    """(c,): the operation that made each contact, counted from 0."""
     contact: NDArray[np.intp]
     """(m,): the contact of each equation."""
     plane: Array
@@ -50,6 +52,30 @@ class Equations:
         """The operations, of `n`, whose motion parameters occur, the most recent first."""
         occurring = np.unique(self.letters) - len(self.start)
         return tuple(int(k) for k in occurring[::-1] if 0 <= k < n)
+
+    def containing(self, free: Collection[int]) -> NDArray[np.bool_]:
+        """Whether the motion parameter of one of these operations occurs in the word of each contact, (c,)."""
+        wanted = np.array(sorted(free), dtype=np.intp) + len(self.start)
+        return np.asarray(np.isin(self.letters, wanted).any(axis=1))
+
+    def among(self, contacts: NDArray[np.bool_]) -> Equations:
+        """The equations of these contacts, (c,), alone."""
+        rows, number = contacts[self.contact], np.cumsum(contacts) - 1
+        return Equations(
+            start=self.start,
+            letters=self.letters[contacts],
+            inverse=self.inverse[contacts],
+            made=self.made[contacts],
+            contact=number[self.contact[rows]],
+            plane=self.plane[rows],
+            vertex=self.vertex[rows],
+        )
+
+    def gaps(self, goals: Array) -> Array:
+        """The largest |e| of each contact, (c,), [m]; NaN where a number is not finite."""
+        largest_of_each = np.zeros(len(self.letters))
+        np.maximum.at(largest_of_each, self.contact, np.abs(self.residual(goals)))
+        return largest_of_each
 
     def residual(self, goals: Array) -> Array:
         """e of every equation, (m,), [m]: positive where faces are apart, negative where they are inside each other."""
@@ -107,28 +133,28 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
 
     Args:
         goals: (n, 4, 4), where the vertices are taken, world frame, [m].
-        free: Operations counted from 0; None stands for all.
+        free: Operations counted from 0; None stands for every contact, in the order of `assembly.relations()`.
     """
     parts = tuple(assembly.solids)
     constants = np.array([start[part] for part in parts]).reshape(-1, 4, 4)
-    freed = range(len(assembly)) if free is None else free
-    letters = {k + len(parts) for k in freed}
-    chosen = [(c, word) for c, word in _words(assembly, parts) if letters.intersection(k for k, _ in word)]
+    chosen = _words(assembly, parts)
     stack = np.concatenate([constants, goals])
-    flats = {of: _flat(assembly.face(of)) for contact, _ in chosen for of in contact}
-    vertices = [_vertices(flats[c.manipulated], flats[c.environment], word, stack) for c, word in chosen]
+    flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
+    vertices = [_vertices(flats[c.manipulated], flats[c.environment], word, stack) for c, _, word in chosen]
     contact = np.repeat(np.arange(len(chosen)), [len(v) for v in vertices]).astype(np.intp)
-    width = max((len(word) for _, word in chosen), default=0)
-    padded = [[*word, *[(len(stack), False)] * (width - len(word))] for _, word in chosen]
+    width = max((len(word) for _, _, word in chosen), default=0)
+    padded = [[*word, *[(len(stack), False)] * (width - len(word))] for _, _, word in chosen]
     table = np.array(padded, dtype=np.intp).reshape(len(chosen), width, 2)
-    return Equations(
+    system = Equations(
         start=constants,
         letters=table[..., 0],
         inverse=table[..., 1].astype(np.bool_),
+        made=np.array([made for _, made, _ in chosen], dtype=np.intp),
         contact=contact,
-        plane=np.array([flats[c.manipulated].plane for c, _ in chosen]).reshape(-1, 4)[contact],
+        plane=np.array([flats[c.manipulated].plane for c, _, _ in chosen]).reshape(-1, 4)[contact],
         vertex=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in vertices)]),
     )
+    return system if free is None else system.among(system.containing(free))
 
 
 def gap(assembly: Assembly, start: Poses, goals: Array) -> float:
@@ -141,14 +167,18 @@ def largest(e: Array) -> float:
     return float(np.max(np.abs(e), initial=0.0))
 
 
-def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, ODL]]:
-    """Every contact ever made with D_a^-1 D_b, simplified; term k stands for the start of part k, then operations."""
+def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, int, ODL]]:
+    """Every contact ever made, the operation that made it, and D_a^-1 D_b, simplified.
+
+    Term k stands for the start of part k, then for the operations.
+    """
     rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
     history = rooted.odls()
     words = []
     for contact, made, _ in rooted.relations():
         D = history[made]
-        words.append((contact, simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part]))))
+        word = simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part]))
+        words.append((contact, made - len(parts), word))
     return words
 
 

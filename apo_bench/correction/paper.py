@@ -1,58 +1,52 @@
-"""The corrector of the paper: every contact equation, every motion parameter, all at once (Sections 2.3 and 3.3)."""
+"""The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from apo_bench import outcomes
-from apo_bench.correction.equations import equations, gap, largest
-from apo_bench.correction.newton import Solution, solve
+from apo_bench.correction.candidates import candidates
+from apo_bench.correction.ending import refused, sentence, status
+from apo_bench.correction.equations import equations, largest
+from apo_bench.correction.newton import solve
+from apo_bench.correction.settle import settled
 from apo_bench.program import Correction, Observation
 
 
 def paper(seen: Observation) -> Correction:
-    """Change what was seen by as little as makes all contacts hold, lost ones too.
+    """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other goal by itself.
 
     Returns:
         `converged` if every |e| is within `seen.gap_m`; otherwise `not_seen` (nothing was changed), `inconsistent`,
-        `not_converged` or `not_finite` (nothing was changed), with its sentence.
+        `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the candidates; rank and
+        trace are those of their joint solution.
+    """
+    return at_once(seen, np.ones(len(seen.assembly.relations()), dtype=np.bool_))
+
+
+def at_once(seen: Observation, known: NDArray[np.bool_]) -> Correction:
+    """The same on a graph that holds the `known` contacts, (c,) in the order of `seen.assembly.relations()`.
+
+    The status says whether those hold; the gaps are those of every contact ever made.
     """
     if not seen.seen.all():
-        return _refused(seen)
+        return refused(seen)
     system = equations(seen.assembly, seen.start, seen.goals)
-    freed = system.variables(len(seen.goals))
-    before = largest(system.residual(seen.goals))
-    found = solve(system, seen.goals, freed)
-    status = _status(found, seen.gap_m)
+    before = system.gaps(seen.goals)
+    freed = candidates(seen.assembly, known & ~(before <= seen.gap_m), known)
+    found = solve(system.among(known & system.containing(freed)), seen.goals, freed)
+    ended = status(found, largest(system.gaps(found.goals)[known]), seen.gap_m)
+    goals = found.goals
+    if ended == "converged":
+        for k in sorted(set(range(len(goals))).difference(freed)):
+            goals = settled(system, goals, k, seen.gap_m)
     return Correction(
-        goals=found.goals,
-        status=status,
-        sentence=sentence(status, seen.gap_m),
+        goals=goals,
+        status=ended,
+        sentence=sentence(ended, seen.gap_m),
         freed=freed,
-        gap_before_m=before,
-        gap_after_m=found.gap_m,
+        gap_before_m=largest(before),
+        gap_after_m=largest(system.gaps(goals)),
         rank=found.rank,
         trace=found.trace,
     )
-
-
-def sentence(status: str, gap_m: float) -> str:
-    """What a status means."""
-    if status == "converged":
-        return f"every contact holds within {gap_m * 1e3:g} mm"
-    return outcomes.sentence(status)
-
-
-def _status(found: Solution, gap_m: float) -> str:
-    if not found.finite:
-        return "not_finite"
-    if found.gap_m <= gap_m:
-        return "converged"
-    return "inconsistent" if found.at_rest else "not_converged"
-
-
-def _refused(seen: Observation) -> Correction:
-    """What was seen, unchanged: an operation without a pose has no motion parameter to start from."""
-    missing = int(np.argmin(seen.seen))
-    now = gap(seen.assembly, seen.start, seen.goals)
-    return Correction(seen.goals, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)

@@ -1,0 +1,31 @@
+"""How a correction ends: a status with its sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench import outcomes
+from apo_bench.correction.equations import gap
+from apo_bench.correction.newton import Solution
+from apo_bench.program import Correction, Observation
+
+
+def status(found: Solution, left_m: float, gap_m: float) -> str:
+    """`converged` if what is left, [m], is within `gap_m`; otherwise why not."""
+    if not found.finite:
+        return "not_finite"
+    if left_m <= gap_m:
+        return "converged"
+    return "inconsistent" if found.at_rest else "not_converged"
+
+
+def sentence(status: str, gap_m: float, of: str = "every contact") -> str:
+    """What a status means; `of` says which contacts were looked at."""
+    return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
+
+
+def refused(seen: Observation) -> Correction:
+    """What was seen, unchanged: an operation without a pose has no motion parameter to start from."""
+    missing = int(np.argmin(seen.seen))
+    now = gap(seen.assembly, seen.start, seen.goals)
+    return Correction(seen.goals, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)
