@@ -66,7 +66,7 @@ def _put_aside_before(assembly: Assembly, k: int) -> int | None:
 
 
 def _puts_aside(assembly: Assembly, k: int, part: str) -> bool:
-    """Whether operation k moves a part away for good: not for the first time, alone, and nothing meets it any more."""
+    """Whether operation k only moves a part away: not for the first time, alone, and nothing meets it afterwards."""
     operation = assembly.operations[k]
     again = any(part in earlier.moves for earlier in assembly.operations[:k])
     alone = operation.moves == (part,) and _met(operation) <= assembly.fixed

@@ -256,7 +256,7 @@ def test_what_the_tower_says():
 
 
 def test_what_is_left_out_has_a_default(tmp_path: Path):
-    """From straight above, 30 mm; held at the centroid across the narrower level axis; no site, nobody careless."""
+    """From straight above, 30 mm; held above its middle, across the narrower level axis; no site, nobody careless."""
     lines = SLOTS.split("\n[site]")[0].splitlines()
     optional = r"(grasp|vary|clearance_mm|gap_mm|paper|human|success|color) ="
     kept = [line for line in lines if not re.match(optional, line)]
@@ -273,7 +273,7 @@ def test_what_is_left_out_has_a_default(tmp_path: Path):
         assert attach.direction == pytest.approx((0, 0, -1))
         assert attach.travel_m == 0.03
     stick = plain.assembly.solids["stick"]
-    assert plain.grasps[2].point == pytest.approx(stick.centroid)
+    assert plain.grasps[2].point == pytest.approx((0, 0, 0.003))
     assert plain.grasps[2].across == pytest.approx((0, 1, 0))
 
 
@@ -383,3 +383,89 @@ def test_broken_groups(old: str, new: str, words: list[str], tmp_path: Path):
     message = refused(path)
     for word in words:
         assert word in message
+
+
+BRIDGE, FIXTURE, POCKETS = (
+    (folder("scenarios") / f"{name}.toml").read_text()
+    for name in ("carried_bridge", "vanished_fixture", "pocket_table")
+)
+AWAY = 'goal = { at_mm = [70, 140, 25] }\ncontacts = [["nz", "table.top"]]\n'
+AGAIN = '\n[[operations]]\nmove = "cube"\n{goal}contacts = [["nz", "table.top"]]\n'
+AWAY_TWICE = AWAY + AGAIN.format(goal="goal = { at_mm = [0, 140, 25] }\n")
+STICK_IN = '\n[[operations]]\nmove = "stick"\n'
+
+DISORDER = {
+    "no_such_part": (FIXTURE, 'move = "castle2"', 'move = "castle3"', ["operation 3, move", "'castle3'", "'castle2'?"]),
+    "touches_what_is_not_there": (
+        BRIDGE,
+        '["nz", "castle1.topP"], ["nz", "castle1.topN"]',
+        '["nz", "stick.pz"]',
+        ["operation 3, contacts, contact 1", "'stick' is not there yet"],
+    ),
+    "carried_but_never_touched": (
+        FIXTURE,
+        AWAY,
+        'carries = ["castle1"]\n' + AWAY,
+        ["operation 4, carries", "'castle1' is carried, but no contact", "'cube'", "leave it out"],
+    ),
+    "carried_after_the_contact_is_gone": (
+        POCKETS,
+        'carries = ["cube2", "cube3"]',
+        'carries = ["cube2", "cube3", "cube1"]',
+        ["operation 6, carries", "'cube1' is carried, but no contact that stands"],
+    ),
+    "carried_before_it_is_there": (
+        POCKETS,
+        'move = "cube3"\n',
+        'move = "cube3"\ncarries = ["stick"]\n',
+        ["operation 3, carries", "'stick' is carried before any operation has moved it"],
+    ),
+    "carries_itself": (
+        POCKETS,
+        'carries = ["cube2", "cube3"]',
+        'carries = ["cube2", "stick"]',
+        ["operation 6, carries", "'stick' would carry itself"],
+    ),
+    "carried_twice": (
+        POCKETS,
+        'carries = ["cube2", "cube3"]',
+        'carries = ["cube2", "cube2"]',
+        ["operation 6, carries", "'cube2' stands here twice"],
+    ),
+    "removed_to_where_it_is": (
+        FIXTURE,
+        AWAY,
+        AWAY + AGAIN.format(goal="goal = { at_mm = [70, 140, 25] }\n"),
+        ["operation 5, goal", "'cube' stands there already"],
+    ),
+    "removed_twice": (
+        FIXTURE,
+        AWAY,
+        AWAY_TWICE,
+        ["operation 5, move", "operation 4 has already taken 'cube' away", "take one of the two operations out"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", sorted(DISORDER))
+def test_operations_that_do_not_follow_from_each_other(fault: str, tmp_path: Path):
+    text, old, new, words = DISORDER[fault]
+    assert text.count(old) == 1
+    path = tmp_path / "mine.toml"
+    path.write_text(re.sub(r"(?m)^vary = .*\n", "", text.replace(old, new)))
+    message = refused(path)
+    for word in words:
+        assert word in message
+
+
+def test_a_part_may_be_moved_often_if_each_move_is_of_use(tmp_path: Path):
+    """Parked, then put down as a fixture once more; or parked and carried off; only for nothing it may not be moved."""
+    text = re.sub(r"(?m)^vary = .*\n", "", FIXTURE).replace(AWAY, AWAY_TWICE)
+    path = tmp_path / "mine.toml"
+    stop = AGAIN.format(goal="goal = { at_mm = [-70, -55, 25] }\n")
+    stop = stop.replace('["nz", "table.top"]', '["nz", "table.top"], ["py", "castle1.ny"]')
+    path.write_text(text.replace(STICK_IN, stop + STICK_IN))
+    refused(path)
+    once = text.replace(AWAY_TWICE, AWAY)
+    path.write_text(once.replace(STICK_IN, stop + STICK_IN))
+    assert [operation.main for operation in load_scenario(path).assembly.operations].count("cube") == 3

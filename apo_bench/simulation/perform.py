@@ -37,8 +37,7 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
         hands.add(0, part)
     before, beside, goal = _ends(hands, act, T)
     if act.out.any():
-        hands.move((0, smooth(T, moved(T, act.out, 1.0), STROKE)))
-        T = moved(T, act.out, 1.0)
+        T = _free(hands, T, act.out, clearance_m)
     safe = max(SAFE_M, before[2, 3])
     for end in (at_height(T, max(safe, T[2, 3])), at_height(before, safe), before):
         hands.move((0, smooth(T, end, SPEED, turn_speed=4.0)))
@@ -52,6 +51,14 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
         hands.wait(0.05)
     hands.let_go(0, act.part, *act.carries)
     hands.wait(REST_S)
+
+
+def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
+    """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
+    raised = moved(T, UP, clearance_m)
+    hands.move((0, smooth(T, raised, NUDGE)))
+    hands.move((0, smooth(raised, moved(raised, out, 1.0), STROKE)))
+    return moved(raised, out, 1.0)
 
 
 def _ends(hands: Hands, act: Act, T: Array) -> tuple[Array, Array, Array]:
