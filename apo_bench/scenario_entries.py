@@ -22,6 +22,8 @@ from apo_bench.strict_json import Node
 
 TRAVEL_M = 0.03
 """How far before its goal the line of attach begins, where the file does not say."""
+RAISED = 0.15
+"""Height of a grasp over the middle of the part, as a part of the height of the part."""
 LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""
 
@@ -197,10 +199,10 @@ def _attach(node: Node | None, goal: Array) -> Attach:
 
 
 def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp:
-    """The grasp; at the centroid, across the narrower level axis unless the file says otherwise."""
+    """The grasp; above the middle, across the narrower level axis unless the file says otherwise."""
     keys = node.fields((), ("at_mm", "across")) if node else {}
-    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else solid.centroid
     low, high = solid.bounds
+    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else _above_middle(solid, before)
     if ((point < low) | (point > high)).any():
         span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
         keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
@@ -215,6 +217,14 @@ def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp
     if len(level) < 2:
         refuse(entry, "the part does not stand straight where it is picked; say grasp = { across = [x, y, z] }")
     return Grasp(point, np.eye(3)[min(level, key=lambda axis: (high - low)[axis])])
+
+
+def _above_middle(solid: Solid, T: Array) -> Array:
+    """Over the middle of the part as it stands, so that fingers which reach below it clear what it stands on."""
+    low, high = solid.bounds
+    up = T[2, :3]
+    point: Array = (low + high) / 2 + RAISED * (np.abs(up) @ (high - low)) * up
+    return np.clip(point, low, high)
 
 
 def _shifts(node: Node, operation: int) -> tuple[Shift, ...]:
