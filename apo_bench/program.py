@@ -236,3 +236,5 @@ class ReplayResult:
     peak_force_n: float
     """Largest net contact force on a part that the robot held (the gripper's own forces excluded)."""
     sim_seconds: float
+    timeline: tuple[tuple[Step, float], ...] = ()
+    """Each step that was finished, with the simulated time at which it was over, [s]."""

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact
+from apo_bench.assembly import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
-from apo_bench.geometry.overlap import overlap
 from apo_bench.program import Plan, Poses, Step
 from apo_bench.scenario import Attach, Grasp
 from apo_bench.simulation.grasping import (
@@ -24,14 +23,13 @@ from apo_bench.simulation.grasping import (
     tip_frame,
 )
 from apo_bench.simulation.scene import Scene
+from apo_bench.simulation.touch import later_walls, neighbours, restored, sides_of, slow_before
 from apo_bench.simulation.transfer import Grip, Line, Transfer, key_poses
 
 GRAVITY = 9.81
 PLACE_WEIGHTS, INSERT_WEIGHTS, SLIDE_WEIGHTS = 6.0, 2.5, 0.5
 """Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
-SLOW_M = 0.003
-WALL_MARGIN_M = 0.002
 PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
 """How a part that was taken off is put down, in the world."""
 
@@ -112,16 +110,16 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     part, start, target = operation.main, believed[operation.main], task.target
     T = target @ pose.inverse(start)
     after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
-    contacts = _restored(plan.assembly, k) if undo else operation.contacts
+    contacts = restored(plan.assembly, k) if undo else operation.contacts
     out = _line(scene, _held_by(plan.assembly, task.was, operation.moves), start)
     into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m) if undo else _line(scene, k, target)
     grips, out, into = _grips(scene, task, part, out, into, believed, after)
-    sides = () if into.level else _sides(plan.assembly, contacts, operation.moves, after)
-    leaves = operation.contacts if undo or task.was == k else _restored(plan.assembly, k)
-    away = () if out.level else tuple(-side for side in _sides(plan.assembly, leaves, operation.moves, believed))
+    sides = () if into.level else sides_of(plan.assembly, contacts, operation.moves, after)
+    leaves = operation.contacts if undo or task.was == k else restored(plan.assembly, k)
+    away = () if out.level else tuple(-side for side in sides_of(plan.assembly, leaves, operation.moves, believed))
     weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
-    near = [weight[p] for p in _neighbours(contacts, operation.moves) if p in weight]
+    near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
         part=part,
         carried=operation.carries,
@@ -133,7 +131,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         into=into,
         sides=sides,
         away=away,
-        slow=_slow(plan.assembly, contacts, after, into),
+        slow=slow_before(plan.assembly, contacts, after, into.way),
         weight_n=held,
         place_n=PLACE_WEIGHTS * held,
         insert_n=INSERT_WEIGHTS * min(near, default=held),
@@ -220,64 +218,12 @@ def _centring(
     settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
     place = Place(T, obstacles(assembly.solids, after, (part,)))
     grips = []
-    for wall in _later_walls(assembly, k, part):
+    for wall in later_walls(assembly, k, part):
         if abs((T[:3, :3] @ wall)[2]) < 0.5 and all(abs(T[:3, :3] @ wall @ way) < 0.5 for way in settled):
             settled.append(T[:3, :3] @ wall)
             grasp = clear_across(scene, part, np.abs(wall), place)
             grips += [] if grasp is None else [_grip(scene, part, grasp, T, T)]
     return tuple(grips)
-
-
-def _later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
-    """Normals of the part's faces, (3,) each, that later operations fit or slide something against.
-
-    Only those before the part is moved by itself again.
-    """
-    walls = []
-    for operation in assembly.operations[k + 1 :]:
-        if operation.main == part:
-            break
-        for contact in operation.contacts:
-            walls += [assembly.face(of).normal for of in contact if of.part == part]
-    return walls
-
-
-def _restored(assembly: Assembly, k: int) -> tuple[Contact, ...]:
-    """The contacts that operation k broke: undoing it makes them again."""
-    return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)
-
-
-def _sides(
-    assembly: Assembly, contacts: tuple[Contact, ...], moved: tuple[str, ...], poses: Poses
-) -> tuple[Array, ...]:
-    """The level directions in which the moved part comes to lie against another one, none twice."""
-    sides: list[Array] = []
-    for contact in contacts:
-        if assembly.is_fit(contact):
-            continue
-        rests = contact.environment if contact.manipulated.part in moved else contact.manipulated
-        side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
-        if abs(side[2]) < 0.5 and not any(side @ other > 0.99 for other in sides):
-            sides.append(side)
-    return tuple(sides)
-
-
-def _slow(assembly: Assembly, contacts: tuple[Contact, ...], poses: Poses, into: Line) -> float:
-    """How far before the goal a motion from above turns slow: where the first wall begins, or just above the floor."""
-    depth = SLOW_M
-    for contact in contacts:
-        m, e = contact
-        wall = assembly.face(e)
-        if assembly.is_fit(contact) and abs(poses[e.part][:3, :3] @ wall.normal @ into.way) < 0.5:
-            corners = overlap(assembly.face(m), poses[m.part], wall, poses[e.part]).corners
-            if len(corners):
-                depth = max(depth, float(np.ptp(corners @ into.way)) + WALL_MARGIN_M)
-    return depth
-
-
-def _neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:
-    """What the moved part touches."""
-    return {of.part for contact in contacts for of in contact} - set(moved)
 
 
 def _mass(scene: Scene, part: str) -> float:

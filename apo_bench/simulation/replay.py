@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.outcomes import sentence
-from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot
+from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step
 from apo_bench.simulation.prepare import Move, moves, unreachable
 from apo_bench.simulation.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene import Scene
@@ -30,8 +30,8 @@ def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses
     """
     robot = Robot(scene, plan.start if parts_at is None else parts_at, watch)
     after: list[Snapshot | None] = [None] * len(plan.assembly)
-    todo = moves(plan, scene)
-    outcome = _refusal(plan, scene, todo) or _carry_out(plan, robot, todo, after)
+    todo, timeline = moves(plan, scene), list[tuple[Step, float]]()
+    outcome = _refusal(plan, scene, todo) or _carry_out(plan, robot, todo, after, timeline)
     final = None
     if outcome.code != "unstable_simulation":
         final = _settled(robot, plan)
@@ -40,6 +40,7 @@ def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses
         outcome=outcome,
         peak_force_n=robot.peak_force_n,
         sim_seconds=float(robot.data.time),
+        timeline=tuple(timeline),
     )
 
 
@@ -66,7 +67,13 @@ def _stages(plan: Plan) -> list[tuple[int, Array]]:
     return found
 
 
-def _carry_out(plan: Plan, robot: Robot, todo: tuple[Move, ...], after: list[Snapshot | None]) -> Outcome:
+def _carry_out(
+    plan: Plan,
+    robot: Robot,
+    todo: tuple[Move, ...],
+    after: list[Snapshot | None],
+    timeline: list[tuple[Step, float]],
+) -> Outcome:
     robot.wait(0.05)
     for step, t in todo:
         try:
@@ -77,6 +84,7 @@ def _carry_out(plan: Plan, robot: Robot, todo: tuple[Move, ...], after: list[Sna
                 after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
             return _outcome(plan, halt.stage, halt.code, step.operation)
         after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
+        timeline.append((step, float(robot.data.time)))
     return Outcome("done", "ok", None, sentence("ok"))
 
 
