@@ -7,10 +7,10 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.outcomes import sentence
 from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step
+from apo_bench.simulation.carry_out import carry_out
 from apo_bench.simulation.prepare import Move, moves, unreachable
 from apo_bench.simulation.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.transfer import transfer
 from apo_bench.simulation.world import snapshot
 from apo_bench.stability import unstable
 
@@ -77,7 +77,7 @@ def _carry_out(
     robot.wait(0.05)
     for step, t in todo:
         try:
-            transfer(robot, t)
+            carry_out(robot, t)
             _until_rest(robot)
         except Halt as halt:
             if halt.code == "force_stop" and not step.undo:

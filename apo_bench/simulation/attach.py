@@ -1,0 +1,84 @@
+"""The last stretch to a goal, and the first one out of it: guarded lines, from above, level, and onto a side."""
+
+from __future__ import annotations
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.fingers import change
+from apo_bench.simulation.paths import moved, smooth, steady
+from apo_bench.simulation.robot import Guard, Robot
+from apo_bench.simulation.transfer import ASIDE_M, UP, Grip, Transfer, aim
+
+PLACE, TOUCH, INSERT, SLIDE = 0.06, 0.01, 0.06, 0.005
+"""Steady speeds [m/s]: down to just above the support, onto it, along an insertion, against a part at the side."""
+PULL, LEAVE = 0.1, 0.03
+"""Peak speeds [m/s] of a part that is pulled out, and of one that is moved off a side."""
+OVERTRAVEL_M = 0.002
+"""Contact is sought this far beyond the goal."""
+ARRIVED_M = 0.001
+"""An insertion that stops earlier than this before its end was stopped by force."""
+BEYOND_M, OFF_M = 0.004, 0.0003
+"""A slide may go this much beyond the goal, this high over the floor."""
+
+
+def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
+    """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
+    robot.stage = "attach"
+    guard, rise = Guard(t.into.way, t.insert_n), t.floats
+    if t.into.left is not None and second is not None:
+        there = moved(moved(t.T_world_goal, t.into.way, -t.into.left), rise, 1.0)
+        left = robot.follow(steady(robot.T, there @ grip.T_part_tip, INSERT), guard)
+        if left > ARRIVED_M:
+            return left + t.into.left, grip
+        change(robot, t, grip, second, moved(there, rise, -1.0) @ second.T_part_tip)
+        grip, rise = second, t.clearance * UP
+        robot.follow(smooth(robot.T, moved(robot.T, rise, 1.0), 0.01))
+    left = robot.follow(steady(robot.T, moved(t.T_world_goal @ grip.T_part_tip, rise, 1.0), INSERT), guard)
+    lower = moved(robot.T, UP, -rise[2] - OVERTRAVEL_M)
+    robot.follow(steady(robot.T, lower, TOUCH), Guard(-UP, t.place_n))
+    robot.wait(0.05)
+    return left, grip
+
+
+def come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
+    """From above, slowly where contact may come any moment, until the part stands; then onto its sides."""
+    robot.stage = "attach"
+    down = Guard(t.into.way, t.place_n)
+    goal = aim(t) @ grip.T_part_tip
+    left = robot.follow(steady(robot.T, moved(goal, t.into.way, -t.slow), PLACE), down)
+    if left == 0.0:
+        robot.follow(steady(robot.T, moved(goal, t.into.way, OVERTRAVEL_M), TOUCH), down)
+    robot.wait(0.05)
+    for side in t.sides:
+        _slide(robot, t, side)
+
+
+def _slide(robot: Robot, t: Transfer, side: Array) -> None:
+    """Off the floor by a hair, sideways until it touches, and down again."""
+    robot.follow(smooth(robot.T, moved(robot.T, UP, OFF_M), 0.01))
+    robot.wait(0.05)
+    robot.follow(steady(robot.T, moved(robot.T, side, ASIDE_M + BEYOND_M), SLIDE), Guard(side, t.slide_n))
+    robot.follow(steady(robot.T, moved(robot.T, UP, -OFF_M - OVERTRAVEL_M), TOUCH), Guard(-UP, t.place_n))
+    robot.wait(0.05)
+
+
+def pull_out(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> Grip:
+    """Backwards along the way of an insertion; returns the grip at its end."""
+    robot.stage = "lift"
+    robot.follow(smooth(robot.T, moved(robot.T, t.floats, 1.0), 0.01))
+    if t.out.left is None or second is None:
+        robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.travel), PULL))
+        return grip
+    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.left), PULL))
+    part = moved(t.T_world_start, t.out.way, -t.out.left)
+    change(robot, t, grip, second, part @ second.T_part_tip)
+    robot.follow(smooth(robot.T, moved(robot.T, t.floats, 1.0), 0.01))
+    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, t.out.left - t.out.travel), PULL))
+    return second
+
+
+def leave(robot: Robot, t: Transfer) -> None:
+    """Off what the part touches at its side, before it is lifted."""
+    if t.away:
+        robot.follow(smooth(robot.T, moved(robot.T, UP, OFF_M), 0.01))
+    for side in t.away:
+        robot.follow(smooth(robot.T, moved(robot.T, side, ASIDE_M), LEAVE))

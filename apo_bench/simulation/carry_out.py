@@ -1,0 +1,66 @@
+"""One part, with what it carries, from one place to another: pick, lift, carry, attach, release, depart."""
+
+from __future__ import annotations
+
+from apo_bench.simulation.attach import ARRIVED_M, come_down, insert, leave, pull_out
+from apo_bench.simulation.fingers import centre, check_grasp, depart, grasp, release
+from apo_bench.simulation.paths import at_height, moved, smooth
+from apo_bench.simulation.robot import Halt, Robot
+from apo_bench.simulation.transfer import SAFE_M, UP, Grip, Transfer, aim
+
+LIFT, CARRY, LOWER = 0.25, 0.35, 0.2
+"""Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
+LOST_LOAD = 0.8
+"""A hand that feels less than this part of the weight of a group has lost some of it."""
+
+
+def carry_out(robot: Robot, t: Transfer) -> None:
+    """Carry it out.
+
+    Raises:
+        Halt: Something went wrong; the stage and code say what.
+    """
+    grips = iter(t.grips)
+    grip = next(grips)
+    _pick(robot, t, grip)
+    if t.out.level:
+        grip = pull_out(robot, t, grip, next(grips) if t.out.left is not None else None)
+    _lift(robot, t)
+    _carry(robot, t, grip)
+    if t.into.level:
+        left, grip = insert(robot, t, grip, next(grips) if t.into.left is not None else None)
+    else:
+        come_down(robot, t, grip)
+        left = 0.0
+    release(robot, t, grip)
+    depart(robot)
+    if left > ARRIVED_M:
+        raise Halt("attach", "force_stop")
+    for other in t.centring:
+        centre(robot, t, other)
+
+
+def _pick(robot: Robot, t: Transfer, grip: Grip) -> None:
+    robot.stage = "pick"
+    grasp(robot, t, grip, t.T_world_start @ grip.T_part_tip)
+
+
+def _lift(robot: Robot, t: Transfer) -> None:
+    robot.stage = "lift"
+    if t.carried:
+        robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.02))
+    leave(robot, t)
+    robot.follow(smooth(robot.T, at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
+
+
+def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
+    robot.stage = "carry"
+    before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
+    if t.into.level:
+        before = moved(before, t.floats, 1.0)
+    robot.follow(smooth(robot.T, at_height(before, max(SAFE_M, before[2, 3])), CARRY))
+    robot.follow(smooth(robot.T, before, LOWER))
+    robot.wait(0.1)
+    check_grasp(robot, grip)
+    if t.carried and robot.scene.grasp == "friction" and robot.load() < LOST_LOAD * t.weight_n:
+        raise Halt("carry", "lost_grasp")
