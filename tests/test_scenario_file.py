@@ -272,7 +272,6 @@ def test_what_is_left_out_has_a_default(tmp_path: Path):
     for attach in plain.attach:
         assert attach.direction == pytest.approx((0, 0, -1))
         assert attach.travel_m == 0.03
-    stick = plain.assembly.solids["stick"]
     assert plain.grasps[2].point == pytest.approx((0, 0, 0.003))
     assert plain.grasps[2].across == pytest.approx((0, 1, 0))
 
