@@ -73,7 +73,7 @@ class Graph:
     step: int
     """How many operations are done."""
     nodes: tuple[Node, ...]
-    """Parts that were never moved first, then in the order in which they were placed, main parts before carried ones."""
+    """Parts that were never moved first, then as they were placed, main parts before those they carried."""
     arcs: tuple[Arc, ...]
 
     def stands(self, node: Node) -> bool:
