@@ -21,11 +21,12 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.layout import layout_at
 from apo_bench.program import Demonstration, Observation, Plan, Poses, Step
 from apo_bench.scenario import Scenario
+from apo_bench.schedule import REMEDY, fault
 from apo_bench.strict_json import Node, read_json
 
 DEMONSTRATION = "apo-bench/demonstration/1"
 OBSERVATION = "apo-bench/observation/1"
-PLAN = "apo-bench/plan/1"
+PLAN = "apo-bench/plan/2"
 
 _POSE = ("position_mm", "quaternion_wxyz")
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -59,11 +60,11 @@ def observation_form(seen: Observation, scenario: str) -> Form:
 
 
 def plan_form(plan: Plan, scenario: str) -> Form:
-    """The JSON form of a plan."""
+    """The JSON form of a plan; a step has a pose of its own where that is not the goal of its operation."""
     return {
         **_head(PLAN, scenario, plan.start),
         "operations": _operations_form(plan.assembly, plan.goals, [{}] * len(plan.assembly)),
-        "schedule": [{"operation": step.operation + 1, "undo": step.undo} for step in plan.schedule],
+        "schedule": [_step_form(plan, step, T) for step, T in zip(plan.schedule, plan.targets, strict=True)],
     }
 
 
@@ -127,13 +128,13 @@ def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
     """A plan from its file; see `read_observation` for `scenario` and errors."""
     root = _root(path, PLAN, ("start", "operations", "schedule"), ())
     found = _scenario(root["scenario"], scenario, Path(path).parent)
-    entries = _operations(root["operations"], found.assembly, (), ())
-    return Plan(
-        assembly=found.assembly,
-        start=_poses(root["start"], found),
-        goals=np.array([_pose(entry) for entry in entries]),
-        schedule=tuple(_step(node, len(found.assembly)) for node in root["schedule"].items("schedule entry")),
-    )
+    goals = np.array([_pose(entry) for entry in _operations(root["operations"], found.assembly, (), ())])
+    steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]
+    schedule = tuple(step for step, _ in steps)
+    if steps and (wrong := fault(schedule, len(goals))):
+        raise InputError(f"{path}, schedule: it {wrong}; {REMEDY}.")
+    targets = np.array([T for _, T in steps] or goals)
+    return Plan(found.assembly, _poses(root["start"], found), goals, schedule, targets)
 
 
 def _own_start(scenario: Scenario) -> Poses:
@@ -249,9 +250,17 @@ def _named(entry: Mapping[str, Node], by_deviation: list[str]) -> str:
     return " with ".join(f"'{key}'" for key in given) or "neither"
 
 
-def _step(node: Node, count: int) -> Step:
-    fields = node.fields(("operation",), ("undo",))
+def _step_form(plan: Plan, step: Step, target: Array) -> Form:
+    own = {} if np.array_equal(target, plan.goals[step.operation]) else _pose_form(target)
+    return {"operation": step.operation + 1, "undo": step.undo, **own}
+
+
+def _step(node: Node, goals: Array) -> tuple[Step, Array]:
+    """A step of the schedule and its target, which is the goal of its operation if none is stated."""
+    stated = isinstance(node.value, dict) and any(key in node.value for key in _POSE)
+    fields = node.fields(("operation", *_POSE) if stated else ("operation",), ("undo",) if stated else ("undo", *_POSE))
     number = fields["operation"].integer()
-    if not 1 <= number <= count:
-        fields["operation"].fail(f"an operation from 1 to {count} is needed")
-    return Step(number - 1, fields["undo"].flag() if "undo" in fields else False)
+    if not 1 <= number <= len(goals):
+        fields["operation"].fail(f"an operation from 1 to {len(goals)} is needed")
+    step = Step(number - 1, fields["undo"].flag() if "undo" in fields else False)
+    return step, _pose(fields) if stated else goals[step.operation]

@@ -17,6 +17,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 from apo_bench.names import resolve
 from apo_bench.program import Correction, Observation
+from apo_bench.schedule import REMEDY, fault
 
 Corrector = Callable[[Observation], Correction]
 """Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
@@ -31,6 +32,7 @@ CORRECTORS = MappingProxyType(
         "no-disappeared": "apo_bench.correction.ablations:no_disappeared",
     }
 )
+RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
 STATUSES = ("converged", "not_seen", "inconsistent", "not_converged", "not_finite")
 
 
@@ -42,7 +44,7 @@ def correct(seen: Observation, corrector: Any = "paper") -> Correction:
             bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
 
     Raises:
-        InputError: There is no such corrector, or it returned something else.
+        InputError: There is no such corrector, or it returned something else, or a schedule that makes no sense.
     """
     chosen = resolve(corrector, CORRECTORS, "corrector")
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
@@ -64,7 +66,24 @@ def correct(seen: Observation, corrector: Any = "paper") -> Correction:
             f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
         )
     _bare(found.goals, len(seen.goals), name)
+    _check_schedule(found, name)
     return found
+
+
+def _check_schedule(found: Correction, name: str) -> None:
+    if found.schedule and (wrong := fault(found.schedule, len(found.goals))):
+        raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {REMEDY}.")
+    if found.targets is None:
+        return
+    if not found.schedule:
+        raise InputError(
+            f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets."
+        )
+    for i in np.flatnonzero(~rigid(found.targets)):
+        raise InputError(
+            f"the corrector '{name}' returned a target for step {i + 1} of its schedule that is not a rigid pose; "
+            f"{RIGID}."
+        )
 
 
 def _bare(found: Any, n: int, name: str) -> Array:
@@ -78,8 +97,7 @@ def _bare(found: Any, n: int, name: str) -> Array:
         raise InputError(f"the corrector '{name}' returned {given}; return a Correction or goals of shape ({n}, 4, 4).")
     for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~rigid(goals)):
         raise InputError(
-            f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; "
-            "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)."
+            f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; {RIGID}."
         )
     return goals
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from apo_bench.assembly import Assembly, Operation
@@ -9,6 +11,7 @@ from apo_bench.correction.candidates import candidates
 from apo_bench.correction.ending import refused, sentence, status
 from apo_bench.correction.equations import equations, gap, largest
 from apo_bench.correction.newton import solve
+from apo_bench.geometry.arrays import Array
 from apo_bench.placement import placed
 from apo_bench.program import Correction, Observation
 
@@ -27,21 +30,20 @@ def no_history(seen: Observation) -> Correction:
     if not seen.seen.all():
         return refused(seen)
     last = {part: k for k, operation in enumerate(seen.assembly.operations) for part in operation.moves}
-    end, parts = _end(seen.assembly, tuple(last)), tuple(last)
-    poses = np.array([placed(seen.assembly, seen.start, seen.goals)[-1][part] for part in parts]).reshape(-1, 4, 4)
+    poses = _poses(seen, tuple(last))
+    end = _end(seen.assembly, tuple(last))
     system = equations(end, seen.start, poses)
-    freed = candidates(end, ~(system.gaps(poses) <= seen.gap_m))
-    found = solve(system.among(system.containing(freed)), poses, freed)
+    free = candidates(end, ~(system.gaps(poses) <= seen.gap_m))
+    found = solve(system.among(system.containing(free)), poses, free)
     ended = status(found, largest(system.gaps(found.goals)), seen.gap_m)
-    main = {last[parts[i]]: found.goals[i] for i in freed if seen.assembly.operations[last[parts[i]]].main == parts[i]}
+    freed = _main(seen.assembly, last, free)
     goals = np.array(seen.goals)
-    for k, T in main.items():
-        goals[k] = T
+    goals[list(freed)] = found.goals[list(freed.values())]
     return Correction(
         goals=goals,
         status=ended,
         sentence=sentence(ended, seen.gap_m, "every contact that stands at the end"),
-        freed=tuple(sorted(main, reverse=True)),
+        freed=tuple(freed),
         gap_before_m=gap(seen.assembly, seen.start, seen.goals),
         gap_after_m=gap(seen.assembly, seen.start, goals),
         rank=found.rank,
@@ -49,9 +51,20 @@ def no_history(seen: Observation) -> Correction:
     )
 
 
+def _poses(seen: Observation, parts: tuple[str, ...]) -> Array:
+    """Where the motion parameters leave these parts, (parts, 4, 4), world frame, [m]."""
+    final = placed(seen.assembly, seen.start, seen.goals)[-1] if parts else {}
+    return np.array([final[part] for part in parts]).reshape(-1, 4, 4)
+
+
 def _end(assembly: Assembly, parts: tuple[str, ...]) -> Assembly:
-    """Every moved part put where it stands by an operation of its own, then all contacts that stand."""
+    """Every moved part put where it stands by an operation of its own; the last one finds all contacts that stand."""
     standing = tuple(relation.contact for relation in assembly.relations() if relation.lost is None)
-    *others, final = parts or ("",)
-    operations = (*map(Operation, others), Operation(final, standing)) if parts else ()
+    operations = tuple(Operation(part, standing if part == parts[-1] else ()) for part in parts)
     return Assembly(assembly.solids, operations, assembly.fixed)
+
+
+def _main(assembly: Assembly, last: Mapping[str, int], free: tuple[int, ...]) -> dict[int, int]:
+    """Operation -> number of the free part that it moved last as its main part, the most recent first."""
+    numbered = {k: i for i, (part, k) in enumerate(last.items()) if assembly.operations[k].main == part}
+    return {k: numbered[k] for k in sorted(numbered, reverse=True) if numbered[k] in free}

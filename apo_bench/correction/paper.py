@@ -43,7 +43,7 @@ def at_once(seen: Observation, known: NDArray[np.bool_]) -> Correction:
     return Correction(
         goals=goals,
         status=ended,
-        sentence=sentence(ended, seen.gap_m),
+        sentence=sentence(ended, seen.gap_m, "every contact" if known.all() else "every contact that was kept"),
         freed=freed,
         gap_before_m=largest(before),
         gap_after_m=largest(system.gaps(goals)),

@@ -69,7 +69,7 @@ def follow(seen: Observation, sets: Sets) -> Correction:
         targets += [now[step.operation] if step.undo else steps[-1].goals[step.operation] for step in back]
         schedule += back
         now = np.concatenate([steps[-1].goals, now[n + 1 :]])
-    return _report(seen, now, steps, tuple(schedule), np.array(targets).reshape(-1, 4, 4))
+    return _report(seen, now, steps, tuple(schedule), np.array(targets) if targets else None)
 
 
 def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
