@@ -1,4 +1,4 @@
-"""The command line: `apo-bench scenarios | scene | replay | sweep | report`.
+"""The command line: `apo-bench scenarios | graph | scene | replay | sweep | report`.
 
 Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
 request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees.
@@ -84,12 +84,51 @@ def _options(
 
 
 @app.command()
-def scenarios() -> None:
-    """List the scenarios that come with the package."""
+def scenarios(
+    scenario: Annotated[str | None, typer.Argument(help="Print the task card of this one; a name or a file.")] = None,
+) -> None:
+    """List the scenarios that come with the package, or print the task card of one."""
+    from apo_bench.benchmark.card import card
     from apo_bench.benchmark.terminal import print_scenarios
     from apo_bench.scenario_file import load_scenario, scenario_names
 
-    print_scenarios([load_scenario(name) for name in scenario_names()])
+    if scenario is None:
+        print_scenarios([load_scenario(name) for name in scenario_names()])
+    else:
+        typer.echo(card(load_scenario(scenario)), nl=False)
+
+
+@app.command()
+def graph(
+    scenario: ScenarioArgument,
+    step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
+    observation: Annotated[Path | None, typer.Option(help="Show the residuals of this observation file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Draw it into this file: .svg or .png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
+    from apo_bench.benchmark.graph_picture import draw_graph
+    from apo_bench.benchmark.graph_text import graph_form, graph_lines, graph_title
+    from apo_bench.files import read_observation
+    from apo_bench.graph import relation_graph, seen_residuals
+    from apo_bench.scenario_file import load_scenario
+
+    if out is not None:
+        _check_writable(out, "--out", (".svg", ".png"))
+    loaded = load_scenario(scenario)
+    found = relation_graph(loaded.assembly, step)
+    seen = None if observation is None else read_observation(observation, loaded)
+    residuals = None if seen is None else seen_residuals(seen, found)
+    gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
+    if as_json:
+        typer.echo(json.dumps(graph_form(loaded.name, found, residuals), allow_nan=False))
+    else:
+        typer.echo("\n".join(graph_lines(loaded.name, found, residuals, gap_m)))
+    if out is not None:
+        title = graph_title(loaded.name, found)
+        draw_graph(found, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
+        if not as_json:
+            typer.echo(f"\nWrote {out}")
 
 
 @app.command()

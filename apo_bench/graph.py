@@ -6,7 +6,7 @@ have now; one that disappeared joins those they had when it was made, and keeps 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -14,7 +14,10 @@ from apo_bench.assembly import ODL, Assembly, Contact, Relation, inverted, simpl
 from apo_bench.correction.equations import equations, largest
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.program import Poses
+from apo_bench.program import Observation, Poses
+
+Residuals = Sequence[float | None]
+"""The largest |e| of every arc, [m]; None where an operation was not seen."""
 
 
 @final
@@ -102,6 +105,13 @@ def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) 
     done = assembly.first(graph.step)
     systems = (equations(_only(done, arc), start, goals[: graph.step]) for arc in graph.arcs)
     return tuple(largest(system.residual(goals[: graph.step])) for system in systems)
+
+
+def seen_residuals(seen: Observation, graph: Graph) -> tuple[float | None, ...]:
+    """The same at what was seen; None for an arc whose equations need an operation that was not."""
+    residuals = arc_residuals(seen.assembly, seen.start, seen.goals, graph)
+    known = [all(seen.seen[k] for k in arc.operations) for arc in graph.arcs]
+    return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))
 
 
 def _known(assembly: Assembly, step: int) -> Assembly:

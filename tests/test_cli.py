@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from apo_bench import cli
 from apo_bench.benchmark.journal import read_rows
-from apo_bench.scenario_file import scenario_names
+from apo_bench.scenario_file import load_scenario, scenario_names
 
 TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld")
 HOPELESS = ("--level", "40")
@@ -34,7 +35,79 @@ def test_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert [line.split()[0] for line in out.splitlines()[1:]] == list(scenario_names())
 
 
-@pytest.mark.parametrize("arguments", [[], ["--help"], ["replay", "--help"], ["sweep", "--help"]])
+def test_the_card_of_a_scenario_is_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from apo_bench.benchmark.card import card
+    from apo_bench.resources import folder
+
+    loaded = load_scenario("vanished_fixture")
+    assert run(capsys, "scenarios", "vanished_fixture") == (0, card(loaded), "")
+    path = tmp_path / "mine.toml"
+    path.write_text((folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    _, out, _ = run(capsys, "scenarios", str(path))
+    assert out == card(loaded).replace("vanished_fixture:", "mine:")
+
+
+def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "graph", "pocket_table")
+    assert (code, err) == (0, "")
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert lines[0] == "pocket_table after operation 6"
+    for line in (
+        "cube2 (6): T6 T5^-1 T2",
+        "cube1 (1): T1 moved on",
+        "R4 cube3 -> cube1 made 3, lost at 4 [px-nx]",
+        "R8 cube2 -> table made 6 [nz-A_fl px-A_px nx-A_nx py-A_py ny-A_ny]",
+    ):
+        assert line in lines
+    _, out, _ = run(capsys, "graph", "pocket_table", "--step", "3")
+    assert "lost" not in out
+    assert "R5" not in out
+
+
+def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path, picture = _castle_aside(tmp_path, 3.0), tmp_path / "graph.svg"
+    asked = ("graph", "stick_in_tower", "--observation", str(path))
+    code, out, err = run(capsys, *asked, "--json", "--out", str(picture))
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    found = json.loads(out)
+    assert (found["schema"], found["step"]) == ("apo-bench/graph/1", 3)
+    assert [arc["residual_mm"] for arc in found["arcs"]] == pytest.approx([0, 0, 0, 3], abs=1e-6)
+    stick = {"part": "stick", "placed": 3, "odl": "T3"}
+    assert found["arcs"][3]["manipulated"] == stick
+    assert found["nodes"][-1] == {**stick, "stands": True}
+    assert picture.read_bytes().startswith(b"<?xml")
+    _, out, _ = run(capsys, *asked)
+    assert out.splitlines()[-1].endswith("[pz-sfl py-sny ny-spy]  3.000 mm, above 0.1")
+
+
+def test_a_graph_says_what_was_not_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = _castle_aside(tmp_path, 3.0)
+    document = json.loads(path.read_text())
+    document["operations"][1]["seen"] = False
+    path.write_text(json.dumps(document))
+    _, out, _ = run(capsys, "graph", "stick_in_tower", "--observation", str(path), "--json")
+    known = [arc["residual_mm"] is not None for arc in json.loads(out)["arcs"]]
+    assert known == [True, False, True, False]
+    _, out, _ = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
+    assert out.splitlines()[-1].endswith("not seen")
+
+
+def _castle_aside(folder: Path, mm: float) -> Path:
+    """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
+    from apo_bench.files import observation_form, write_form
+    from apo_bench.geometry import pose
+    from apo_bench.program import Observation
+
+    scenario = load_scenario("stick_in_tower")
+    n = len(scenario.assembly)
+    goals = np.array(scenario.goals)
+    goals[1] = goals[1] @ pose.at((0.0, mm * 1e-3, 0.0))
+    seen = Observation(scenario.assembly, scenario.start, goals, np.tile(np.eye(6) * 1e-6, (n, 1, 1)), np.ones(n, bool))
+    write_form(observation_form(seen, "stick_in_tower"), folder / "seen.json")
+    return folder / "seen.json"
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["graph", "--help"], ["replay", "--help"], ["sweep", "--help"]])
 def test_help_is_a_result(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, *arguments)
     assert (code, err) == (0, "")
@@ -215,6 +288,14 @@ def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture
         (("sweep", "stick_in_tower", "stick_in", "--out", "OUT"), "unknown scenario 'stick_in'"),
         (("sweep", "stick_in_tower", "--out", "/proc/none", "--trials", "1"), "cannot be written"),
         (("report", "/no/such/folder"), "holds no sweep"),
+        (("scenarios", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("graph", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("graph", "pocket_table", "--step", "0"), "give a step from 1 to 6"),
+        (("graph", "pocket_table", "--step", "7"), "step 7 was given"),
+        (("graph", "pocket_table", "--step", "x"), "--step"),
+        (("graph", "pocket_table", "--out", "graph.pdf"), "ends in .svg or .png"),
+        (("graph", "pocket_table", "--out", "/no/such/folder/graph.svg"), "cannot be written"),
+        (("graph", "pocket_table", "--observation", "/no/such/seen.json"), "cannot be read"),
     ],
 )
 def test_a_wrong_request_is_one_sentence(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.graph_layout import Layout, arranged
-from apo_bench.graph import Arc, Graph, Node
+from apo_bench.graph import Arc, Graph, Node, Residuals
 
 INK, GONE, ALARM = "#222222", "#8A8A8A", "#C8102E"
 GROUND = "#E4E4E4"
@@ -17,8 +17,6 @@ MARGIN, HEAD, FOOT = 0.15, 0.32, 0.3
 """Inches around the graph, and for the title above it and the words below it."""
 DASHES = (0, (4, 2.5))
 
-Residuals = Sequence[float | None]
-"""Of every arc, [m]; None where an operation was not seen."""
 Colors = Mapping[str, tuple[float, float, float]]
 
 

@@ -1,0 +1,31 @@
+"""Write the task cards and draw the relation graphs of all scenarios: `python docs/cards.py` (seconds)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from apo_bench.benchmark.card import cards
+from apo_bench.benchmark.graph_picture import draw_graph
+from apo_bench.benchmark.graph_text import graph_title
+from apo_bench.graph import relation_graph
+from apo_bench.scenario_file import load_scenario, scenario_names
+
+HERE = Path(__file__).parent
+PICTURE = "pictures/graph_{}.png"
+
+
+def main() -> None:
+    scenarios = [load_scenario(name) for name in scenario_names()]
+    (HERE / "scenarios.md").write_text(cards(scenarios, "python docs/cards.py", PICTURE), encoding="utf-8")
+    for scenario in scenarios:
+        graph = relation_graph(scenario.assembly)
+        draw_graph(
+            graph,
+            HERE / PICTURE.format(scenario.name),
+            title=graph_title(scenario.name, graph),
+            colors=scenario.colors,
+        )
+
+
+if __name__ == "__main__":
+    main()
