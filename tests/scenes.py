@@ -168,6 +168,17 @@ def bridge() -> Scene:
     return scene(solids, operations, [mm(-25, 0, 25), mm(25, 0, 25), mm(0, 0, 60)])
 
 
+def fixture_alignment() -> Scene:
+    """Fig. 5: block A pushed against the fixture B, which is taken away again."""
+    operations = [
+        Operation("B", touch("B", "table", "nz-top")),
+        Operation("A", touch("A", "table", "nz-top") + touch("A", "B", "px-nx")),
+        Operation("B", touch("B", "table", "nz-top")),
+    ]
+    solids = [table(), block("B"), block("A")]
+    return scene(solids, operations, [mm(50, 0, 25), mm(0, 0, 25), mm(150, 0, 25)])
+
+
 def stick_on_castles() -> Scene:
     """Fig. 3: a stick in the slots of two castles."""
     operations = [
@@ -239,12 +250,27 @@ def pockets() -> Scene:
 
 ALL = {
     "bridge": bridge,
+    "fixture_alignment": fixture_alignment,
     "stick_on_castles": stick_on_castles,
     "stick_in_tower": stick_in_tower,
     "subassembly_on_castles": subassembly_on_castles,
     "fixture": fixture,
     "pockets": pockets,
 }
+
+
+def careless(name: str, mm: float, low_mm: float = 0.0) -> tuple[Scene, Array]:
+    """An example of Section 5 or Fig. 6 and what is seen of it: a part put aside, unnoticed, and mended at the end.
+
+    Args:
+        mm: How far aside: operation 2 along y, in example 5.3 with castle 2 against the cube, in Fig. 6 along x.
+        low_mm: How far a stick sinks in its slot or hole, the clearance, before it is seen.
+    """
+    built, goals = ALL[name](), ALL[name]().goals.copy()
+    goals[[1, 2] if name == "fixture" else [1], 0 if name == "pockets" else 1, 3] += mm * 1e-3
+    lying = {"stick_in_tower": [2], "subassembly_on_castles": [3], "fixture": [4], "pockets": [4]}[name]
+    goals[lying, 2, 3] -= low_mm * 1e-3
+    return built, goals
 
 
 def noisy(goals: Array, rng: np.random.Generator, mm: float, deg: float) -> Array:

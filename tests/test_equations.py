@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly import Assembly, Contact, Operation, PartFace
 from apo_bench.correction.equations import equations, gap
@@ -162,6 +162,35 @@ def test_only_equations_with_a_free_motion_parameter_take_part() -> None:
     assert len(freed) == 92 - 4  # the fixture put aside by the fourth operation
     assert freed.variables(6) == (5, 4, 2, 1, 0)
     assert len(equations(scene.assembly, scene.start, scene.goals, set())) == 0
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_equations_of_some_contacts_are_some_of_the_equations(seed: int) -> None:
+    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    system = equations(scene.assembly, scene.start, scene.goals)
+    assert system.made.tolist() == [relation.made for relation in scene.assembly.relations()]
+    moved = scenes.noisy(scene.goals, rng, 5.0, 5.0)
+    e, J = system.linearised(moved)
+    kept = rng.random(len(system.made)) < 0.5
+    some = system.among(kept)
+    assert_array_equal(some.residual(moved), e[kept[system.contact]])
+    assert_array_equal(some.linearised(moved)[1], J[kept[system.contact]])
+    assert_array_equal(some.gaps(moved), system.gaps(moved)[kept])
+    expected = [np.abs(e[system.contact == c]).max() for c in range(len(system.made))]
+    assert_array_equal(system.gaps(moved), expected)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_equations_contain_what_their_derivative_depends_on(seed: int) -> None:
+    scene = random_scene(seed)
+    system = equations(scene.assembly, scene.start, scene.goals)
+    _, J = system.linearised(scene.goals)
+    for k in range(len(scene.goals)):
+        rows = system.containing({k})[system.contact]
+        assert not J[~rows, 6 * k : 6 * k + 6].any()
+        assert len(equations(scene.assembly, scene.start, scene.goals, {k})) == np.count_nonzero(rows)
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,55 @@ def test_a_plan_comes_back_with_its_schedule(tmp_path: Path) -> None:
     assert back.schedule == schedule
 
 
+@QUICK
+@given(seed=st.integers(0, 2**32))
+def test_a_plan_comes_back_with_its_targets(seed: int, tmp_path: Path) -> None:
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = observation(seed).goals[[0, 1, 1, 2, 2]]
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(seed).goals[[0, 2, 2]], schedule, targets)
+    form = files.plan_form(plan, "stick_in_tower")
+    assert ["position_mm" in entry for entry in form["schedule"]] == [False, True, True, False, False]
+    files.write_form(form, tmp_path / "plan.json")
+    back = files.read_plan(tmp_path / "plan.json", SCENARIO)
+    assert back.schedule == schedule
+    np.testing.assert_allclose(back.targets, targets, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.goals, plan.goals, rtol=0, atol=1e-13)
+
+
+def test_a_plan_without_a_schedule_does_everything_once(tmp_path: Path) -> None:
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
+    form = files.plan_form(plan, "stick_in_tower") | {"schedule": []}
+    files.write_form(form, tmp_path / "plan.json")
+    back = files.read_plan(tmp_path / "plan.json")
+    assert back.schedule == plan.schedule == (Step(0), Step(1), Step(2))
+    np.testing.assert_array_equal(back.targets, back.goals)
+
+
+HALF = {"operation": 1, "position_mm": [0.0, 0.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("schedule", "words"),
+    [
+        ([{"operation": 1}, {"operation": 2}], "plan.json, schedule: it leaves operation 3 undone; do every operation"),
+        ([{"operation": 1, "undo": True}], "schedule: it undoes operation 1, which is not done"),
+        ([{"operation": 1}, {"operation": 1}], "schedule: it does operation 1 again, which is done"),
+        ([{"operation": 4}], "schedule entry 1, operation: an operation from 1 to 3 is needed"),
+        ([HALF], "schedule entry 1: the key 'quaternion_wxyz' is missing"),
+        ([HALF | {"quaternion_wxyz": [2, 0, 0, 0]}], "quaternion_wxyz: a quaternion of length 1"),
+        ([{"operation": 1, "pose": 1}], "unknown key 'pose'"),
+        ([3], "schedule entry 1: an object with named keys"),
+    ],
+)
+def test_a_schedule_that_makes_no_sense_is_refused(schedule: Any, words: str, tmp_path: Path) -> None:
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
+    files.write_form(files.plan_form(plan, "stick_in_tower") | {"schedule": schedule}, tmp_path / "plan.json")
+    with pytest.raises(InputError) as refused:
+        files.read_plan(tmp_path / "plan.json")
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
 def test_files_speak_mm_degrees_and_count_from_one() -> None:
     goals = SCENARIO.goals.copy()
     goals[2, :3, 3] = [0.1, -0.2, 0.3]
