@@ -114,16 +114,17 @@ def _report(
     targets: Array | None = None,
 ) -> Correction:
     system = equations(seen.assembly, seen.start, seen.goals)
-    trials = [step for step in steps if step.tried] or steps[-1:]
+    ended = steps[-1].status if steps else "converged"
+    last = next((step for step in reversed(steps) if step.trace), Followed(goals, ended))
     return Correction(
         goals=goals,
-        status=steps[-1].status if steps else "converged",
-        sentence=sentence(steps[-1].status if steps else "converged", seen.gap_m),
+        status=ended,
+        sentence=sentence(ended, seen.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
         gap_before_m=largest(system.gaps(seen.goals)),
         gap_after_m=largest(system.gaps(goals)),
-        rank=trials[-1].rank if trials else 0,
-        trace=trials[-1].trace if trials else (),
+        rank=last.rank,
+        trace=last.trace,
         tried=tuple(one for step in steps for one in step.tried),
         schedule=schedule,
         targets=targets,
