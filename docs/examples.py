@@ -1,0 +1,161 @@
+"""Draw the examples of the paper as strips: `python docs/examples.py [NAME...]` (two minutes, no display needed).
+
+Of each, the failure that the paper predicts (what was seen is replayed), then what the robot does about it, picture by
+picture as in Fig. 11, 14 and 17; of Fig. 6 the six steps. Only the human is careless here: noise level 0.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from apo_bench.benchmark.stages import attempt, see, show
+from apo_bench.correction.correct import correct
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.program import Plan, ReplayResult
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.render import Camera, picture_with_arm, view
+from apo_bench.simulation.scene import Scene, build_scene
+
+HERE = Path(__file__).parent / "pictures"
+SEED = 5
+SIZE = (420, 360)
+
+
+class Moment(NamedTuple):
+    """A picture of a strip."""
+
+    caption: str
+    move: int
+    """Which of the robot's moves, counted from 0; undoing and doing again at once is one."""
+    share: float
+    """How much of it is over."""
+
+
+class Strip(NamedTuple):
+    """One example."""
+
+    title: str
+    method: str
+    failure: str
+    moments: tuple[Moment, ...]
+
+
+EXAMPLES = {
+    "stick_in_tower": Strip(
+        "Example 5.1: {3} fails, {3, 2} holds",
+        "paper-track",
+        "Fig. 10: as seen",
+        (
+            Moment("(a) castle 2 comes off", 2, 0.42),
+            Moment("(b) and down by T2'", 2, 0.86),
+            Moment("(c) the stick goes in by T3'", 3, 0.8),
+        ),
+    ),
+    "carried_bridge": Strip(
+        "Example 5.2: {5}, {5, 4}, {5, 4, 3} fail, {5, 4, 3, 2} holds",
+        "paper-track",
+        "Fig. 13: as seen",
+        (
+            Moment("(a) step 4 undone", 4, 0.3),
+            Moment("(b) step 3 undone", 5, 0.45),
+            Moment("(c) castle 2 is taken", 6, 0.38),
+            Moment("(d) and placed by T2'", 6, 0.86),
+            Moment("(e) step 3 by T3'", 7, 0.86),
+            Moment("(f) step 4 by T4'", 8, 0.82),
+            Moment("(g) step 5 by T5'", 9, 0.86),
+        ),
+    ),
+    "vanished_fixture": Strip(
+        "Example 5.3: {5}, {5, 3} fail, {5, 3, 2} holds",
+        "paper-track",
+        "Fig. 16: as seen",
+        (
+            Moment("(a) step 4 undone", 4, 0.86),
+            Moment("(b) step 3 undone", 5, 0.45),
+            Moment("(c) the cube is taken", 6, 0.38),
+            Moment("(d) and placed by T2'", 6, 0.86),
+            Moment("(e) castle 2 against it, T3'", 7, 0.82),
+            Moment("(f) the cube goes, T4'", 8, 0.45),
+            Moment("(g) step 5 by T5'", 9, 0.86),
+        ),
+    ),
+    "pocket_table": Strip(
+        "Fig. 6: the example task, all goals corrected at once",
+        "paper",
+        "as seen",
+        (
+            Moment("step 1", 0, 0.86),
+            Moment("step 2", 1, 0.55),
+            Moment("step 3", 2, 0.82),
+            Moment("step 4", 3, 0.8),
+            Moment("step 5", 4, 0.9),
+            Moment("step 6: in the air", 5, 0.5),
+            Moment("step 6", 5, 0.88),
+        ),
+    ),
+}
+
+
+def main(names: list[str]) -> None:
+    for name in names or list(EXAMPLES):
+        _draw(name, EXAMPLES[name])
+
+
+def _draw(name: str, strip: Strip) -> None:
+    scene = build_scene(load_scenario(name))
+    shown = show(scene, 1.0, SEED)
+    seen = see(scene, shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
+    made = correct(seen, strip.method)
+    failed = _watched(scene, Plan(seen.assembly, seen.start, seen.goals), shown.layout.goals)
+    right = _watched(
+        scene, Plan(seen.assembly, seen.start, made.goals, made.schedule, made.targets), shown.layout.goals
+    )
+    pictures = [(strip.failure, failed[1][-1][1]), *((m.caption, _state(right, m)) for m in strip.moments)]
+    figure, axes = plt.subplots(1, len(pictures), figsize=(2.35 * len(pictures), 2.5), layout="constrained")
+    camera = _camera(shown.layout.goals)
+    for axis, (caption, state) in zip(axes, pictures, strict=True):
+        axis.imshow(picture_with_arm(scene, shown.layout.start, state, *SIZE, camera))
+        axis.set_title(caption, fontsize=9.5)
+        axis.axis("off")
+    figure.suptitle(strip.title, fontsize=11)
+    figure.savefig(HERE / f"example_{name}.png", dpi=80)
+    plt.close(figure)
+
+
+def _watched(scene: Scene, plan: Plan, reference: Array) -> tuple[ReplayResult, list[tuple[float, Array]]]:
+    """A replay, with time [s] and joint positions of every look at it."""
+    states: list[tuple[float, Array]] = []
+
+    def watch(data: Any) -> None:
+        states.append((float(data.time), np.array(data.qpos)))
+
+    return attempt(plan, scene, reference, watch).result, states
+
+
+def _state(watched: tuple[ReplayResult, list[tuple[float, Array]]], moment: Moment) -> Array:
+    result, states = watched
+    ends = [0.0, *(end for _, end in result.timeline)]
+    at = ends[moment.move] + moment.share * (ends[moment.move + 1] - ends[moment.move])
+    return next(qpos for time, qpos in states if time >= at)
+
+
+def _camera(goals: Array) -> Camera:
+    """Looks at the middle of all places where something is put, across the assembly, from the side off the arm."""
+    low, high = goals[:, :3, 3].min(axis=0), goals[:, :3, 3].max(axis=0)
+    turn = float(np.degrees(np.arctan2(goals[0][1, 0], goals[0][0, 0])))
+    far = 0.42 + 0.7 * float(np.linalg.norm(high - low))
+    return view(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
