@@ -1,9 +1,10 @@
 """Will a plan fail, where and why? Said before anything moves, from the plan and the sizes of the parts alone.
 
-Three things are looked at. A goal at which a part would not stand. Faces that fit into one another and are planned
-further off than the clearance lets them be; of these only faces across the way in, since along it the robot goes on
-until it feels contact. Parts that are planned into one another where no contact is meant; of parts that touch in the
-same operation the fit faces have already told, and the others are found by touch however wrong the plan is.
+Three things are looked at. A goal at which a part would not stand. Contacts that are planned further off than the
+judge allows: of faces that fit into one another those across the way in, since along it the robot goes on until it
+feels contact; of sides that are slid onto each other what stays open once one corner touches, since the slide does not
+turn the part; of supports none, since weight closes them however wrong the plan is. Parts that are planned into one
+another where no contact is meant; of those that touch in the same operation the contacts have told.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from typing import Literal, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation
+from apo_bench.assembly import Assembly, Operation
+from apo_bench.expectation import is_support, residual, settled
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Solid
 from apo_bench.placement import placed
 from apo_bench.program import Plan, Poses
@@ -33,6 +34,10 @@ ACROSS = 0.5
 SPACING_M = 0.02
 """The way in is looked at this densely, and at `MOST` places at most."""
 MOST = 8
+WHY = {
+    "residual": "its contacts are planned {:.2f} mm off, {:g} mm are allowed",
+    "interference": "it would be {:.2f} mm deep in another part, {:g} mm are allowed",
+}
 
 
 @final
@@ -46,16 +51,28 @@ class Prediction:
     code: Code
     sentence: str
     size_mm: float | None
-    """`residual` and `ok`: the largest |e| of a fit contact; `interference`: the depth; None of an unstable goal."""
+    """`residual`: the |e| that is too large; `interference`: the depth; `ok`: the largest |e| of a fit contact; None
+    for an unstable goal."""
 
 
 class Doing(NamedTuple):
-    """One operation about to be done: alone, with every part where it will then be believed."""
+    """One operation about to be done, alone."""
 
     operation: int
     alone: Assembly
     before: Poses
-    poses: Poses
+    planned: Poses
+    """Every part where the plan has it after the operation."""
+    rests: Poses
+    """Every part where it will have come to rest."""
+
+
+class Measure(NamedTuple):
+    """How far something is off, and how far it may be."""
+
+    code: Code
+    size_mm: float
+    allowed_mm: float
 
 
 def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach] = ()) -> Prediction:
@@ -64,77 +81,79 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
     An unstable goal comes before everything else, since a plan with one is not begun.
 
     Args:
-        clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, and
-            parts that should not touch may be as deep in each other as the judge lets one be pushed, `pushed_mm`.
+        clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, others
+            by `support_mm`; parts that should not touch may be as deep in each other as the judge lets one be
+            pushed, `pushed_mm`.
         attach: The way in of each operation; without it every fit contact counts, and nothing but the goals.
     """
     doings = tuple(_doings(plan))
     for doing in doings:
         if unstable(doing.alone, doing.before, _goal(doing)[None]) is not None:
-            return _fails(plan, doing, "unstable_goal", None, "the part would fall there")
-    physical = _physical(plan.assembly, clearance_mm)
-    allowed_mm, worst = clearance_mm + thresholds.fit_margin_mm, 0.0
+            return _fails(doing, "unstable_goal", None, "the part would fall there")
+    physical, worst = _physical(plan.assembly, clearance_mm), 0.0
     for doing in doings:
         how = attach[doing.operation] if attach else None
-        off = max((1e3 * e for e in _residuals(doing, how)), default=0.0)
-        worst = max(worst, off)
-        if off > allowed_mm:
-            why = f"faces that fit are planned {off:.2f} mm off, {allowed_mm:g} mm are allowed"
-            return _fails(plan, doing, "residual", off, why)
-        deep = 1e3 * float(_depth(doing, how, physical))
-        if deep > thresholds.pushed_mm:
-            why = f"it would be {deep:.2f} mm deep in another part, {thresholds.pushed_mm:g} mm are allowed"
-            return _fails(plan, doing, "interference", deep, why)
+        fit = Measure("residual", _fit_mm(doing, how), clearance_mm + thresholds.fit_margin_mm)
+        side = Measure("residual", _side_mm(doing), thresholds.support_mm)
+        depth = Measure("interference", _depth_mm(doing, how, physical), thresholds.pushed_mm)
+        for code, size_mm, allowed_mm in (fit, side, depth):
+            if size_mm > allowed_mm:
+                return _fails(doing, code, size_mm, WHY[code].format(size_mm, allowed_mm))
+        worst = max(worst, fit.size_mm)
     return Prediction(False, None, "ok", "every operation should fit", worst)
 
 
-def _fails(plan: Plan, doing: Doing, code: Code, size_mm: float | None, why: str) -> Prediction:
-    part = plan.assembly.operations[doing.operation].main
-    sentence = f"operation {doing.operation + 1} ({part}) will fail: {why}"
+def _fails(doing: Doing, code: Code, size_mm: float | None, why: str) -> Prediction:
+    sentence = f"operation {doing.operation + 1} ({_operation(doing).main}) will fail: {why}"
     return Prediction(True, doing.operation, code, sentence, size_mm)
 
 
 def _doings(plan: Plan) -> Iterator[Doing]:
-    """Walk the schedule; what an operation carries goes along, and undoing it brings all of it back."""
+    """What the schedule does, in order; undoing only changes where the parts are."""
+    for (k, alone, before, planned), (_, _, _, rests) in zip(_walk(plan, False), _walk(plan, True), strict=True):
+        yield Doing(k, alone, before, planned, rests)
+
+
+def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Poses]]:
+    """Each operation alone, and all poses before and after; what it carries goes along, also when it is undone."""
     now, origin = plan.start, dict[int, Array]()
-    for step, target in zip(plan.schedule, plan.targets, strict=True):
-        operation = plan.assembly.operations[step.operation]
+    for (k, undo), target in zip(plan.schedule, plan.targets, strict=True):
+        operation, before = plan.assembly.operations[k], now
         alone = Assembly(plan.assembly.solids, (operation,), plan.assembly.fixed)
-        before = now
-        if step.undo:
-            (now,) = placed(alone, before, origin[step.operation][None])
+        if undo:
+            (now,) = placed(alone, before, origin[k][None])
             continue
-        origin[step.operation] = before[operation.main]
+        origin[k] = before[operation.main]
         (now,) = placed(alone, before, target[None])
-        yield Doing(step.operation, alone, before, now)
+        now = settled(alone, operation, now) if settling else now
+        yield k, alone, before, now
 
 
-def _residuals(doing: Doing, how: Attach | None) -> Iterator[float]:
-    """|e| at the corners of each fit contact that the operation makes across its way in, nominal faces, [m]."""
+def _fit_mm(doing: Doing, how: Attach | None) -> float:
+    """Largest |e| of the fit contacts that the operation makes across its way in, nominal faces as planned."""
+    found = [0.0]
+    for contact in filter(doing.alone.is_fit, _operation(doing).contacts):
+        e, n = residual(doing.alone, contact, doing.planned)
+        if how is None or abs(n @ _way(doing, how)) < ACROSS:
+            found.append(1e3 * float(np.abs(e).max()))
+    return max(found)
+
+
+def _side_mm(doing: Doing) -> float:
+    """Largest |e| of the sides that the operation slides onto others, once its part rests."""
+    found = [0.0]
     for contact in _operation(doing).contacts:
-        T = doing.poses[contact.manipulated.part]
-        plane = doing.alone.face(contact.manipulated).plane
-        n = T[:3, :3] @ plane[:3]
-        if doing.alone.is_fit(contact) and (how is None or abs(n @ _way(doing, how)) < ACROSS):
-            corners = _corners(doing, contact)
-            yield float(np.abs((corners - T[:3, 3]) @ n + plane[3]).max())
+        if not doing.alone.is_fit(contact) and not is_support(doing.alone, contact, doing.rests):
+            found.append(1e3 * float(np.abs(residual(doing.alone, contact, doing.rests)[0]).max()))
+    return max(found)
 
 
-def _corners(doing: Doing, contact: Contact) -> Array:
-    """Corners of the overlap, (k, 3), world, [m]; of the whole environment face if the faces miss each other."""
-    m, e = contact
-    face, T = doing.alone.face(e), doing.poses[e.part]
-    found = overlap(doing.alone.face(m), doing.poses[m.part], face, T)
-    return found.corners if found else pose.apply(T, face.outline)
-
-
-def _depth(doing: Doing, how: Attach | None, physical: dict[str, Solid]) -> float:
-    """How deep a part that moves comes into one that rests and that it should not touch, [m]."""
-    moves = _operation(doing).moves
+def _depth_mm(doing: Doing, how: Attach | None, physical: dict[str, Solid]) -> float:
+    """How deep a part that moves comes into one that rests and that it should not touch."""
+    moves, at, back = _operation(doing).moves, doing.planned, _way_back(doing, how)
     touching = {frozenset((m.part, e.part)) for m, e in _operation(doing).contacts}
     pairs = [(a, b) for a in moves for b in physical if b not in moves and frozenset((a, b)) not in touching]
-    back = _way_back(doing, how)
-    return max((_along(physical[a], doing.poses[a], physical[b], doing.poses[b], back) for a, b in pairs), default=0.0)
+    return 1e3 * max((float(_along(physical[a], at[a], physical[b], at[b], back)) for a, b in pairs), default=0.0)
 
 
 def _along(a: Solid, T_a: Array, b: Solid, T_b: Array, back: Array) -> float:
@@ -165,7 +184,7 @@ def _way(doing: Doing, how: Attach) -> Array:
 
 
 def _goal(doing: Doing) -> Array:
-    return doing.poses[_operation(doing).main]
+    return doing.planned[_operation(doing).main]
 
 
 def _operation(doing: Doing) -> Operation:

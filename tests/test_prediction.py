@@ -9,8 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from apo_bench.assembly import Assembly
+from apo_bench.expectation import is_support, residual, settled
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.placement import placed
 from apo_bench.prediction import Prediction, predict
 from apo_bench.program import Plan, Step
 from apo_bench.scenario import Attach
@@ -97,6 +100,49 @@ def test_a_side_contact_tells_nothing() -> None:
     """Example 5.3: castle 2 planned 1 mm into the fixture, or off it, is slid onto it."""
     for mm in (1.0, -1.0):
         assert said(scenes.fixture(), off(scenes.fixture(), 3, scenes.mm(0, mm, 0))).operation == 4
+
+
+@pytest.mark.parametrize(("yaw_deg", "fails"), [(0.1, False), (-0.1, False), (0.2, True), (-0.5, True)])
+def test_a_slide_does_not_turn_the_part(yaw_deg: float, fails: bool) -> None:
+    """Fig. 5: a 50 mm side that is not parallel touches with one corner; the other stays off by 50 mm times the yaw."""
+    scene = scenes.fixture_alignment()
+    found = said(scene, off(scene, 2, pose.at((0, 0, 0), (0, 0, yaw_deg))))
+    assert (found.fails, found.operation) == (fails, 1 if fails else None)
+    if fails:
+        assert found.size_mm == pytest.approx(50.0 * abs(np.sin(np.radians(yaw_deg))), rel=0.02)
+
+
+def test_what_lies_flat_after_all_tells_nothing() -> None:
+    """Tilts of a degree and heights of a millimetre are gone once the blocks of Fig. 5 rest on the table."""
+    scene = scenes.fixture_alignment()
+    goals = scene.goals @ pose.at((0, 0, 0.001), (1.0, 0, 0))
+    goals[0] = goals[0] @ pose.at((0, 0, 0), (0, -1.0, 0))
+    assert said(scene, goals).code == "ok"
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
+    """Supports close, of sides one corner, and settling again changes nothing."""
+    scene = scenes.ALL[name]()
+    poses = dict(scene.start)
+    goals = scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0)
+    for operation, goal in zip(scene.assembly.operations, goals, strict=True):
+        alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
+        (brought,) = placed(alone, poses, goal[None])
+        rests = settled(alone, operation, brought)
+        touched = [c for c in operation.contacts if not alone.is_fit(c)]
+        sides = [c for c in touched if not is_support(alone, c, rests)]
+        for contact in touched:
+            e, _ = residual(alone, contact, rests)
+            assert (e.min() if contact in sides else np.abs(e).max()) == pytest.approx(0.0, abs=2e-5)
+        for part, T in rests.items():
+            assert part in operation.moves or T is brought[part]
+            relative = pose.inverse(rests[operation.main]) @ T
+            if part in operation.moves:
+                np.testing.assert_allclose(relative, pose.inverse(brought[operation.main]) @ brought[part], atol=1e-12)
+        again = settled(alone, operation, rests)
+        np.testing.assert_allclose(again[operation.main], rests[operation.main], rtol=0, atol=2e-5)
+        poses = dict(rests)
 
 
 def test_parts_in_one_another_interfere() -> None:
