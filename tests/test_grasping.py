@@ -15,6 +15,7 @@ from apo_bench.scenario import Grasp
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.grasping import Place, grasp_at, obstacles, tip_frame
 from apo_bench.simulation.gripper import gripper_boxes
+from apo_bench.simulation.paths import turn_from, unwound
 from apo_bench.simulation.prepare import Move, moves
 from apo_bench.simulation.scene import Scene, build_scene
 from tests.scenes import block
@@ -158,3 +159,13 @@ def test_undoing_and_doing_again_at_once_is_one_move(fixture: Scene) -> None:
     done = moves(plan, fixture)
     assert [move.step for move in done] == [Step(0), Step(1), Step(1), Step(2)]
     np.testing.assert_allclose(done[2].transfer.T_world_start, plan.goals[1])
+
+
+def test_a_wrist_turns_back_instead_of_winding_up() -> None:
+    rest = pose.at((0, 0, 0.3), (180, 0, 0))
+    start, end = (pose.at((x, 0, 0), (0, 0, turn)) @ rest for x, turn in ((0.0, 100), (0.2, -110)))
+    middle, last = unwound(rest, start, end)
+    assert np.array_equal(last, end)
+    assert np.degrees(turn_from(rest, middle)) == pytest.approx(-5)
+    np.testing.assert_allclose(middle[:3, 3], (0.1, 0, 0.3), atol=1e-12)
+    assert len(unwound(rest, start, pose.at((0, 0, 0), (0, 0, -70)) @ rest)) == 1

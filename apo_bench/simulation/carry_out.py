@@ -58,7 +58,7 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
     if t.into.level:
         before = moved(before, t.floats, 1.0)
-    robot.follow(smooth(robot.T, at_height(before, max(SAFE_M, before[2, 3])), CARRY))
+    robot.go(at_height(before, max(SAFE_M, before[2, 3])), CARRY)
     robot.follow(smooth(robot.T, before, LOWER))
     robot.wait(0.1)
     check_grasp(robot, grip)

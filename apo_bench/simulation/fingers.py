@@ -20,7 +20,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
     above = at_height(at, hover(at))
     robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3])), NEAR))
-    robot.follow(smooth(robot.T, at_height(above, robot.T[2, 3]), FREE, turn_speed=3.0))
+    robot.go(at_height(above, robot.T[2, 3]), FREE, turn_speed=3.0)
     robot.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
     robot.follow(smooth(robot.T, at, NEAR))

@@ -68,6 +68,29 @@ class _Trapezoid:
         return s / top
 
 
+def turn_from(rest: Array, T: Array) -> float:
+    """How far a tip that looks down is turned about the vertical from its rest, -pi to pi, [rad]."""
+    a, b = rest[:2, 0], T[:2, 0]
+    return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
+
+
+def unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
+    """Where to go through from start to end so that a wrist which began at rest does not wind up.
+
+    The shorter way round may lead over a half turn away from the rest, where the wrist ends; then the other way is
+    taken, with a pose in the middle.
+    """
+    a, b = turn_from(rest, start), turn_from(rest, end)
+    if abs(b - a) <= np.pi:
+        return (end,)
+    middle = np.array(start)
+    middle[:3, 3] = (start[:3, 3] + end[:3, 3]) / 2
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos((b - a) / 2), -np.sin((b - a) / 2)], [np.sin((b - a) / 2), np.cos((b - a) / 2)]]
+    middle[:3, :3] = turn[:3, :3] @ start[:3, :3]
+    return (middle, end)
+
+
 def moved(T: Array, along: Array, by: float) -> Array:
     """The pose shifted in the world."""
     out = np.array(T)

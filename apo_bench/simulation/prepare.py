@@ -22,6 +22,7 @@ from apo_bench.simulation.grasping import (
     obstacles,
     tip_frame,
 )
+from apo_bench.simulation.paths import turn_from
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.touch import later_walls, neighbours, restored, sides_of, slow_before
 from apo_bench.simulation.transfer import Grip, Line, Transfer, key_poses
@@ -188,14 +189,8 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
     other = Grasp(grasp.point, -grasp.across)
     rest = scene.kinematics.forward(scene.arm.home)
     tips = [tip_frame(each, start) for each in (grasp, other)]
-    tip = min(tips, key=lambda T: max(_turn(rest, start @ T), _turn(rest, goal @ T)))
+    tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
     return Grip(tip, _half_width(scene, part, grasp))
-
-
-def _turn(rest: Array, T: Array) -> float:
-    """How far the tip is turned about the vertical from its rest, [rad]."""
-    a, b = rest[:2, 0], T[:2, 0]
-    return abs(float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)))
 
 
 def _half_width(scene: Scene, part: str, grasp: Grasp) -> float:

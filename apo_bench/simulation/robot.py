@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
-from apo_bench.simulation.paths import Line
+from apo_bench.simulation.paths import Line, smooth, unwound
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import fresh, unstable
 
@@ -63,6 +63,7 @@ class Robot:
         mujoco.mj_forward(self.model, self.data)
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
+        self._rest = self.T
         self.data.ctrl[self._drives] = self.q
         self.data.ctrl[self._grip] = self.arm.opening_m
         forces, free = self.data.sensordata.reshape(-1, 3), len(scene.work.free)
@@ -86,6 +87,11 @@ class Robot:
             return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
         self.q, self.T = path[-1], line.end
         return 0.0
+
+    def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
+        """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
+        for T in unwound(self._rest, self.T, end):
+            self.follow(smooth(self.T, T, speed, turn_speed))
 
     def wait(self, seconds: float) -> None:
         self._run(np.broadcast_to(self.q, (round(seconds / self.model.opt.timestep), len(self.q))), None)
