@@ -22,12 +22,19 @@ from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
 
 RECORD = Path(__file__).with_name("success_rate.json")
-SCENES = ("stick_in_tower", "stick_on_castles")
-SEEDS = range(8)
-RATES = {"oracle": (0.99, 1.0), "paper": (0.97, 1.0), "none": (0.0, 0.05)}
-"""The rates that the README claims, at least and at most."""
+SEEDS = range(10)
+EXAMPLES = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
+"""Those that the paper's robot takes apart and builds again."""
+OTHERS = ("stick_on_castles", "block_on_block", "bridge_cycle", "fixture_alignment")
+RATES = {"oracle": (0.99, 1.0), "paper": (0.97, 1.0), "paper-track": (0.95, 1.0), "none": (0.0, 0.05)}
+"""The rates that the README claims, at least and at most; `none` only where a fit makes it fail."""
+FITS = (*EXAMPLES, "stick_on_castles")
 SURPRISE = 1e-4
 """A count less likely than this under the claimed rate is a regression."""
+CASES = [
+    *((name, method) for name in (*EXAMPLES, *OTHERS) for method in ("oracle", "none", "paper")),
+    *((name, "paper-track") for name in EXAMPLES),
+]
 
 
 def spec(scenario: str, method: str, seed: int) -> TrialSpec:
@@ -35,10 +42,10 @@ def spec(scenario: str, method: str, seed: int) -> TrialSpec:
     return TrialSpec(scenario=scenario, method=method, seed=seed, level_mm=level, level_deg=level, careless=careless)
 
 
-def verdicts(scene: Scene) -> dict[str, list[bool]]:
-    """Strict success of each method for each seed."""
+def verdicts(scene: Scene, method: str) -> str:
+    """Strict success for each seed, as ones and zeros."""
     name = scene.scenario.name
-    return {method: [bool(run_trial(spec(name, method, seed), scene)["success"]) for seed in SEEDS] for method in RATES}
+    return "".join(str(int(run_trial(spec(name, method, seed), scene)["success"])) for seed in SEEDS)
 
 
 def bits(scene: Scene) -> str:
@@ -48,20 +55,24 @@ def bits(scene: Scene) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SCENES)
-def test_success_rates_are_what_they_were(name: str) -> None:
+@pytest.mark.parametrize(("name", "method"), CASES)
+def test_success_rates_are_what_they_were(name: str, method: str) -> None:
     scene = build_scene(load_scenario(name))
     recorded = json.loads(RECORD.read_text())[name]
-    found = verdicts(scene)
+    found = verdicts(scene, method)
     if bits(scene) == recorded["bits"]:
-        assert found == recorded["verdicts"]
-    for method, (least, most) in RATES.items():
-        won = sum(found[method])
+        assert found == recorded["verdicts"][method]
+    if method != "none" or name in FITS:
+        least, most = RATES[method]
+        won = found.count("1")
         assert binom.cdf(won, len(SEEDS), least) > SURPRISE, f"{method} succeeded only {won} times"
         assert binom.sf(won - 1, len(SEEDS), most) > SURPRISE, f"{method} succeeded {won} times"
 
 
 if __name__ == "__main__":
-    compiled = {name: build_scene(load_scenario(name)) for name in SCENES}
-    record = {name: {"bits": bits(scene), "verdicts": verdicts(scene)} for name, scene in compiled.items()}
+    record: dict[str, dict[str, object]] = {}
+    for name in (*EXAMPLES, *OTHERS):
+        scene = build_scene(load_scenario(name))
+        won = {method: verdicts(scene, method) for case, method in CASES if case == name}
+        record[name] = {"bits": bits(scene), "verdicts": won}
     RECORD.write_text(json.dumps(record, indent=1) + "\n")
