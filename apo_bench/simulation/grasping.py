@@ -22,8 +22,10 @@ MARGINS_M = (0.004, 0.003, 0.002)
 """Room around the gripper, as much as there is."""
 GRID_M = 0.003
 """Candidates along a part, and looks along a stroke, are this far apart."""
-END_M = 0.034
-"""No grasp is nearer to the end of a long part."""
+END_M = 0.018
+"""No grasp is nearer to the end of a long part: the pads still lie on it."""
+MOST_LEFT_M = 0.1
+"""A grip is changed so near to the goal that the part already lies in what it was put into."""
 HEIGHT = 0.65
 """Height of the tip over the part's lowest point, as a part of its height."""
 
@@ -107,7 +109,7 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Plac
         whole = _clear(scene, part, [grasp for left, grasp in able if left == 0.0], ends, margin)
         if whole:
             return Grips(whole[0])
-        found = _pair(scene, part, stroke, sorted(able, key=lambda pair: pair[0])[:8], margin)
+        found = _pair(scene, part, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
         if found is not None:
             return found
     return Grips(preferred)
@@ -128,12 +130,12 @@ def half_width(solid: Solid, grasp: Grasp) -> float:
 
 
 def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
-    """Begin with a grasp that comes near to the end, and end with one that is clear from there on."""
+    """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
     goal = Place(stroke.T, stroke.around)
     last = _clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin)
     for left, first in able:
         change = Place(_back(stroke, left), stroke.around)
-        if left < stroke.travel and _clear(scene, part, [first], [change], margin):
+        if 0.0 < left < MOST_LEFT_M and _clear(scene, part, [first], [change], margin):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
             for second in _clear(scene, part, last, [change], margin):
                 if _nearest(scene, part, second, near, margin) == 0.0:
