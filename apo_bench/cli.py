@@ -7,16 +7,16 @@ request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from apo_bench import __version__
+from apo_bench.arguments import check_writable, cores, numbers, words
 from apo_bench.errors import InputError
 
 app = typer.Typer(
@@ -114,7 +114,7 @@ def graph(
     from apo_bench.scenario_file import load_scenario
 
     if out is not None:
-        _check_writable(out, "--out", (".svg", ".png"))
+        check_writable(out, "--out", (".svg", ".png"))
     loaded = load_scenario(scenario)
     found = relation_graph(loaded.assembly, step)
     seen = None if observation is None else read_observation(observation, loaded)
@@ -148,7 +148,7 @@ def scene(
     if clearance is not None:
         check_clearance(clearance)
     loaded = load_scenario(scenario)
-    _check_writable(out, "--out", (".xml",))
+    check_writable(out, "--out", (".xml",))
     xml = scene_xml(loaded, clearance_mm=clearance, grasp=grasp, arm=arm, timestep_s=timestep_ms * 1e-3)
     out.write_text(xml, encoding="utf-8")
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
@@ -182,7 +182,7 @@ def replay(
         (save_observation, "--save-observation", (".json",)),
     ):
         if path is not None:
-            _check_writable(path, option, endings)
+            check_writable(path, option, endings)
     row = run_one(
         Request(
             scenario=scenario,
@@ -232,14 +232,14 @@ def sweep(
     from apo_bench.benchmark import sweep as runner
     from apo_bench.benchmark.grid import SweepSpec
     from apo_bench.benchmark.statistics import tally
-    from apo_bench.benchmark.terminal import print_cells
+    from apo_bench.benchmark.terminal import print_cells, print_prediction
 
     spec = SweepSpec(
         scenarios=tuple(scenarios),
-        levels=_numbers(levels, "--levels"),
-        careless=_numbers(careless, "--careless"),
-        methods=_words(methods, "--methods"),
-        clearances_mm=() if clearance is None else _numbers(clearance, "--clearance"),
+        levels=numbers(levels, "--levels"),
+        careless=numbers(careless, "--careless"),
+        methods=words(methods, "--methods"),
+        clearances_mm=() if clearance is None else numbers(clearance, "--clearance"),
         trials=trials,
         seed=seed,
         noise=noise or "isotropic",
@@ -249,10 +249,11 @@ def sweep(
     )
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     try:
-        rows = runner.sweep(spec, out, workers=_cores() if workers is None else workers, command=command)
+        rows = runner.sweep(spec, out, workers=cores() if workers is None else workers, command=command)
     except KeyboardInterrupt as error:
         raise Interrupted("interrupted; what had ended is kept, and the same command continues.") from error
     print_cells(tally(rows))
+    print_prediction(rows)
     typer.echo(
         f"{len(rows)} rows in {out / 'trials.jsonl'}; table and figure: apo-bench report {shlex.quote(str(out))}"
     )
@@ -264,43 +265,13 @@ def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep -
     from apo_bench.benchmark.journal import read_rows
     from apo_bench.benchmark.report import report as write_report
     from apo_bench.benchmark.statistics import tally
-    from apo_bench.benchmark.terminal import print_cells
+    from apo_bench.benchmark.terminal import print_cells, print_prediction
 
     made = write_report(folder)
-    print_cells(tally(read_rows(folder)))
-    typer.echo(f"Table:  {made.table}\nFigure: {made.figure}\nReport: {made.page}")
-
-
-def _numbers(text: str, option: str) -> tuple[float, ...]:
-    """`0,0.5,1` as numbers; whether they are allowed is checked where they are used."""
-    words = _words(text, option)
-    try:
-        return tuple(float(word) for word in words)
-    except ValueError as error:
-        raise InputError(
-            f"{option} {text} was given; numbers with commas between them are allowed: 0,0.5,1."
-        ) from error
-
-
-def _words(text: str, option: str) -> tuple[str, ...]:
-    words = tuple(word.strip() for word in text.split(","))
-    if not all(words):
-        raise InputError(f"{option} '{text}' was given; at least one entry is needed, with single commas between them.")
-    return words
-
-
-def _check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
-    allowed = " or ".join(endings)
-    if path.suffix.lower() not in endings:
-        raise InputError(f"{option} {path} was given; a file name that ends in {allowed} is allowed.")
-    folder = path.parent
-    if path.is_dir() or not folder.is_dir() or not os.access(path if path.exists() else folder, os.W_OK):
-        raise InputError(f"{option} {path} cannot be written; name a file in a folder that exists and can be written.")
-
-
-def _cores() -> int:
-    affinity: Any = getattr(os, "sched_getaffinity", None)
-    return max(1, min(64, len(affinity(0)) if affinity else os.cpu_count() or 1))
+    rows = read_rows(folder)
+    print_cells(tally(rows))
+    print_prediction(rows)
+    typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nFigure: {made.figure}\nReport: {made.page}")
 
 
 if __name__ == "__main__":

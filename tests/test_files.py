@@ -115,7 +115,15 @@ HALF = {"operation": 1, "position_mm": [0.0, 0.0, 0.0]}
 @pytest.mark.parametrize(
     ("schedule", "words"),
     [
-        ([{"operation": 1}, {"operation": 2}], "plan.json, schedule: it leaves operation 3 undone; do every operation"),
+        (
+            [{"operation": 1}, {"operation": 2}],
+            "plan.json, schedule: it leaves operation 3 undone; do operations in order",
+        ),
+        ([{"operation": 2}], "schedule: it does operation 2 before operation 1"),
+        (
+            [{"operation": 1}, {"operation": 2}, {"operation": 1, "undo": True}],
+            "schedule: it undoes operation 1 before operation 2, which came after it",
+        ),
         ([{"operation": 1, "undo": True}], "schedule: it undoes operation 1, which is not done"),
         ([{"operation": 1}, {"operation": 1}], "schedule: it does operation 1 again, which is done"),
         ([{"operation": 4}], "schedule entry 1, operation: an operation from 1 to 3 is needed"),
