@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
 from apo_bench.scenario import Scenario
+from apo_bench.simulation.touch import held_by, sides_of
 
 SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
@@ -55,7 +54,7 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
     """
     operation, attach = scenario.assembly.operations[k], scenario.attach[k]
     way = target[:3, :3] @ attach.direction
-    beside = _away(scenario.assembly, operation.contacts, operation.moves, stages[k + 1])
+    beside = _off(sides_of(scenario.assembly, operation.contacts, operation.moves, stages[k + 1]))
     return Act(
         part=operation.main,
         carries=operation.carries,
@@ -74,22 +73,16 @@ def _out(scenario: Scenario, k: int, poses: Poses) -> Array:
     """The motion, (3,) [m], that frees what operation k moves: back out of where it sticks, or off what is beside."""
     operations = scenario.assembly.operations
     main, moves = operations[k].main, operations[k].moves
-    put = max((j for j in range(k) if operations[j].main == main), default=None)
-    if put is not None and any(contact.environment.part not in moves for contact in operations[put].contacts):
+    last = max((j for j in range(k) if operations[j].main == main), default=None)
+    put = held_by(scenario.assembly, last, moves)
+    if put is not None:
         way = poses[main][:3, :3] @ scenario.attach[put].direction
         if abs(way[2]) < 0.5:
             return np.asarray(-scenario.attach[put].travel_m * way)
     standing = (relation.contact for relation in scenario.assembly.first(k).relations() if relation.lost is None)
-    return SIDE_M * _away(scenario.assembly, standing, moves, poses)
+    return SIDE_M * _off(sides_of(scenario.assembly, standing, moves, poses))
 
 
-def _away(assembly: Assembly, contacts: Iterable[Contact], moves: tuple[str, ...], poses: Poses) -> Array:
-    """The sum of the level unit vectors, (3,), that lead what moves off what stands beside it, fits left out."""
-    found: list[Array] = []
-    for contact in contacts:
-        rests = [of for of in contact if of.part not in moves]
-        if len(rests) == 1 and not assembly.is_fit(contact):
-            normal = poses[rests[0].part][:3, :3] @ assembly.face(rests[0]).normal
-            if abs(normal[2]) < 0.5 and not any(normal @ other > 0.99 for other in found):
-                found.append(normal)
-    return np.asarray(sum(found, np.zeros(3)))
+def _off(sides: tuple[Array, ...]) -> Array:
+    """Away from all of them, (3,); zero if there is none."""
+    return -np.sum(np.array(sides).reshape(-1, 3), axis=0)

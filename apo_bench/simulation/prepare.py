@@ -24,7 +24,7 @@ from apo_bench.simulation.grasping import (
 )
 from apo_bench.simulation.paths import turn_from
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.touch import later_walls, neighbours, restored, sides_of, slow_before
+from apo_bench.simulation.touch import held_by, later_walls, neighbours, restored, sides_of, slow_before
 from apo_bench.simulation.transfer import Grip, Line, Transfer, key_poses
 
 GRAVITY = 9.81
@@ -112,7 +112,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     T = target @ pose.inverse(start)
     after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
     contacts = restored(plan.assembly, k) if undo else operation.contacts
-    out = _line(scene, _held_by(plan.assembly, task.was, operation.moves), start)
+    out = _line(scene, held_by(plan.assembly, task.was, operation.moves), start)
     into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m) if undo else _line(scene, k, target)
     grips, out, into = _grips(scene, task, part, out, into, believed, after)
     sides = () if into.level else sides_of(plan.assembly, contacts, operation.moves, after)
@@ -147,13 +147,6 @@ def _line(scene: Scene, k: int | None, T: Array) -> Line:
         return Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
     attach = scene.scenario.attach[k]
     return Line(T[:3, :3] @ attach.direction, attach.travel_m)
-
-
-def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
-    """The operation out of whose contacts a part must be brought; none if all of them move along."""
-    if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
-        return None
-    return was
 
 
 def _is_level(plan: Plan, scene: Scene, k: int) -> bool:

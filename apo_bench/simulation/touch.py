@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact
@@ -18,18 +20,24 @@ def restored(assembly: Assembly, k: int) -> tuple[Contact, ...]:
     return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)
 
 
+def held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
+    """The operation `was`, out of whose contacts a part must be brought; None if all of them move along."""
+    if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
+        return None
+    return was
+
+
 def sides_of(
-    assembly: Assembly, contacts: tuple[Contact, ...], moved: tuple[str, ...], poses: Poses
+    assembly: Assembly, contacts: Iterable[Contact], moved: tuple[str, ...], poses: Poses
 ) -> tuple[Array, ...]:
-    """The level directions in which the moved part comes to lie against another one, none twice."""
+    """The level directions in which what moves comes to lie against what rests, fits left out, none twice."""
     sides: list[Array] = []
     for contact in contacts:
-        if assembly.is_fit(contact):
-            continue
-        rests = contact.environment if contact.manipulated.part in moved else contact.manipulated
-        side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
-        if abs(side[2]) < 0.5 and not any(side @ other > 0.99 for other in sides):
-            sides.append(side)
+        rests = [of for of in contact if of.part not in moved]
+        if len(rests) == 1 and not assembly.is_fit(contact):
+            side = -poses[rests[0].part][:3, :3] @ assembly.face(rests[0]).normal
+            if abs(side[2]) < 0.5 and not any(side @ other > 0.99 for other in sides):
+                sides.append(side)
     return tuple(sides)
 
 
