@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from apo_bench.benchmark.confusion import Confusion, confusions
 from apo_bench.benchmark.confusion_table import summary
+from apo_bench.benchmark.effort import Effort, efforts
 from apo_bench.benchmark.figure import OTHERS, STYLES, draw
 from apo_bench.benchmark.report import COLUMNS, report
 from apo_bench.benchmark.spec import ROW
@@ -42,6 +43,9 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "failure_code": "force_stop" if failed else None,
         "failure_operation": 3 if failed else None,
         "predicted": None if success is None else foretold(failed),
+        "extra_operations": None if success is None else 0,
+        "sim_seconds": None if success is None else 20.0,
+        "pushed_mm": None if success is None else 0.1,
     } | more
 
 
@@ -230,3 +234,18 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
         report(write(tmp_path / "bad", [row(), {"seed": 1}]))
     with pytest.raises(InputError, match="row of schema 'apo-bench/row/1'"):
         report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))
+
+
+def test_effort_counts_what_was_right() -> None:
+    rows = [
+        row("paper", 0),
+        row("paper-track", 0, extra_operations=2, sim_seconds=26.0, pushed_mm=0.3),
+        row("paper-track", 1, extra_operations=4, sim_seconds=28.0, pushed_mm=0.2),
+        row("paper-track", 2, success=False, extra_operations=9, sim_seconds=99.0, pushed_mm=9.0),
+        row("none", 0, success=False),
+    ]
+    assert efforts(rows) == (
+        Effort("stick_in_tower", "paper", 1, 0.0, 20.0, 0.1),
+        Effort("stick_in_tower", "paper-track", 2, 3.0, 27.0, 0.3),
+    )
+    assert efforts([]) == ()

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import WORDS, confusion_lines, write_confusions
+from apo_bench.benchmark.effort import WORDS as EFFORT
+from apo_bench.benchmark.effort import effort_lines, efforts
 from apo_bench.benchmark.figure import draw, level_label
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.statistics import Cell, tally
@@ -107,6 +109,12 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
         WORDS,
         "",
         *confusion_lines(confusions(rows)),
+        "",
+        "## What it takes",
+        "",
+        EFFORT,
+        "",
+        *effort_lines(efforts(rows)),
     ]
     return "\n".join(lines) + "\n"
 
