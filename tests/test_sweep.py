@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import functools
 import json
+import subprocess
+import sys
+import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -234,3 +238,30 @@ def test_two_scenarios_of_one_name_are_refused(tmp_path: Path) -> None:
     copy.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
     with pytest.raises(InputError, match="two scenarios called 'stick_in_tower'"):
         runner.sweep(replace(SPEC, scenarios=("stick_in_tower", str(copy))), tmp_path / "run")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+def test_workers_end_when_the_sweep_is_killed(tmp_path: Path) -> None:
+    """Their rows would be written by nobody, and they would keep the machine busy."""
+    command = [sys.executable, "-m", "apo_bench.cli", "sweep", "block_on_block", "--out", str(tmp_path / "runs")]
+    asked = ["--levels", "0,1,2,3", "--careless", "0", "--methods", "none", "--trials", "200", "--workers", "2"]
+    process = subprocess.Popen([*command, *asked], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    rows = tmp_path / "runs" / "trials.jsonl"
+    wait_for(lambda: rows.exists() and rows.read_bytes().count(b"\n") > 1)
+    children = {int(pid) for task in Path(f"/proc/{process.pid}/task").iterdir() for pid in child_ids(task)}
+    assert len(children) >= 2
+    process.kill()
+    process.wait()
+    wait_for(lambda: not any(Path(f"/proc/{pid}").exists() for pid in children))
+
+
+def child_ids(task: Path) -> list[str]:
+    return (task / "children").read_text().split()
+
+
+def wait_for(true: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.1)

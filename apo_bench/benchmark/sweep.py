@@ -201,9 +201,15 @@ def _work(number: int, tasks: Any, said: Any, stop: Any) -> None:
     """The life of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     worker = Worker(number)
+    parent = multiprocessing.parent_process()
+
+    def stopped() -> bool:
+        """Asked to stop, or alone: rows of a process whose parent was killed would be written by nobody."""
+        return stop.is_set() or (parent is not None and not parent.is_alive())
+
     try:
-        while not stop.is_set() and (unit := tasks.get()) is not None:
-            worker.run(unit, lambda row, timing: said.put(("row", row, timing)), stop.is_set)
+        while not stopped() and (unit := tasks.get()) is not None:
+            worker.run(unit, lambda row, timing: said.put(("row", row, timing)), stopped)
         said.put(("done",))
     except InputError as error:
         said.put(("refused", str(error)))
