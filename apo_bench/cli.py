@@ -126,7 +126,10 @@ def graph(
         typer.echo("\n".join(graph_lines(loaded.name, found, residuals, gap_m)))
     if out is not None:
         title = graph_title(loaded.name, found)
-        draw_graph(found, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
+        try:
+            draw_graph(found, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
+        except OSError as error:
+            raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
         if not as_json:
             typer.echo(f"\nWrote {out}")
 

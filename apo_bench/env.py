@@ -34,6 +34,8 @@ LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
 LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
 """How far an action can move a goal per axis, [m, rad]."""
 PICTURE = (480, 640)
+MOST_TRIES = 30
+"""So many demonstrations in a row may go wrong before `reset()` gives up."""
 
 Action = NDArray[np.float64]
 Seen = dict[str, Any]
@@ -156,15 +158,15 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._seen
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Watch another demonstration; `seed=k` is trial k. There are no options."""
+        """Watch another demonstration; `seed=k` is trial k. There are no options.
+
+        Raises:
+            InputError: No demonstration comes out right.
+        """
         if seed is not None:
             check_seed(int(seed))
         super().reset(seed=seed)
-        trial = int(seed) if seed is not None else self._next_trial()
-        shown = show(self._scene, self._careless, trial)
-        while seed is None and shown.demonstration.code != "ok":
-            trial = self._next_trial()
-            shown = show(self._scene, self._careless, trial)
+        trial, shown = self._watch_human(seed)
         self._shown, self._seen = shown, see(self._scene, shown, self._noise, trial)
         self.aim(self._seen.goals)
         self._refused, self._over = unseen(self._seen), False
@@ -229,6 +231,19 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if self._window is not None:
             self._window.close()
             self._window = None
+
+    def _watch_human(self, seed: int | None) -> tuple[int, Shown]:
+        """Trial `seed`, or the next one whose demonstration is right."""
+        for _ in range(1 if seed is not None else MOST_TRIES):
+            trial = int(seed) if seed is not None else self._next_trial()
+            shown = show(self._scene, self._careless, trial)
+            if seed is not None or shown.demonstration.code == "ok":
+                return trial, shown
+        raise InputError(
+            f"{MOST_TRIES} demonstrations of '{self._scene.scenario.name}' in a row went wrong at carelessness "
+            f"{self._careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend the "
+            "scenario."
+        )
 
     def _next_trial(self) -> int:
         return int(self.np_random.integers(2**31))

@@ -40,6 +40,20 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
                 f"{file}, operation {k + 1}, move: operation {earlier + 1} has already taken '{operation.main}' away, "
                 "and nothing is put against it after that; take one of the two operations out."
             )
+        left = _left_in_the_air(assembly, k)
+        if left is not None:
+            raise InputError(
+                f"{file}, operation {k + 1}, carries: after it '{left}' rests on nothing that a contact names; "
+                "carry it along, or move it first."
+            )
+
+
+def _left_in_the_air(assembly: Assembly, k: int) -> str | None:
+    """A part that was put down before and, after operation k, has no contact left."""
+    put = {part for operation in assembly.operations[: k + 1] for part in operation.moves}
+    known = assembly.first(k + 1)
+    held = {part for relation in known.relations() if relation.lost is None for part in _ends(relation.contact)}
+    return next((part for part in assembly.solids if part in put - held), None)
 
 
 def _loose(assembly: Assembly, k: int) -> str | None:

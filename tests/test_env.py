@@ -280,6 +280,18 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     assert info["trial"] == calls[1] != calls[0]
 
 
+def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
+    env: APOReplay, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import apo_bench.env as module
+
+    shown = module.show(env._scene, 1.0, SEED)
+    failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
+    monkeypatch.setattr(module, "show", lambda *_: failed)
+    with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row went wrong at carelessness"):
+        env.reset()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 from apo_bench.outcomes import CODES
-from apo_bench.program import Correction, Observation, Step
+from apo_bench.program import Correction, Observation, Step, Try
 from tests import scenes
 
 Error = Callable[[Array], Array]
@@ -371,9 +372,10 @@ def steps(spelled: str) -> tuple[Step, ...]:
 
 def scheduled(spelled: str, mirrored: bool = False) -> Callable[[Observation], Correction]:
     def scheduling(seen: Observation) -> Correction:
-        targets = np.tile(np.eye(4), (len(steps(spelled)), 1, 1))
-        targets[-1, 0, 0] = -1.0 if mirrored else 1.0
-        return replace(paper(seen), schedule=steps(spelled), targets=targets)
+        made = paper(seen)
+        targets = made.goals[[min(k, len(made.goals) - 1) for k, _ in steps(spelled)]]
+        targets[-1] = np.diag([-1.0, 1.0, 1.0, 1.0]) if mirrored else targets[-1]
+        return replace(made, schedule=steps(spelled), targets=targets)
 
     return scheduling
 
@@ -383,6 +385,44 @@ def test_a_schedule_that_makes_sense_is_passed_on() -> None:
     assert found.schedule == steps("1 2 -2 2 3")
     assert found.targets is not None
     assert found.targets.shape == (5, 4, 4)
+
+
+def returning(**changed: Any) -> Callable[[Observation], Correction]:
+    def returned(seen: Observation) -> Correction:
+        return replace(paper(seen), **changed)
+
+    return returned
+
+
+def test_plain_pairs_are_steps() -> None:
+    found = correct(noisy_tower(), returning(schedule=[(0, False), (1,), [2, np.False_]]))
+    assert found.schedule == steps("1 2 3")
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"schedule": (0, "1", 2)}, "returned '1' as step 2 of its schedule; return `Step(operation, undo)`"),
+        ({"schedule": (Step(0.0), Step(1), Step(2))}, "as step 1 of its schedule"),
+        ({"schedule": "1 2 3"}, "returned '1' as step 1"),
+        ({"schedule": ((0, False, 3),)}, "returned (0, False, 3) as step 1"),
+        ({"freed": (99, -5)}, "returned the operation 99 in `freed`; return whole numbers from 0 to 2"),
+        ({"freed": "abc"}, "returned the operation 'abc' in `freed`"),
+        ({"gap_after_m": None}, "returned None as gap_after_m; return a length in metres"),
+        ({"tried": ("x",)}, "returned 'x' among `tried`"),
+        ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
+        ({"tried": (Try(1, (0,), "much"),)}, "returned 'much' as gap_m of `tried`"),
+        (
+            {"schedule": steps("1 2 3"), "targets": np.tile(np.eye(4), (3, 1, 1))},
+            "returned a last target for operation 1 that is not its goal",
+        ),
+    ],
+)
+def test_a_correction_of_nonsense_is_one_sentence(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        correct(noisy_tower(), returning(**changed))
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
 
 
 def other_status(seen: Observation) -> Correction:

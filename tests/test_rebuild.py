@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from apo_bench.layout import draw_layout
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.program import Plan, Step
 from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.replay import replay
 from apo_bench.simulation.scene import Scene, build_scene
 
 SCENES = (
@@ -127,3 +129,51 @@ def test_fig_6_frees_all_but_operation_4() -> None:
     scene = build_scene(load_scenario("pocket_table"))
     seen = see(scene, show(scene, 1.0, 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
     assert [k + 1 for k in correct(seen, "paper").freed] == [6, 5, 3, 2, 1]
+
+
+TALL = """<mujoco model="post"><worldbody><body name="post">
+<geom name="post" type="box" size="0.025 0.025 0.08" density="600"/>
+<site name="nz" pos="0 0 -0.08"/>
+</body></worldbody></mujoco>
+"""
+PAST = """schema = 1
+title = "A post carried past another"
+[parts.table]
+file = "table"
+fixed = true
+[parts.near]
+file = "post.xml"
+start = { at_mm = [100, -200, 80] }
+[parts.far]
+file = "post.xml"
+start = { at_mm = [100, 200, 80] }
+[[operations]]
+move = "near"
+goal = { at_mm = [100, 0, 80] }
+contacts = [["nz", "table.top"]]
+[[operations]]
+move = "far"
+goal = { at_mm = [100, -200, 80] }
+contacts = [["nz", "table.top"]]
+"""
+
+
+def test_tall_parts_are_carried_over_what_stands(tmp_path: Path) -> None:
+    (tmp_path / "post.xml").write_text(TALL)
+    (tmp_path / "past.toml").write_text(PAST)
+    scene = build_scene(load_scenario(tmp_path / "past.toml"))
+    shown = show(scene, 0.0, 1)
+    assert shown.demonstration.code == "ok"
+    plan = Plan(scene.scenario.assembly, shown.layout.start, shown.layout.goals)
+    tried = attempt(plan, scene, shown.layout.goals)
+    assert (tried.result.outcome.code, tried.verdict.code) == ("ok", "ok")
+
+
+def test_a_collision_names_what_was_struck(scenes: Mapping[str, Scene]) -> None:
+    """Block A is believed to be where it is not: the fingers come down on it."""
+    scene = scenes["block_on_block"]
+    layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
+    there = {**layout.start, "A": layout.start["B"] @ pose.at((0.06, 0.0, 0.0))}
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene, parts_at=there)
+    assert (result.outcome.stage, result.outcome.code) == ("pick", "collision")
+    assert result.outcome.sentence == "the arm struck A in operation 1"

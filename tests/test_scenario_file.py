@@ -431,6 +431,12 @@ DISORDER = {
         'carries = ["cube2", "cube2"]',
         ["operation 6, carries", "'cube2' stands here twice"],
     ),
+    "left_in_the_air": (
+        (folder("scenarios") / "block_on_block.toml").read_text(),
+        "[judge]",
+        '[[operations]]\nmove = "B"\ngoal = { at_mm = [200, 0, 25] }\ncontacts = [["nz", "table.top"]]\n\n[judge]',
+        ["operation 3, carries", "after it 'A' rests on nothing", "carry it along, or move it first"],
+    ),
     "removed_to_where_it_is": (
         FIXTURE,
         AWAY,

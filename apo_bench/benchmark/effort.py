@@ -42,7 +42,9 @@ def efforts(rows: Iterable[Mapping[str, Any]]) -> tuple[Effort, ...]:
 
 
 def effort_lines(found: Sequence[Effort]) -> list[str]:
-    """A Markdown table."""
+    """A Markdown table, or a sentence where nothing was right."""
+    if not found:
+        return ["No trial was right."]
     return [
         "| scenario | method | right | extra operations | simulated | pushed at most |",
         "|---|---|---|---|---|---|",

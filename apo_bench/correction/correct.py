@@ -12,12 +12,12 @@ from apo_bench import outcomes
 from apo_bench.correction.ending import sentence
 from apo_bench.correction.equations import equations, gap, largest
 from apo_bench.correction.newton import CUT_OFF, LENGTH_M, least_step
+from apo_bench.correction.returned import RIGID, checked
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 from apo_bench.names import resolve
 from apo_bench.program import Correction, Observation
-from apo_bench.schedule import REMEDY, fault
 
 Corrector = Callable[[Observation], Correction]
 """Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
@@ -32,7 +32,6 @@ CORRECTORS = MappingProxyType(
         "no-disappeared": "apo_bench.correction.ablations:no_disappeared",
     }
 )
-RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
 STATUSES = ("converged", "not_seen", "inconsistent", "not_converged", "not_finite")
 
 
@@ -65,25 +64,8 @@ def correct(seen: Observation, corrector: Any = "paper") -> Correction:
         raise InputError(
             f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
         )
-    _bare(found.goals, len(seen.goals), name)
-    _check_schedule(found, name)
-    return found
-
-
-def _check_schedule(found: Correction, name: str) -> None:
-    if found.schedule and (wrong := fault(found.schedule, len(found.goals))):
-        raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {REMEDY}.")
-    if found.targets is None:
-        return
-    if not found.schedule:
-        raise InputError(
-            f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets."
-        )
-    for i in np.flatnonzero(~rigid(found.targets)):
-        raise InputError(
-            f"the corrector '{name}' returned a target for step {i + 1} of its schedule that is not a rigid pose; "
-            f"{RIGID}."
-        )
+    goals = _bare(found.goals, len(seen.goals), name)
+    return checked(found, len(goals), name)
 
 
 def _bare(found: Any, n: int, name: str) -> Array:

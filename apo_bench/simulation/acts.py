@@ -7,11 +7,14 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
 from apo_bench.scenario import Scenario
-from apo_bench.simulation.touch import held_by, sides_of
+from apo_bench.simulation.touch import heights, held_by, sides_of
 
+OVER_M = 0.02
+"""Room between what is carried and what it is carried over."""
 SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
 
@@ -36,6 +39,8 @@ class Act:
     """Where every part should be when all is done."""
     bearing: tuple[str, ...]
     """The moved parts that make contacts."""
+    over: float
+    """How high the part must be lifted so that what moves passes over what stands, [m]."""
     late: tuple[str, ...]
     """Parts that are displaced and now brought to their true places by the other hand."""
 
@@ -65,8 +70,15 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         aside=SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
+        over=_over(scenario.assembly, operation.main, operation.moves, stages[k]),
         late=late,
     )
+
+
+def _over(assembly: Assembly, main: str, moves: tuple[str, ...], poses: Poses) -> float:
+    ends = {part: heights(assembly.solids[part], poses[part]) for part in assembly.solids}
+    hangs = float(poses[main][2, 3]) - min(ends[part][0] for part in moves)
+    return max((top for part, (_, top) in ends.items() if part not in moves), default=0.0) + hangs + OVER_M
 
 
 def _out(scenario: Scenario, k: int, poses: Poses) -> Array:

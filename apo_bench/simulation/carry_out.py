@@ -6,7 +6,7 @@ from apo_bench.simulation.attach import ARRIVED_M, come_down, insert, leave, pul
 from apo_bench.simulation.fingers import centre, check_grasp, depart, grasp, release
 from apo_bench.simulation.paths import at_height, moved, smooth
 from apo_bench.simulation.robot import Halt, Robot
-from apo_bench.simulation.transfer import SAFE_M, UP, Grip, Transfer, aim
+from apo_bench.simulation.transfer import UP, Grip, Transfer, aim
 
 LIFT, CARRY, LOWER = 0.25, 0.35, 0.2
 """Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
@@ -33,7 +33,7 @@ def carry_out(robot: Robot, t: Transfer) -> None:
         come_down(robot, t, grip)
         left = 0.0
     release(robot, t, grip)
-    depart(robot)
+    depart(robot, t)
     if left > ARRIVED_M:
         raise Halt("attach", "force_stop")
     for other in t.centring:
@@ -50,7 +50,7 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.carried:
         robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(SAFE_M, robot.T[2, 3])), LIFT))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), LIFT))
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
@@ -58,9 +58,9 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
     if t.into.level:
         before = moved(before, t.floats, 1.0)
-    robot.go(at_height(before, max(SAFE_M, before[2, 3])), CARRY)
+    robot.go(at_height(before, max(t.safe, before[2, 3])), CARRY)
     robot.follow(smooth(robot.T, before, LOWER))
     robot.wait(0.1)
     check_grasp(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.load() < LOST_LOAD * t.weight_n:
-        raise Halt("carry", "lost_grasp")
+        raise Halt("carry", "lost_grasp", " or ".join(t.carried))

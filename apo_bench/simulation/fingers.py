@@ -5,7 +5,7 @@ from __future__ import annotations
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.paths import at_height, moved, smooth
 from apo_bench.simulation.robot import Halt, Robot
-from apo_bench.simulation.transfer import SAFE_M, Grip, Transfer, hover
+from apo_bench.simulation.transfer import Grip, Transfer, hover
 
 FREE, NEAR = 1.4, 0.55
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
@@ -19,7 +19,7 @@ LOST_M = 0.002
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
     above = at_height(at, hover(at))
-    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3])), NEAR))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), NEAR))
     robot.go(at_height(above, robot.T[2, 3]), FREE, turn_speed=3.0)
     robot.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
@@ -41,11 +41,11 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.hold()
 
 
-def depart(robot: Robot) -> None:
+def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
     robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], DEPART_M), NEAR))
     robot.handle(None)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(SAFE_M, robot.T[2, 3])), FREE))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), FREE))
 
 
 def change(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
@@ -53,7 +53,7 @@ def change(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> No
     stage = robot.stage
     robot.wait(0.05)
     release(robot, t, grip)
-    depart(robot)
+    depart(robot, t)
     robot.stage = stage
     grasp(robot, t, second, at)
 
@@ -63,7 +63,7 @@ def centre(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "release"
     grasp(robot, t, grip, t.T_world_goal @ grip.T_part_tip)
     release(robot, t, grip)
-    depart(robot)
+    depart(robot, t)
 
 
 def check_grasp(robot: Robot, grip: Grip) -> None:

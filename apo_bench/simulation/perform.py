@@ -20,7 +20,7 @@ SHIFT = 0.03
 NUDGE = 0.01
 """Peak speed of lifting and lowering a part for an adjustment, [m/s]."""
 SAFE_M = 0.16
-"""Height at which parts are carried over the others."""
+"""Least height at which parts are carried over the others."""
 DROP_M = 0.0002
 """A part is let go this much above its support, as nobody presses it into the table."""
 LIFT_M = 0.0003
@@ -38,7 +38,7 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
     before, beside, goal = _ends(hands, act, T)
     if act.out.any():
         T = _free(hands, T, act.out, clearance_m)
-    safe = max(SAFE_M, before[2, 3])
+    safe = max(SAFE_M, act.over, before[2, 3])
     for end in (at_height(T, max(safe, T[2, 3])), at_height(before, safe), before):
         hands.move((0, smooth(T, end, SPEED, turn_speed=4.0)))
         T = end

@@ -82,7 +82,7 @@ def _carry_out(
         except Halt as halt:
             if halt.code == "force_stop" and not step.undo:
                 after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
-            return _outcome(plan, halt.stage, halt.code, step.operation)
+            return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
         after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
         timeline.append((step, float(robot.data.time)))
     return Outcome("done", "ok", None, sentence("ok"))
@@ -110,5 +110,5 @@ def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
     return snapshot(robot.scene.work, robot.data, plan.start)
 
 
-def _outcome(plan: Plan, stage: str, code: str, k: int) -> Outcome:
-    return Outcome(stage, code, k, sentence(code, part=plan.assembly.operations[k].main, operation=k))
+def _outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:
+    return Outcome(stage, code, k, sentence(code, part=part or plan.assembly.operations[k].main, operation=k))

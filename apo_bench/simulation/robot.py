@@ -34,9 +34,11 @@ Watch = Callable[[Any], None]
 class Halt(Exception):
     """The robot gives up; caught by `replay`, which makes an `Outcome` of it."""
 
-    def __init__(self, stage: str, code: str) -> None:
-        super().__init__(stage, code)
+    def __init__(self, stage: str, code: str, part: str = "") -> None:
+        super().__init__(stage, code, part)
         self.stage, self.code = stage, code
+        self.part = part
+        """Which part it is about, if not the one that is moved."""
 
 
 class Guard(NamedTuple):
@@ -170,8 +172,9 @@ class Robot:
         if unstable(self.data):
             raise Halt(self.stage, "unstable_simulation")
         self._feel()
-        if self._hardest_blow() > COLLISION_N:
-            raise Halt(self.stage, "collision")
+        struck, force = self._hardest_blow()
+        if force > COLLISION_N:
+            raise Halt(self.stage, "collision", struck)
         if self.watch is not None:
             self.watch(self.data)
 
@@ -184,12 +187,13 @@ class Robot:
     def _pushed_back(self, guard: Guard) -> bool:
         return bool(-(self._feel() @ guard.way) > guard.newton)
 
-    def _hardest_blow(self) -> float:
-        """Largest force between the arm and a part that it does not handle, [N]."""
+    def _hardest_blow(self) -> tuple[str, float]:
+        """The part that the arm strikes hardest without handling it, and the force, [N]."""
         squares = (self._on_arm * self._on_arm).sum(axis=1)
         if self._handled is not None:
             squares[self._handled] = 0.0
-        return float(np.sqrt(squares.max()))
+        i = int(squares.argmax())
+        return (*self.scene.work.free, *self.scene.work.fixed)[i], math.sqrt(squares[i])
 
     def handle(self, part: str | None) -> None:
         """Say which part the fingers may touch."""

@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.solid import Solid
 from apo_bench.program import Poses
 
 SLOW_M = 0.003
@@ -71,3 +72,10 @@ def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
 def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:
     """What the moved part touches."""
     return {of.part for contact in contacts for of in contact} - set(moved)
+
+
+def heights(solid: Solid, T: Array) -> tuple[float, float]:
+    """The lowest and the highest point of a part, [m]."""
+    ends = [(T[2, :3] @ box.center, np.abs(T[2, :3]) @ box.half) for box in solid.boxes]
+    low, high = min(at - reach for at, reach in ends), max(at + reach for at, reach in ends)
+    return float(T[2, 3] + low), float(T[2, 3] + high)

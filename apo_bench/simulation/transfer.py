@@ -12,7 +12,7 @@ from apo_bench.simulation.paths import at_height, moved
 
 UP = np.array([0.0, 0.0, 1.0])
 SAFE_M = 0.15
-"""Height of the tip at which parts are carried over the others."""
+"""Least height of the tip at which parts are carried over the others."""
 HOVER_M = 0.11
 """So far above a grasp the hand comes to a stand."""
 ASIDE_M = 0.006
@@ -64,6 +64,10 @@ class Transfer:
     """Directions in which the part is slid onto another one at its side, (3,) each."""
     away: tuple[Array, ...]
     """Directions in which the part is first moved off another one at its side, (3,) each."""
+    over: float
+    """Height of the tip at which the empty hand passes over everything that stands, [m]."""
+    safe: float
+    """Height of the tip at which the part is carried over everything that stands, [m]."""
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
     weight_n: float
@@ -95,7 +99,7 @@ def key_poses(t: Transfer) -> tuple[Array, ...]:
     pick, goal = t.T_world_start @ first, t.T_world_goal @ last
     free = moved(t.T_world_start @ carrying, t.out.way, -t.out.travel)
     before = moved(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
-    high = [at_height(T, max(SAFE_M, T[2, 3])) for T in (free, before)]
+    high = [at_height(T, max(t.safe, T[2, 3])) for T in (free, before)]
     return (at_height(pick, hover(pick)), pick, *([free] if t.out.level else []), *high, before, goal)
 
 

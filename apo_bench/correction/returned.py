@@ -1,0 +1,96 @@
+"""What a corrector of somebody else's returned: whether it can be executed and written into a row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.rigid import rigid
+from apo_bench.program import Correction, Step, Try
+from apo_bench.schedule import REMEDY, fault
+
+RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
+SAME = 1e-9
+"""Poses that differ by less, [m] and unitless, are one and the same."""
+
+
+def checked(found: Correction, n: int, name: str) -> Correction:
+    """The correction of n operations by the corrector called `name`, its schedule made of steps.
+
+    Raises:
+        InputError: The first thing that is wrong.
+    """
+    found = replace(found, schedule=_steps(found.schedule, name))
+    _check_numbers(found, n, name)
+    _check_schedule(found, name)
+    return found
+
+
+def _steps(schedule: Any, name: str) -> tuple[Step, ...]:
+    """The schedule as steps; pairs of a whole number and a truth value will do."""
+    steps = []
+    for i, given in enumerate(schedule if isinstance(schedule, Sequence) else [schedule], start=1):
+        pair = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
+        k, undo = (*pair, False)[:2]
+        if len(pair) not in (1, 2) or not _whole(k) or not isinstance(undo, bool | np.bool_):
+            raise InputError(
+                f"the corrector '{name}' returned {given!r} as step {i} of its schedule; "
+                "return `Step(operation, undo)`, the operation counted from 0."
+            )
+        steps.append(Step(int(k), bool(undo)))
+    return tuple(steps)
+
+
+def _check_numbers(found: Correction, n: int, name: str) -> None:
+    """What a row repeats: operations that exist, gaps that are numbers."""
+    tried = found.tried if isinstance(found.tried, Sequence) else (found.tried,)
+    named = [("freed", k) for k in _listed(found.freed)]
+    for one in tried:
+        if not isinstance(one, Try):
+            raise InputError(f"the corrector '{name}' returned {one!r} among `tried`; return `Try(step, free, gap_m)`.")
+        named += [("tried", k) for k in (one.step, *_listed(one.free))]
+    for field, k in named:
+        if not _whole(k) or not 0 <= k < n:
+            raise InputError(
+                f"the corrector '{name}' returned the operation {k!r} in `{field}`; "
+                f"return whole numbers from 0 to {n - 1}."
+            )
+    gaps = [("gap_before_m", found.gap_before_m), ("gap_after_m", found.gap_after_m)]
+    for field, gap_m in (*gaps, *(("gap_m of `tried`", one.gap_m) for one in tried)):
+        if not isinstance(gap_m, float | int | np.floating):
+            raise InputError(f"the corrector '{name}' returned {gap_m!r} as {field}; return a length in metres.")
+
+
+def _listed(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _check_schedule(found: Correction, name: str) -> None:
+    if found.schedule and (wrong := fault(found.schedule, len(found.goals))):
+        raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {REMEDY}.")
+    if found.targets is None:
+        return
+    if not found.schedule:
+        raise InputError(
+            f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets."
+        )
+    for j in np.flatnonzero(~rigid(found.targets)):
+        raise InputError(
+            f"the corrector '{name}' returned a target for step {j + 1} of its schedule that is not a rigid pose; "
+            f"{RIGID}."
+        )
+    ends = {step.operation: i for i, step in enumerate(found.schedule) if not step.undo}
+    for k, i in ends.items():
+        if np.abs(found.targets[i] - found.goals[k]).max() > SAME:
+            raise InputError(
+                f"the corrector '{name}' returned a last target for operation {k + 1} that is not its goal; "
+                "return goals that are the targets in force at the end."
+            )
