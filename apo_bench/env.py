@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
 from apo_bench.benchmark.spec import check_careless, check_clearance, check_seed, level_pair
-from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, foretold, see, show, unseen
+from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, foretold, misshown, see, show, unseen
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.infos import predicted_info, whole
 from apo_bench.observation.noise import Level, Noise, make_noise
-from apo_bench.outcomes import sentence
 from apo_bench.program import Observation, Plan, Poses, Step
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
@@ -256,9 +255,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def _replayed(self, shown: Shown, plan: Plan) -> tuple[bool, bool, Ending, dict[str, Any] | None]:
         """Strict success, loose success, where it ended, and what the plan had said."""
-        code = shown.demonstration.code
-        if code != "ok":
-            return False, False, Ending("demonstrate", code, None, sentence(code)), None
+        if shown.demonstration.code != "ok":
+            return False, False, misshown(shown.demonstration), None
         if self._refused is not None:
             return False, False, self._refused, None
         said = foretold(plan, self._scene)

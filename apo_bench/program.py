@@ -53,7 +53,9 @@ class Demonstration:
     careless: Array
     """(n, 6, 6) covariance [m, rad] that the human's carelessness adds, body frame of each main part."""
     code: str = "ok"
-    """`ok`, or why the demonstration itself failed."""
+    """`ok`, or `demonstration_failed`."""
+    why: str = ""
+    """What the judge found wrong, in words."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)

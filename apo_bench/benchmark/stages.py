@@ -72,6 +72,12 @@ def see(scene: Scene, shown: Shown, noise: Noise, seed: int) -> Observation:
     return observe(shown.demonstration, noise, rng, gap_m=scene.scenario.gap_mm * 1e-3)
 
 
+def misshown(shown: Demonstration) -> Ending:
+    """Why a demonstration that is not right itself is not replayed."""
+    why = f": {shown.why}" if shown.why else ""
+    return Ending("demonstrate", shown.code, None, sentence(shown.code) + why)
+
+
 def unseen(seen: Observation) -> Ending | None:
     """Why an observation cannot be replayed as it is: an operation was not seen."""
     if seen.seen.all():

@@ -12,12 +12,11 @@ import numpy as np
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
-from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, see, show
+from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, misshown, see, show
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.outcomes import sentence
 from apo_bench.pose_error import pose_errors
 from apo_bench.program import Observation, Plan, Snapshot
 from apo_bench.simulation.scene import Scene
@@ -44,8 +43,7 @@ def run_trial(
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     head = _head(spec, scene, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
     if shown.demonstration.code != "ok":
-        code = shown.demonstration.code
-        return head | _result(Ending("demonstrate", code, None, sentence(code)), success=None)
+        return head | _result(misshown(shown.demonstration), success=None)
     noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
     planned = plan(spec.method, see(scene, shown, noise, spec.seed), shown.layout.goals)
     return head | _carry_out(planned, scene, shown.layout.goals, shown.layout.goals, watch)

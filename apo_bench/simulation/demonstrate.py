@@ -8,6 +8,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.human_error import careless_covariance, spread
 from apo_bench.judge import judge
+from apo_bench.outcomes import sentence
 from apo_bench.placement import placed
 from apo_bench.program import Demonstration, Layout, Reached, Snapshot
 from apo_bench.scenario import Carelessness
@@ -43,13 +44,15 @@ def demonstrate(scene: Scene, layout: Layout, careless: float, rng: np.random.Ge
         goals.append(after[-1].poses[operation.main])
     hands.wait(REST_S)
     final = snapshot(scene.shown, hands.data, layout.start)
+    why = "the simulation became unstable" if unstable(hands.data) else _wrong(scene, layout, after, final)
     return Demonstration(
         assembly=scenario.assembly,
         start=layout.start,
         goals=np.array(goals),
         final=final.poses,
         careless=careless_covariance(scenario, careless),
-        code="ok" if not unstable(hands.data) and _right(scene, layout, after, final) else "demonstration_failed",
+        code="demonstration_failed" if why else "ok",
+        why=why,
     )
 
 
@@ -61,8 +64,8 @@ def _draw(how: Carelessness | None, careless: float, rng: np.random.Generator) -
     return careless * sign * (how.low_m + size * (how.high_m - how.low_m)) * how.axis
 
 
-def _right(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> bool:
-    """Whether what the human built is right at the end; that late adjustments pushed a part is no fault."""
+def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> str:
+    """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
     verdict = judge(
         scene.scenario.assembly,
         Reached(after=tuple(after), final=final),
@@ -70,4 +73,9 @@ def _right(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot)
         scene.scenario.thresholds,
         scene.clearance_mm,
     )
-    return not any(found for fault, found in verdict.conditions.items() if fault != "pushed")
+    fault = next((fault for fault, found in verdict.conditions.items() if found and fault != "pushed"), None)
+    if fault is None:
+        return ""
+    bad = next((c for c in verdict.contacts if not c.strict), None)
+    where = f" ({bad.contact}, operation {bad.operation + 1})" if bad and fault in ("gap", "overlap") else ""
+    return sentence(fault) + where
