@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly import Assembly, Contact
 from apo_bench.geometry.arrays import Array, frozen
 
 Poses = Mapping[str, Array]
@@ -152,6 +152,46 @@ class Try(NamedTuple):
     """Largest |e| over the equations of the trial, after solving."""
 
 
+class Suspect(NamedTuple):
+    """A relation, and how well everything else fits without it."""
+
+    relation: str
+    """R1, R2, ... as in the relation graph: all contacts of one operation between one pair of parts."""
+    contacts: tuple[Contact, ...]
+    made: int
+    """The operation that made it, counted from 0."""
+    chi_square: float
+    """Squared Mahalanobis length of the correction when its equations are left out."""
+    freedom: int
+    """Rank of the equations that are left."""
+    p_value: float
+
+
+@final
+@dataclass(frozen=True)
+class Test:
+    """The chi-square test of a correction: is it larger than the stated noise explains?"""
+
+    chi_square: float
+    """Squared Mahalanobis length of the correction, what is left of contradictory contacts added."""
+    freedom: int
+    """Degrees of freedom: the rank of the contact equations at the solution."""
+    p_value: float
+    level: float
+    """The test fails if the p-value is below."""
+    suspects: tuple[Suspect, ...] = ()
+    """Every relation, the most suspect first; looked for only if the test fails."""
+
+    @property
+    def passes(self) -> bool:
+        return self.p_value >= self.level
+
+    @property
+    def ambiguous(self) -> tuple[Suspect, ...]:
+        """The ambiguity set: relations without any one of which the test would pass."""
+        return tuple(suspect for suspect in self.suspects if suspect.p_value >= self.level)
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Correction:
@@ -173,9 +213,17 @@ class Correction:
     """What to do and undo, in order; empty stands for: every operation once."""
     targets: Array | None = None
     """(steps, 4, 4) as in `Plan`; None stands for `goals` throughout."""
+    test: Test | None = None
+    """Whether the stated noise explains the correction; None of correctors that do not ask."""
+    covariance: Array | None = None
+    """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown."""
+    dropped: tuple[str, ...] = ()
+    """Relations that were left out, since the test named them."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
+        if self.covariance is not None:
+            object.__setattr__(self, "covariance", frozen(self.covariance, len(self.goals), 6, 6))
         if self.targets is not None:
             object.__setattr__(self, "targets", frozen(self.targets, len(self.schedule), 4, 4))
 

@@ -32,7 +32,7 @@ CORRECTORS = MappingProxyType(
         "no-disappeared": "apo_bench.correction.ablations:no_disappeared",
     }
 )
-STATUSES = ("converged", "not_seen", "inconsistent", "not_converged", "not_finite")
+STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
 
 
 def correct(seen: Observation, corrector: Any = "paper") -> Correction:
