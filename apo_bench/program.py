@@ -169,7 +169,7 @@ class Suspect(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class Test:
+class Consistency:
     """The chi-square test of a correction: is it larger than the stated noise explains?"""
 
     chi_square: float
@@ -213,7 +213,7 @@ class Correction:
     """What to do and undo, in order; empty stands for: every operation once."""
     targets: Array | None = None
     """(steps, 4, 4) as in `Plan`; None stands for `goals` throughout."""
-    test: Test | None = None
+    test: Consistency | None = None
     """Whether the stated noise explains the correction; None of correctors that do not ask."""
     covariance: Array | None = None
     """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown."""
