@@ -18,7 +18,13 @@ from apo_bench.program import Demonstration, Observation
 Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 """Any function `(assembly, shown, rng) -> Observation` is a noise model."""
 
-NOISES = MappingProxyType({"isotropic": "apo_bench.observation.isotropic:Isotropic"})
+NOISES = MappingProxyType(
+    {
+        "isotropic": "apo_bench.observation.isotropic:Isotropic",
+        "anisotropic": "apo_bench.observation.anisotropic:Anisotropic",
+        "per-part": "apo_bench.observation.per_part:PerPart",
+    }
+)
 
 
 class Level(NamedTuple):

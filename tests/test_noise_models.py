@@ -1,0 +1,143 @@
+"""Noise that is not the same everywhere: the camera's line of sight, and parts that are seen worse than others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.anisotropic import (
+    ACROSS,
+    ALONG,
+    IN_IMAGE,
+    OUT_OF_IMAGE,
+    Anisotropic,
+    line_of_sight,
+)
+from apo_bench.observation.isotropic import FLOOR, Isotropic
+from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
+from apo_bench.observation.observe import observe
+from apo_bench.observation.per_part import LEAST, MOST, PerPart, factors
+from apo_bench.program import Observation
+from tests import scenes
+
+TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
+MODELS = [Anisotropic, PerPart]
+LEVEL = Level(3.0, 6.0)
+
+
+def see(noise: Noise, seed: int) -> Observation:
+    return observe(scenes.shown(TOWER), noise, np.random.default_rng(seed))
+
+
+def twists(seen: Observation, shown: Array) -> Array:
+    """Body twists by which goals are wrong, (n, 6)."""
+    return pose.log(pose.inverse(shown) @ seen.goals)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_draws_have_the_stated_covariance(model: Callable[[Level], Noise]) -> None:
+    """Whitened by what each observation states, errors of any draw are of zero mean and unit covariance."""
+    z = []
+    for seed in range(700):
+        seen = see(model(LEVEL), seed)
+        L = np.linalg.cholesky(seen.covariance)
+        z.append(np.linalg.solve(L, twists(seen, TOWER.goals)[..., None])[..., 0])
+    unit = np.concatenate(z)
+    assert np.abs(unit.mean(axis=0)).max() < 4 / np.sqrt(len(unit))
+    assert_allclose(unit.T @ unit / len(unit), np.eye(6), atol=5 / np.sqrt(len(unit)))
+
+
+def test_draws_differ_along_the_sight_and_across_it() -> None:
+    """Empirical world covariance against the factors, whatever the part's frame."""
+    sight, world = line_of_sight(), []
+    for seed in range(1000):
+        seen = see(Anisotropic(LEVEL), seed)
+        R = seen.goals[:, :3, :3]
+        xi = twists(seen, TOWER.goals)
+        world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
+    for half, (along, across), sigma in zip(
+        np.concatenate(world, axis=1),
+        ((ALONG, ACROSS), (IN_IMAGE, OUT_OF_IMAGE)),
+        (3e-3, np.radians(6.0)),
+        strict=True,
+    ):
+        expected = sigma**2 * (across**2 * np.eye(3) + (along**2 - across**2) * np.outer(sight, sight))
+        assert_allclose(half.T @ half / len(half), expected, atol=0.1 * np.abs(expected).max())
+
+
+def test_the_line_of_sight_is_fixed_in_the_world() -> None:
+    """Turn the parts: the body covariance turns, that in the world stays."""
+    turned = scenes.turned(TOWER, pose.at((0.3, 0.1, 0.0), (15.0, -40.0, 100.0)))
+    worlds = []
+    for scene in (TOWER, turned):
+        seen = observe(scenes.shown(scene), Anisotropic(LEVEL), np.random.default_rng(4))
+        R = np.zeros((len(seen.goals), 6, 6))
+        R[:, :3, :3] = R[:, 3:, 3:] = seen.goals[:, :3, :3]
+        worlds.append(R @ seen.covariance @ np.swapaxes(R, 1, 2))
+    assert_allclose(worlds[1], worlds[0], atol=1e-15)
+    assert_allclose(worlds[0], np.tile(worlds[0][0], (3, 1, 1)), atol=1e-15)
+
+
+def test_the_geometric_mean_is_that_of_isotropic() -> None:
+    """Determinants: 0.91 of the level for positions, the level itself for turns."""
+    seen = see(Anisotropic(LEVEL), 0)
+    for half, expected in ((slice(0, 3), (ALONG * ACROSS**2) ** (1 / 3) * 3e-3), (slice(3, 6), np.radians(6.0))):
+        assert_allclose(np.linalg.det(seen.covariance[:, half, half]) ** (1 / 6), expected, rtol=1e-9)
+    assert_allclose((ALONG * ACROSS**2) ** (1 / 3), 0.909, atol=1e-3)
+
+
+def test_a_part_is_as_bad_in_every_operation() -> None:
+    """The error of each operation is that of `isotropic` times the factor of the part it moves."""
+    plain, seen = see(Isotropic(LEVEL), 8), see(PerPart(LEVEL), 8)
+    ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
+    assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
+    rng = np.random.default_rng(8)
+    rng.standard_normal((3, 6))
+    factor = factors(TOWER.assembly.solids, rng)
+    assert_allclose(ratio[:, 0], [factor[o.main] for o in TOWER.assembly.operations], rtol=1e-6)
+    assert_allclose(seen.covariance, ratio[:, :1, None] ** 2 * plain.covariance, rtol=1e-6)
+
+
+def test_factors_are_log_uniform() -> None:
+    from scipy.stats import kstest
+
+    drawn = np.log(list(factors([str(i) for i in range(2000)], np.random.default_rng(2)).values()))
+    assert kstest(drawn, "uniform", (np.log(LEAST), np.log(MOST) - np.log(LEAST))).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("name", sorted(NOISES))
+def test_level_zero_is_exact_bit_for_bit_and_states_the_floor(name: str) -> None:
+    seen = see(make_noise(name, Level(0.0, 0.0)), 5)
+    assert seen.goals.tobytes() == scenes.shown(TOWER).goals.tobytes()
+    assert_allclose(seen.covariance, np.tile(np.diag(FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
+
+
+@pytest.mark.parametrize("name", sorted(NOISES))
+def test_levels_only_scale_the_same_unit_draws(name: str) -> None:
+    """In the world frame of what is seen a twist is linear in the level; the generator is consumed alike."""
+    worlds, after = [], set()
+    for level in (Level(1.0, 0.5), Level(4.0, 1.0)):
+        rng = np.random.default_rng(2)
+        seen = observe(scenes.shown(TOWER), make_noise(name, level), rng)
+        R, xi = seen.goals[:, :3, :3], twists(seen, TOWER.goals)
+        position = xi[:, :3] if name != "anisotropic" else np.einsum("nij,nj->ni", R, xi[:, :3])
+        worlds.append(np.concatenate([position, xi[:, 3:]], axis=1))
+        after.add(rng.random())
+    assert_allclose(worlds[1][:, :3], 4.0 * worlds[0][:, :3], rtol=1e-6)
+    assert_allclose(worlds[1][:, 3:], 2.0 * worlds[0][:, 3:], rtol=1e-6)
+    assert len(after) == 1
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_carelessness_is_stated_but_not_drawn(model: Callable[[Level], Noise]) -> None:
+    careless = np.zeros((3, 6, 6))
+    careless[1, 1, 1] = 0.0029**2
+    plain = observe(scenes.shown(TOWER), model(LEVEL), np.random.default_rng(0))
+    loose = observe(scenes.shown(TOWER, careless), model(LEVEL), np.random.default_rng(0))
+    assert_array_equal(loose.goals, plain.goals)
+    assert_allclose(loose.covariance - plain.covariance, careless, atol=1e-18)
