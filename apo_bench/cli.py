@@ -34,7 +34,8 @@ ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench 
 Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that fit; default: the scenario's.")]
 GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
 ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
-NoiseOption = Annotated[str | None, typer.Option(help="Noise model, or package.module:name; default: isotropic.")]
+NOISE = "isotropic, anisotropic, per-part, or package.module:name"
+RELATIONS = "What correctors are told of the contacts: given (right), missed, false, shifted:3 (mm)"
 Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
 
 
@@ -169,7 +170,8 @@ def replay(
     clearance: Clearance = None,
     grasp: GraspOption = "friction",
     arm: ArmOption = "six_axis",
-    noise: NoiseOption = None,
+    noise: Annotated[str | None, typer.Option(help=f"{NOISE}; default: isotropic.")] = None,
+    relations: Annotated[str | None, typer.Option(help=f"{RELATIONS}; default: given.")] = None,
     timestep_ms: Timestep = 1.0,
     observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,
     save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
@@ -194,6 +196,7 @@ def replay(
             level_deg=level_deg,
             careless=careless,
             noise=noise,
+            relations=relations,
             seed=seed,
             method=method,
             clearance_mm=clearance,
@@ -227,7 +230,8 @@ def sweep(
     clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,
     grasp: GraspOption = "friction",
     arm: ArmOption = "six_axis",
-    noise: NoiseOption = None,
+    noise: Annotated[str, typer.Option(help=f"{NOISE}; several with commas.")] = "isotropic",
+    relations: Annotated[str, typer.Option(help=f"{RELATIONS}; several with commas.")] = "given",
     timestep_ms: Timestep = 1.0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
 ) -> None:
@@ -245,7 +249,8 @@ def sweep(
         clearances_mm=() if clearance is None else numbers(clearance, "--clearance"),
         trials=trials,
         seed=seed,
-        noise=noise or "isotropic",
+        noises=words(noise, "--noise"),
+        relations=words(relations, "--relations"),
         grasp=grasp,
         arm=arm,
         timestep_s=timestep_ms * 1e-3,

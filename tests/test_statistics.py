@@ -33,6 +33,7 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "level": 0.0 if method == "oracle" else 1.0,
         "level_deg": 0.0 if method == "oracle" else 1.0,
         "noise": "isotropic",
+        "relations": "given",
         "grasp": "friction",
         "method": method,
         "seed": seed,
@@ -197,8 +198,8 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
     assert made.figure.read_bytes().startswith(b"\x89PNG")
     page = made.page.read_text()
     assert made.figure.name in page
-    assert "| stick_in_tower | 0.25 mm | 1 | 0.5 | none | 25.0 % | 4.6 to 69.9 % | 4 | 0 |" in page
-    assert "| stick_in_tower | 0.25 mm | 1 | 0.5 | paper | 100.0 % | 43.9 to 100.0 % | 3 | 1 |" in page
+    assert "| stick_in_tower | 0.25 mm | isotropic | any | 1 | 0.5 | none | 25.0 % | 4.6 to 69.9 % | 4 | 0 |" in page
+    assert "| stick_in_tower | 0.25 mm | isotropic | given | 1 | 0.5 | paper | 100.0 % | 43.9 to 100.0 % | 3 | 1 |" in page
     assert "| stick_in_tower | none | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
     assert "| all | all | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
     confusion = list(csv.DictReader(made.confusion.open()))

@@ -49,7 +49,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["trial"] += 1
         assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed}"
         key = trial_key(spec, scene.scenario.name)
-        names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "method")
+        names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "noise", "relations", "method")
         return {"schema": ROW, **dict(zip(names, key, strict=True)), "success": spec.seed % 2 == 0}
 
     monkeypatch.setattr("apo_bench.benchmark.grid.load_scenario", LOAD)
@@ -66,6 +66,19 @@ def test_the_grid_is_every_combination_once() -> None:
     keys = [trial_key(t, loaded[t.scenario].name) for unit in units(spec, loaded) for t in unit.trials]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
     assert {key[2] for key in keys} == {0, 1}
+
+
+def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None:
+    spec = replace(SPEC, noises=("isotropic", "per-part"), relations=("given", "missed", "shifted:3.0", "shifted:3"))
+    assert spec.relations == ("given", "missed", "shifted:3")
+    loaded = load_all(spec)
+    trials = [t for unit in units(spec, loaded) for t in unit.trials]
+    keys = {trial_key(t, "stick_in_tower") for t in trials}
+    assert len(keys) == len(trials) == 3 * (1 + 2 * 2 * (1 + 3))
+    met = {m: {(t.noise, t.relations) for t in trials if t.method == m} for m in spec.methods}
+    assert met["oracle"] == {("isotropic", "given")}
+    assert met["none"] == {("isotropic", "given"), ("per-part", "given")}
+    assert len(met["paper"]) == 6
 
 
 def test_by_default_the_ceiling_the_raw_and_the_papers_way_are_compared() -> None:
@@ -215,7 +228,10 @@ def test_a_sweep_that_makes_no_sense_is_refused(change: dict[str, Any], words: s
     ("change", "words"),
     [
         ({"scenarios": ("stick_in_towr",)}, "did you mean 'stick_in_tower'"),
-        ({"noise": "isotropc"}, "did you mean 'isotropic'"),
+        ({"noises": ("isotropc",)}, "did you mean 'isotropic'"),
+        ({"relations": ("mised",)}, "did you mean 'missed'"),
+        ({"relations": ("shifted:0",)}, "a size above 0 and up to 50 mm is allowed: shifted:3"),
+        ({"relations": ()}, "no relations were given"),
         ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
         ({"methods": ("json:nothing",)}, "unknown corrector in module json 'nothing'"),
     ],

@@ -1,4 +1,4 @@
-"""Success over level: a panel per scenario and carelessness, a line with its interval per method."""
+"""Success over level: a panel per scenario, clearance, noise, relations and carelessness, a line per method."""
 
 from __future__ import annotations
 
@@ -13,6 +13,29 @@ DODGE = 0.07
 """Methods stand this far from each other at one level, so that equal rates do not hide each other."""
 MANY = 3
 """With more methods than this in a panel, the numbers of trials are left to the table."""
+
+
+class Row(NamedTuple):
+    """What the panels of one row of the figure have in common."""
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    relations: str
+
+    def holds(self, c: Cell) -> bool:
+        """Whether a cell is drawn here: the oracle meets no noise, and it and `none` are not told any relations."""
+        where = (c.scenario, c.clearance_mm) == (self.scenario, self.clearance_mm)
+        noise = c.method == "oracle" or c.noise == self.noise
+        return where and noise and (c.method in ("oracle", "none") or c.relations == self.relations)
+
+    def title(self, careless: float) -> str:
+        """`stick_in_tower, careful human, 0.25 mm clearance`, and what is not as usual."""
+        human = "careful human" if careless == 0 else f"carelessness {careless:g}"
+        unusual = [f"{self.noise} noise"] * (self.noise != "isotropic")
+        unusual += [f"relations {self.relations}"] * (self.relations != "given")
+        first = f"{self.scenario}, {human}, {self.clearance_mm:g} mm clearance"
+        return "\n".join([first, ", ".join(unusual)]) if unusual else first
 
 
 class Style(NamedTuple):
@@ -41,18 +64,16 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
     from matplotlib.figure import Figure
 
     swept = [cell for cell in cells if cell.method != "oracle"]
-    clearances = sorted({(c.scenario, c.clearance_mm) for c in cells})
+    rows = rows_of(cells)
     careless = sorted({c.careless for c in swept}) or [0.0]
-    columns, lines = len(careless), len(clearances)
+    columns, lines = len(careless), len(rows)
     figure = Figure(figsize=(0.9 + 4.3 * columns, 1.0 + 3.1 * lines), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(lines, columns, squeeze=False, sharey=True)
-    for i, (scenario, clearance) in enumerate(clearances):
-        mine = [c for c in cells if (c.scenario, c.clearance_mm) == (scenario, clearance)]
+    for i, row in enumerate(rows):
         for j, f in enumerate(careless):
-            human = "careful human" if f == 0 else f"carelessness {f:g}"
-            axes[i][j].set_title(f"{scenario}, {human}, {clearance:g} mm clearance", fontsize=10)
-            _panel(axes[i][j], mine, f)
+            axes[i][j].set_title(row.title(f), fontsize=10)
+            _panel(axes[i][j], [c for c in cells if row.holds(c)], f)
         axes[i][0].set_ylabel("strict success")
     figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
     handles = {label: h for axis in axes.flat for h, label in zip(*axis.get_legend_handles_labels(), strict=True)}
@@ -64,6 +85,13 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
         frameon=False,
     )
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
+
+
+def rows_of(cells: Sequence[Cell]) -> list[Row]:
+    """The rows of panels, in the order of the cells; the cells of methods that meet everything decide."""
+    keen = [c for c in cells if c.method not in ("oracle", "none")]
+    fewer = keen or [c for c in cells if c.method == "none"] or list(cells)
+    return list(dict.fromkeys(Row(c.scenario, c.clearance_mm, c.noise, c.relations) for c in fewer))
 
 
 def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:

@@ -6,7 +6,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, final
 
-from apo_bench.benchmark.spec import TrialSpec, check_careless, check_clearance, check_level, check_method, check_seed
+from apo_bench.benchmark.spec import (
+    TrialSpec,
+    check_careless,
+    check_clearance,
+    check_level,
+    check_method,
+    check_seed,
+    checked_relations,
+    knows_relations,
+)
 from apo_bench.errors import InputError
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
@@ -15,8 +24,8 @@ LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 METHODS = ("oracle", "none", "paper")
 LARGEST_TRIALS = 1_000_000
 
-Key = tuple[str, float, int, float, float, float, str]
-"""Scenario, clearance, seed, carelessness, level in mm, level in degrees, method: one trial of a sweep."""
+Key = tuple[str, float, int, float, float, float, str, str, str]
+"""Scenario, clearance, seed, carelessness, level in mm, in degrees, noise, relations, method: one trial of a sweep."""
 
 
 @final
@@ -34,15 +43,18 @@ class SweepSpec:
     trials: int = 100
     seed: int = 0
     """The first of the seeds."""
-    noise: str = "isotropic"
+    noises: tuple[str, ...] = ("isotropic",)
+    relations: tuple[str, ...] = ("given",)
+    """What correctors are told of the contacts, as in `TrialSpec`."""
     grasp: str = "friction"
     arm: str = "six_axis"
     timestep_s: float = 0.001
 
     def __post_init__(self) -> None:
-        for name in ("scenarios", "levels", "careless", "methods", "clearances_mm"):
+        object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
+        for name in ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations"):
             object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
-        for name in ("scenarios", "levels", "careless", "methods"):
+        for name in ("scenarios", "levels", "careless", "methods", "noises", "relations"):
             if not getattr(self, name):
                 raise InputError(f"no {name} were given for the sweep; at least one is needed.")
         if not 1 <= self.trials <= LARGEST_TRIALS:
@@ -84,7 +96,8 @@ def load_all(spec: SweepSpec) -> Mapping[str, Scenario]:
 def units(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
     """All the work of a sweep, seeds first, so that an interrupted sweep has every cell about equally full.
 
-    The oracle meets neither noise nor carelessness: it runs once per seed, recorded at level 0 and carelessness 0.
+    The oracle meets neither noise nor carelessness: it runs once per seed, recorded at level 0, carelessness 0 and the
+    first noise. Neither it nor `none` asks what touches what: both are recorded with the relations as given.
     """
     return tuple(
         Unit(_trials(spec, given, clearance, seed))
@@ -105,39 +118,42 @@ def described(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> dict[str, Any]
 def trial_key(trial: TrialSpec, name: str) -> Key:
     """The key of a trial whose scenario is called `name`."""
     t = trial
-    return (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg, t.method)
+    return (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg, t.noise, t.relations, t.method)
 
 
 def row_key(row: Mapping[str, Any]) -> Key:
     """The key of the trial that a row is of."""
     return (
         *(row["scenario"], row["clearance_mm"], row["seed"], row["careless"]),
-        *(row["level"], row["level_deg"], row["method"]),
+        *(row["level"], row["level_deg"], row["noise"], row["relations"], row["method"]),
     )
 
 
 def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tuple[TrialSpec, ...]:
-    def trial(method: str, level: float, careless: float) -> TrialSpec:
+    def trial(method: str, level: float, careless: float, noise: str, relations: str) -> TrialSpec:
         return TrialSpec(
             scenario=given,
             level_mm=level,
             level_deg=level,
             careless=careless,
             clearance_mm=clearance_mm,
-            noise=spec.noise,
+            noise=noise,
             grasp=spec.grasp,
             arm=spec.arm,
             method=method,
             seed=seed,
             timestep_s=spec.timestep_s,
+            relations=relations,
         )
 
-    ceiling = tuple(trial(method, 0.0, 0.0) for method in spec.methods if method == "oracle")
+    ceiling = tuple(trial(m, 0.0, 0.0, spec.noises[0], "given") for m in spec.methods if m == "oracle")
     rest = tuple(
-        trial(method, level, careless)
+        trial(method, level, careless, noise, relations)
         for careless in spec.careless
         for level in spec.levels
+        for noise in spec.noises
         for method in spec.methods
         if method != "oracle"
+        for relations in (spec.relations if knows_relations(method) else ("given",))
     )
     return ceiling + rest

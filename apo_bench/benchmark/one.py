@@ -27,6 +27,7 @@ class Request:
     level_deg: float | None = None
     careless: float | None = None
     noise: str | None = None
+    relations: str | None = None
     seed: int = 0
     method: str = "none"
     clearance_mm: float | None = None
@@ -95,12 +96,13 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
         method=request.method,
         seed=request.seed,
         timestep_s=request.timestep_s,
+        relations=request.relations or "given",
     )
 
 
 def _refuse_contradictions(request: Request) -> None:
     """Nothing is drawn for an observation that comes from a file."""
-    for name in ("level", "level_mm", "level_deg", "careless", "noise", "save_observation"):
+    for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "save_observation"):
         if getattr(request, name) is not None:
             option = "--" + name.replace("_", "-")
             raise InputError(

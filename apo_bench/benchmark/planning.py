@@ -25,18 +25,20 @@ class Planned:
     gap_after_m: float
 
 
-def plan(method: Any, seen: Observation, truth: Array | None) -> Planned:
+def plan(method: Any, seen: Observation, truth: Array | None, told: Observation | None = None) -> Planned:
     """What a method would have the robot do.
 
     Args:
         method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
+        told: What a corrector gets in place of `seen`, where the relations it is told are wrong. The plan has the
+            right ones all the same: what is executed are goals.
     """
     if isinstance(method, str) and method == "oracle" and truth is not None:
         return _as_it_is(seen, truth, None)
     if isinstance(method, str) and method == "none":
         return _as_it_is(seen, seen.goals, unseen(seen))
-    made = correct(seen, method)
+    made = correct(seen if told is None else told, method)
     return Planned(
         plan=_planned(seen, made) if made.ok else None,
         refused=None if made.ok else refusal(made),

@@ -13,11 +13,12 @@ from apo_bench.benchmark.effort import WORDS as EFFORT
 from apo_bench.benchmark.effort import effort_lines, efforts
 from apo_bench.benchmark.figure import draw, level_label
 from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.spec import knows_relations
 from apo_bench.benchmark.statistics import Cell, tally
 from apo_bench.errors import InputError
 
 COLUMNS = (
-    *("scenario", "clearance_mm", "careless", "level_mm", "level_deg", "method"),
+    *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "method"),
     *("trials", "successes", "rate", "low_95", "high_95", "loose_successes", "loose_rate", "excluded", "failures"),
 )
 
@@ -76,7 +77,7 @@ def _write_table(cells: Sequence[Cell], path: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for c in cells:
-            where = (c.scenario, c.clearance_mm, c.careless, c.level, c.level_deg, c.method)
+            where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg, c.method)
             loose = (c.loose_successes, c.loose_rate)
             writer.writerow([*where, c.trials, c.successes, c.rate, *c.interval, *loose, c.excluded, failures(c, 99)])
 
@@ -85,20 +86,20 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
     excluded = {(r["scenario"], r["seed"], r["careless"]) for r in rows if r["demonstration"] != "ok"}
     shown = {(r["scenario"], r["seed"], r["careless"]) for r in rows}
     grasps = ", ".join(sorted({r["grasp"] for r in rows}))
-    noises = ", ".join(sorted({r["noise"] for r in rows}))
     lines = [
         "# Success of replayed demonstrations",
         "",
-        f"{len(rows)} trials; grasp {grasps}, noise {noises}. A level of L is a standard deviation of L mm and "
-        "L degrees per axis.",
-        "`oracle` replays the drawn layout and meets neither noise nor carelessness; `none` replays what was seen.",
+        f"{len(rows)} trials; grasp {grasps}. A level of L is a standard deviation of L mm and L degrees per axis, "
+        "times what the noise model makes of it in a direction or for a part.",
+        "`oracle` replays the drawn layout and meets neither noise nor carelessness; `none` replays what was seen. "
+        "Neither is told what touches what, so wrong relations are met by correctors alone.",
         f"{len(excluded)} of {len(shown)} demonstrations were not right themselves and are left out of every method.",
         "",
         f"![Success over level]({made.figure.name})",
         "",
-        "| scenario | clearance | careless | level | method | strict success | 95 % interval | n | excluded | loose "
-        "| failures |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "| scenario | clearance | noise | relations | careless | level | method | strict success | 95 % interval | n "
+        "| excluded | loose | failures |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
         *(_line(cell) for cell in cells),
         "",
         "Strict and loose are the judge's; intervals are Wilson's; the same numbers stand in "
@@ -121,8 +122,9 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
 
 def _line(c: Cell) -> str:
     ceiling = c.method == "oracle"
+    noise, relations = "any" if ceiling else c.noise, c.relations if knows_relations(c.method) else "any"
     return (
-        f"| {c.scenario} | {c.clearance_mm:g} mm | {'any' if ceiling else f'{c.careless:g}'} "
+        f"| {c.scenario} | {c.clearance_mm:g} mm | {noise} | {relations} | {'any' if ceiling else f'{c.careless:g}'} "
         f"| {'any' if ceiling else level_label(c.level, c.level_deg)} | {c.method} | {percent(c.rate)} "
         f"| {interval(c)} | {c.trials} | {c.excluded} | {percent(c.loose_rate)} | {failures(c)} |"
     )

@@ -16,8 +16,6 @@ LARGEST_LEVEL = 50.0
 LARGEST_CARELESS = 10.0
 LARGEST_SEED = 2**53 - 1
 """Whole numbers up to here survive every JSON reader."""
-RELATIONS = "given"
-"""The contacts come with the demonstration; they are not recognised from the poses."""
 
 
 @final
@@ -37,7 +35,8 @@ class TrialSpec:
     method: str = "none"
     seed: int = 0
     timestep_s: float = 0.001
-    relations: str = RELATIONS
+    relations: str = "given"
+    """What a corrector is told of the contacts: `given`, `missed`, `false`, `shifted:3` (mm), or `module:name`."""
 
     def __post_init__(self) -> None:
         check_level(self.level_mm, "level in mm")
@@ -46,8 +45,7 @@ class TrialSpec:
         check_clearance(self.clearance_mm)
         check_method(self.method)
         check_seed(self.seed)
-        if self.relations != RELATIONS:
-            raise InputError(unknown("kind of relations", self.relations, (RELATIONS,)))
+        object.__setattr__(self, "relations", checked_relations(self.relations))
 
 
 def check_level(level: float, what: str = "level") -> None:
@@ -89,6 +87,21 @@ def check_method(method: str) -> None:
     known = ("oracle", "none", *CORRECTORS)
     if ":" not in method and method not in known:
         raise InputError(unknown("method", method, known) + " Or give your own corrector as 'package.module:name'.")
+
+
+def checked_relations(given: str) -> str:
+    """The relations as rows spell them; raise an `InputError` unless there are such."""
+    from apo_bench.observation.relations import KINDS, relations_name
+
+    name = relations_name(given)
+    if ":" not in name and name not in KINDS:
+        raise InputError(unknown("kind of relations", given, KINDS) + " Or give your own as 'package.module:name'.")
+    return name
+
+
+def knows_relations(method: str) -> bool:
+    """Whether a method is told what touches what; the oracle and `none` do not ask."""
+    return method not in ("oracle", "none")
 
 
 def _within(x: float, low: float, high: float, what: str, meaning: str) -> None:

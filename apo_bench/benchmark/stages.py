@@ -12,6 +12,7 @@ from apo_bench.judge import Verdict, judge
 from apo_bench.layout import draw_layout
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observe import observe
+from apo_bench.observation.relations import Relations, told
 from apo_bench.outcomes import sentence
 from apo_bench.prediction import predict
 from apo_bench.program import Demonstration, Layout, Observation, Plan, ReplayResult
@@ -19,7 +20,7 @@ from apo_bench.simulation.demonstrate import demonstrate
 from apo_bench.simulation.replay import replay
 from apo_bench.simulation.scene import Scene
 
-LAYOUT, DEMONSTRATION, OBSERVATION, ARM = range(4)
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS = range(5)
 """Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
 
 
@@ -70,6 +71,11 @@ def see(scene: Scene, shown: Shown, noise: Noise, seed: int) -> Observation:
     """Watch the demonstration of a trial through a noise model."""
     rng = stream(seed, OBSERVATION)
     return observe(shown.demonstration, noise, rng, gap_m=scene.scenario.gap_mm * 1e-3)
+
+
+def tell(seen: Observation, relations: Relations | None, truth: Array, seed: int) -> Observation:
+    """The observation of a trial as a corrector gets it: with relations that may be wrong."""
+    return told(seen, relations, truth, stream(seed, RELATIONS))
 
 
 def misshown(shown: Demonstration) -> Ending:

@@ -1,4 +1,4 @@
-"""Success rates with intervals: one cell per scenario, clearance, carelessness, level and method."""
+"""Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level and method."""
 
 from __future__ import annotations
 
@@ -10,8 +10,18 @@ from typing import Any, NamedTuple, final
 
 CONFIDENCE = 0.95
 
-Place = tuple[str, float, float, float, float, str]
-"""Scenario, clearance, carelessness, level in mm, level in degrees, method: all but the seed."""
+
+class Place(NamedTuple):
+    """What the trials of a cell have in common: all but the seed."""
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    relations: str
+    careless: float
+    level: float
+    level_deg: float
+    method: str
 
 
 class Interval(NamedTuple):
@@ -28,6 +38,8 @@ class Cell:
 
     scenario: str
     clearance_mm: float
+    noise: str
+    relations: str
     careless: float
     level: float
     level_deg: float
@@ -73,37 +85,28 @@ def rank(method: str) -> int:
     return first.index(method) if method in first else len(first)
 
 
+def rank_relations(relations: str) -> tuple[int, str]:
+    """Right relations first."""
+    return int(relations != "given"), relations
+
+
 def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
-    """Count rows into cells, sorted by scenario, clearance, carelessness, method (`oracle` first), level.
+    """Count rows into cells, sorted by scenario, clearance, noise, relations, carelessness, method, level.
 
     Rows of a measured demonstration have no level and belong to no cell.
     """
     groups: dict[Place, list[Mapping[str, Any]]] = {}
     for row in rows:
         if row["level"] is not None:
-            place = (
-                row["scenario"],
-                row["clearance_mm"],
-                row["careless"],
-                row["level"],
-                row["level_deg"],
-                row["method"],
-            )
-            groups.setdefault(place, []).append(row)
+            groups.setdefault(Place(*(row[name] for name in Place._fields)), []).append(row)
     return tuple(_cell(key, groups[key]) for key in sorted(groups, key=_order))
 
 
 def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
     counted = [row for row in rows if row["success"] is not None]
     why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in counted if not row["success"])
-    scenario, clearance, careless, level, level_deg, method = key
     return Cell(
-        scenario=scenario,
-        clearance_mm=clearance,
-        careless=careless,
-        level=level,
-        level_deg=level_deg,
-        method=method,
+        **key._asdict(),
         trials=len(counted),
         successes=sum(row["success"] for row in counted),
         loose_successes=sum(row["loose_success"] for row in counted),
@@ -113,5 +116,6 @@ def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
 
 
 def _order(key: Place) -> tuple[Any, ...]:
-    scenario, clearance, careless, level, level_deg, method = key
-    return (scenario, clearance, careless, rank(method), method, level, level_deg)
+    k = key
+    where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
+    return (*where, rank(k.method), k.method, k.level, k.level_deg)

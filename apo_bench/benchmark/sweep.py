@@ -25,6 +25,7 @@ from apo_bench.correction.correct import CORRECTORS
 from apo_bench.errors import InputError
 from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.relations import make_relations
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.arm import find_arm
 from apo_bench.simulation.scene import Scene, build_scene
@@ -56,7 +57,10 @@ def sweep(spec: SweepSpec, out: str | Path, *, workers: int = 1, command: str = 
     if not 1 <= workers <= LARGEST_WORKERS:
         raise InputError(f"{workers} workers were given; a whole number from 1 to {LARGEST_WORKERS} is allowed.")
     loaded = load_all(spec)
-    make_noise(spec.noise, Level(0.0, 0.0))
+    for noise in spec.noises:
+        make_noise(noise, Level(0.0, 0.0))
+    for relations in spec.relations:
+        make_relations(relations)
     arm = find_arm(spec.arm)
     for method in spec.methods:
         if method not in ("oracle", "none"):
@@ -123,7 +127,7 @@ class Worker:
 
     def _timing(self, row: Row, began: float, ready: float, shown: float, ended: float) -> dict[str, Any]:
         """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
-        keys = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "method")
+        keys = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "noise", "relations", "method")
         return {
             **{key: row[key] for key in keys},
             "compile_s": ready - began,

@@ -13,6 +13,7 @@ from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.report import failures, interval, percent
+from apo_bench.benchmark.spec import knows_relations
 from apo_bench.benchmark.statistics import Cell
 from apo_bench.scenario import Scenario
 
@@ -36,15 +37,20 @@ def print_row(row: Mapping[str, Any]) -> None:
 def print_cells(cells: Sequence[Cell]) -> None:
     """Strict success rates with their intervals."""
     table = Table(box=None, pad_edge=False)
-    for name in ("scenario", "clearance", "careless", "level", "method"):
+    unusual = [
+        n for n, usual in (("noise", "isotropic"), ("relations", "given")) if {getattr(c, n) for c in cells} - {usual}
+    ]
+    for name in ("scenario", "clearance", *unusual, "careless", "level", "method"):
         table.add_column(name)
     for name in ("success", "95 % interval", "n", "loose"):
         table.add_column(name, justify="right")
     table.add_column("failures")
     for c in cells:
         where = (f"{c.careless:g}", level_label(c.level, c.level_deg)) if c.method != "oracle" else ("any", "any")
+        met = {"noise": c.method != "oracle", "relations": knows_relations(c.method)}
+        axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
         rates = (percent(c.rate), interval(c), str(c.trials), percent(c.loose_rate))
-        table.add_row(c.scenario, f"{c.clearance_mm:g} mm", *where, c.method, *rates, failures(c))
+        table.add_row(c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))
     _console().print(table)
     excluded = sum(c.excluded for c in cells)
     if excluded:
@@ -61,6 +67,8 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
         asked = "measured observation"
     else:
         asked = f"level {level_label(row['level'], row['level_deg'])}, careless {row['careless']:g}, seed {row['seed']}"
+        asked += f", {row['noise']} noise" * (row["noise"] != "isotropic")
+        asked += f", relations {row['relations']}" * (row["relations"] != "given")
     lines = [
         ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
         ("trial", asked),

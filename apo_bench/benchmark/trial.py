@@ -12,11 +12,12 @@ import numpy as np
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
-from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, misshown, see, show
+from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, misshown, see, show, tell
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.relations import make_relations
 from apo_bench.pose_error import pose_errors
 from apo_bench.program import Observation, Plan, Snapshot
 from apo_bench.simulation.scene import Scene
@@ -37,7 +38,7 @@ def run_trial(
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
 
     Raises:
-        InputError: The noise model or the corrector is unknown or returned what it must not.
+        InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
     shown = shown or show(scene, spec.careless, spec.seed)
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
@@ -45,7 +46,9 @@ def run_trial(
     if shown.demonstration.code != "ok":
         return head | _result(misshown(shown.demonstration), success=None)
     noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
-    planned = plan(spec.method, see(scene, shown, noise, spec.seed), shown.layout.goals)
+    seen = see(scene, shown, noise, spec.seed)
+    told = tell(seen, make_relations(spec.relations), shown.layout.goals, spec.seed)
+    planned = plan(spec.method, seen, shown.layout.goals, told)
     return head | _carry_out(planned, scene, shown.layout.goals, shown.layout.goals, watch)
 
 

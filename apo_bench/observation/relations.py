@@ -1,0 +1,228 @@
+"""Wrong relations: what touches what is told wrongly, to see what a corrector makes of that.
+
+`missed`     one contact was not noticed
+`false`      one contact too many: two faces that only come near each other
+`shifted:3`  one face is not where the model of its part says, by 3 mm along its normal
+
+The truth, the human, the robot and the judge keep the right relations; only what a corrector is told is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Contact, Operation, PartFace
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.solid import Face
+from apo_bench.graph import relation_graph
+from apo_bench.names import resolve
+from apo_bench.placement import placed
+from apo_bench.program import Observation, Poses
+
+Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
+"""Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
+
+GIVEN = "given"
+"""The contacts come with the demonstration, and are right."""
+WRONG = MappingProxyType(
+    {
+        "missed": "apo_bench.observation.relations:missed",
+        "false": "apo_bench.observation.relations:false",
+        "shifted": "apo_bench.observation.relations:Shifted",
+    }
+)
+KINDS = (GIVEN, *WRONG)
+SHIFT_MM, LARGEST_SHIFT_MM = 2.0, 50.0
+OPPOSED = math.cos(math.radians(10.0))
+"""Normals whose cosine is below minus this look at each other."""
+TOUCHING_M, NEAR_M = 0.5e-3, 15e-3
+"""Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
+COVERED_M2 = 25e-6
+"""Faces that cover less of each other do not meet, (5 mm)^2."""
+
+
+def relations_name(given: str) -> str:
+    """How rows spell it: `shifted` stands for 2 mm, `shifted:3.0` is `shifted:3`.
+
+    Raises:
+        InputError: A size that is not allowed.
+    """
+    kind, _, size = given.partition(":")
+    if kind != "shifted":
+        return given
+    try:
+        size_mm = float(size or SHIFT_MM)
+    except ValueError:
+        size_mm = math.nan
+    if not 0.0 < size_mm <= LARGEST_SHIFT_MM:
+        raise InputError(
+            f"the relations '{given}' were given; a size above 0 and up to {LARGEST_SHIFT_MM:g} mm is allowed: "
+            "shifted:3."
+        )
+    return f"shifted:{size_mm:g}"
+
+
+def make_relations(given: Any) -> Relations | None:
+    """The function that a name stands for; None for `given`, where nothing is wrong.
+
+    Args:
+        given: `given`, `missed`, `false`, `shifted:3` (mm), `"package.module:name"`, or the function itself.
+
+    Raises:
+        InputError: There is no such thing.
+    """
+    if not isinstance(given, str):
+        return _callable(given, getattr(given, "__name__", type(given).__name__))
+    name = relations_name(given)
+    if name == GIVEN:
+        return None
+    if name.startswith("shifted:"):
+        return Shifted(float(name.partition(":")[2]) * 1e-3)
+    known = dict.fromkeys(KINDS, "") | WRONG
+    return _callable(resolve(name, known, "kind of relations"), name)
+
+
+def told(seen: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator) -> Observation:
+    """The same observation with wrong relations.
+
+    Args:
+        truth: (n, 4, 4), the true goals, world frame, [m].
+
+    Raises:
+        InputError: The function returned something other than an assembly of the same operations.
+    """
+    if relations is None:
+        return seen
+    wrong = relations(seen.assembly, seen.start, truth, rng)
+    name = getattr(relations, "__name__", type(relations).__name__)
+    if not isinstance(wrong, Assembly):
+        raise InputError(f"the relations '{name}' returned {type(wrong).__name__}; return an Assembly.")
+    if _acts(wrong) != _acts(seen.assembly) or set(wrong.solids) != set(seen.assembly.solids):
+        raise InputError(f"the relations '{name}' changed parts or operations; change nothing but contacts and faces.")
+    return replace(seen, assembly=wrong)
+
+
+def culprit(right: Assembly, wrong: Assembly) -> str | None:
+    """The relation (R1, R2, ... of the wrong graph) with a contact that is not a right one; None if there is none."""
+    for arc in relation_graph(wrong).arcs:
+        if not set(arc.contacts) <= set(right.operations[arc.made].contacts):
+            return arc.name
+    return None
+
+
+def missed(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
+    """One contact, any, is not there."""
+    k, contact = _any(assembly, rng)
+    return _with(assembly, k, tuple(c for c in assembly.operations[k].contacts if c != contact))
+
+
+def false(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
+    """One contact too many: a face of a part that was moved and one that it faces, less than 15 mm apart.
+
+    Where no two faces come so near, the nearest pair is taken that covers each other, or, failing that, that look at
+    each other at all; an assembly without even those is left as it is.
+    """
+    pairs = list(_facing(assembly, start, goals))
+    near = [pair for pair in pairs if pair.covered and pair.apart_m < NEAR_M]
+    if near:
+        chosen = near[int(rng.integers(len(near)))]
+    elif pairs:
+        chosen = min(pairs, key=lambda pair: (not pair.covered, pair.apart_m))
+    else:
+        return assembly
+    return _with(assembly, chosen.made, (*assembly.operations[chosen.made].contacts, chosen.contact))
+
+
+@final
+@dataclass(frozen=True)
+class Shifted:
+    """One contact, any, is told with its lower face off along the normal, outwards or inwards."""
+
+    size_m: float = SHIFT_MM * 1e-3
+
+    def __call__(self, assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
+        k, contact = _any(assembly, rng)
+        part, old = contact.environment
+        by = assembly.face(contact.environment).normal * self.size_m * (1.0, -1.0)[int(rng.integers(2))]
+        solid = assembly.solids[part]
+        new = _moved(solid.faces[old], f"{old}_shifted", by)
+        instead = Contact(contact.manipulated, PartFace(part, new.name))
+        solids = {**assembly.solids, part: replace(solid, faces={**solid.faces, new.name: new})}
+        contacts = tuple(instead if c == contact else c for c in assembly.operations[k].contacts)
+        return _with(replace(assembly, solids=solids), k, contacts)
+
+
+class _Pair(NamedTuple):
+    """Two faces that look at each other and do not touch."""
+
+    made: int
+    contact: Contact
+    apart_m: float
+    """Distance of their planes, in the middle."""
+    covered: bool
+
+
+def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
+    """One of all contacts ever made, each as likely, and the operation that made it."""
+    relations = assembly.relations()
+    if not relations:
+        raise InputError("wrong relations were asked for, but the assembly has no contact; use `given`.")
+    chosen = relations[int(rng.integers(len(relations)))]
+    return chosen.made, chosen.contact
+
+
+def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
+    """Faces of parts that an operation moved, and faces of those that stand there, apart by more than nothing."""
+    standing = dict.fromkeys(part for part in assembly.solids if part in assembly.fixed)
+    for k, poses in enumerate(placed(assembly, start, goals)):
+        moves = assembly.operations[k].moves
+        standing |= dict.fromkeys(moves)
+        for part in moves:
+            for other in (p for p in standing if p not in moves):
+                for a in assembly.solids[part].faces.values():
+                    for b in assembly.solids[other].faces.values():
+                        contact = Contact(PartFace(part, a.name), PartFace(other, b.name))
+                        apart = _apart(a, poses[part], b, poses[other])
+                        if apart is not None and contact not in assembly.operations[k].contacts:
+                            area = overlap(a, poses[part], b, poses[other]).area
+                            yield _Pair(k, contact, apart, area > COVERED_M2)
+
+
+def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
+    """How far face a stands in front of face b, [m]; None if they do not look at each other, or touch."""
+    n = T_b[:3, :3] @ b.normal
+    if (T_a[:3, :3] @ a.normal) @ n > -OPPOSED:
+        return None
+    apart = float((pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]) @ n)
+    return apart if apart > TOUCHING_M else None
+
+
+def _moved(face: Face, name: str, by: Array) -> Face:
+    return Face(name, face.outline + by, tuple(hole + by for hole in face.holes), face.fit)
+
+
+def _with(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly:
+    """The same assembly where operation k makes these contacts."""
+    operations = list(assembly.operations)
+    operations[k] = replace(operations[k], contacts=contacts)
+    return replace(assembly, operations=tuple(operations))
+
+
+def _acts(assembly: Assembly) -> list[Operation]:
+    """The operations without their contacts."""
+    return [replace(operation, contacts=()) for operation in assembly.operations]
+
+
+def _callable(given: Any, name: str) -> Relations:
+    if not callable(given) or isinstance(given, type):
+        raise InputError(f"the relations '{name}' are no function; give (assembly, start, goals, rng) -> Assembly.")
+    return given
