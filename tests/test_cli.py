@@ -14,6 +14,7 @@ import pytest
 
 from apo_bench import cli
 from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.spec import ROW
 from apo_bench.scenario_file import load_scenario, scenario_names
 
 TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld")
@@ -137,7 +138,7 @@ def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
     assert (code, err) == (0, "")
     assert out.count("\n") == 1
     row = json.loads(out)
-    assert (row["schema"], row["seed"], row["method"], row["success"]) == ("apo-bench/row/2", 5, "paper", True)
+    assert (row["schema"], row["seed"], row["method"], row["success"]) == (ROW, 5, "paper", True)
 
 
 def test_a_replay_that_fails_is_a_result(capsys: pytest.CaptureFixture[str]) -> None:

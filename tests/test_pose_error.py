@@ -14,7 +14,7 @@ from apo_bench.correction.newton import solve
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.placement import placed
-from apo_bench.pose_error import pose_errors
+from apo_bench.pose_error import goal_errors, pose_errors
 from apo_bench.program import Poses, Reached, Snapshot
 from tests import scenes
 
@@ -55,6 +55,14 @@ def test_pure_errors(wrong: Mapping[int, Array], expected: tuple[float, float]) 
     """Root mean square over the three operations, [mm]."""
     measured = errors(scenes.stick_on_castles(), wrong)
     assert measured == pytest.approx(tuple(np.array(expected) / np.sqrt(3)), abs=1e-6)
+
+
+@pytest.mark.parametrize("build", scenes.ALL.values())
+def test_planned_goals_and_poses_that_reach_them_have_the_same_errors(build) -> None:
+    scene = build()
+    goals = scenes.noisy(scene.goals, np.random.default_rng(6), 2.0, 1.0)
+    given = scene.assembly, scene.start, scene.goals
+    assert goal_errors(*given, goals) == pose_errors(*given, reached(scene, goals))
 
 
 def test_the_fixed_part_is_what_the_contacts_would_take_back() -> None:

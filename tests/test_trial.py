@@ -21,8 +21,9 @@ from apo_bench.benchmark.trial import nominal_where_seen, run_measured, run_tria
 from apo_bench.correction.correct import correct
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.graph import relation_graph
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.program import Correction, Observation, Step, Try
+from apo_bench.program import Consistency, Correction, Observation, Step, Suspect, Try
 from apo_bench.resources import folder
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
@@ -41,6 +42,17 @@ KEYS = (
         "peak_force_n",
         "sim_seconds",
     ),
+    *(
+        "chi_square",
+        "chi_square_freedom",
+        "p_value",
+        "test_passes",
+        "suspects",
+        "dropped",
+        "wrong_relation",
+        "inside_95",
+    ),
+    *("planned_error_fixed_mm", "planned_error_free_mm"),
 )
 
 
@@ -147,6 +159,45 @@ def test_a_person_reads_what_was_tried_and_foretold(
     assert "schedule 2 operations beyond doing each once predicted operation 3 fails: residual, " in said
     print_row(rows["paper"])
     assert "predicted it fits, 0.00 mm off at most" in " ".join(capsys.readouterr().out.split())
+
+
+def doubts(seen: Observation) -> Correction:
+    """As the paper corrects, with a test that fails and names the first relation."""
+    arcs = relation_graph(seen.assembly).arcs
+    suspects = tuple(Suspect(a.name, a.contacts, a.made, 1.0, 3, 0.8 if a is arcs[0] else 0.0) for a in arcs)
+    test = Consistency(30.0, 5, 1e-5, 0.01, suspects)
+    return replace(correct(seen, "paper"), test=test, dropped=("R1",))
+
+
+def test_the_row_says_what_the_correction_says_of_itself(
+    scene: Scene, shown: Shown, monkeypatch: pytest.MonkeyPatch, rows: dict[str, dict[str, Any]]
+) -> None:
+    monkeypatch.setattr("apo_bench.benchmark.planning.correct", lambda seen, method: doubts(seen))
+    row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
+    assert (row["chi_square"], row["chi_square_freedom"], row["p_value"]) == (30.0, 5, 1e-5)
+    assert (row["test_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
+    for method in ("oracle", "none", "paper"):
+        assert (rows[method]["test_passes"], rows[method]["suspects"], rows[method]["chi_square"]) == (None, None, None)
+    assert [rows[method]["dropped"] for method in ("oracle", "none", "paper")] == [None, None, []]
+
+
+def test_the_row_says_how_far_the_plan_is_from_the_truth(rows: dict[str, dict[str, Any]]) -> None:
+    assert (rows["oracle"]["planned_error_fixed_mm"], rows["oracle"]["planned_error_free_mm"]) == (0.0, 0.0)
+    assert rows["none"]["planned_error_fixed_mm"] > 1.0
+    assert rows["paper"]["planned_error_fixed_mm"] < 0.1
+    assert rows["paper"]["planned_error_free_mm"] > 0.5
+
+
+def test_wrong_relations_are_told_and_noted(scene: Scene, shown: Shown) -> None:
+    """Correctors meet them, nothing else does; robot and judge keep the right ones."""
+    kinds = ("given", "missed", "false", "shifted:3")
+    told = {k: run_trial(replace(SPEC, method="paper", relations=k), scene, shown=shown) for k in kinds}
+    assert [told[k]["relations"] for k in kinds] == list(kinds)
+    assert [told[k]["wrong_relation"] is None for k in kinds] == [True, True, False, False]
+    assert told["shifted:3"]["success"] is False
+    raw = [run_trial(replace(SPEC, relations=k), scene, shown=shown) for k in ("given", "shifted:3")]
+    apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
+    assert apart == {"relations", "spec_hash"}
 
 
 def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> None:

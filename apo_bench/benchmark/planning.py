@@ -23,6 +23,8 @@ class Planned:
     tried: tuple[Try, ...]
     gap_before_m: float
     gap_after_m: float
+    correction: Correction | None = None
+    """What the corrector returned; None where none was asked."""
 
 
 def plan(method: Any, seen: Observation, truth: Array | None, told: Observation | None = None) -> Planned:
@@ -46,6 +48,7 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
         tried=made.tried,
         gap_before_m=made.gap_before_m,
         gap_after_m=made.gap_after_m,
+        correction=made,
     )
 
 

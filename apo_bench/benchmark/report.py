@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from apo_bench.benchmark.calibration import WORDS as CALIBRATION
+from apo_bench.benchmark.calibration import calibration_lines, calibrations
 from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import WORDS, confusion_lines, write_confusions
 from apo_bench.benchmark.effort import WORDS as EFFORT
@@ -116,6 +118,12 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
         EFFORT,
         "",
         *effort_lines(efforts(rows)),
+        "",
+        "## Calibration",
+        "",
+        CALIBRATION,
+        "",
+        *calibration_lines(calibrations(rows)),
     ]
     return "\n".join(lines) + "\n"
 

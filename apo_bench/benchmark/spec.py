@@ -10,7 +10,7 @@ from typing import final
 from apo_bench.errors import InputError, unknown
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/2"
+ROW = "apo-bench/row/3"
 LARGEST_LEVEL = 50.0
 """[mm] and [degrees]: five times that is still inside the room."""
 LARGEST_CARELESS = 10.0

@@ -94,6 +94,13 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     if row["pose_error_fixed_mm"] is not None:
         errors = f"{row['pose_error_fixed_mm']:.3f} mm fixed by contacts, {row['pose_error_free_mm']:.3f} mm free"
         lines.append(("pose error", errors))
+    if row["planned_error_fixed_mm"] is not None:
+        planned = (
+            f"{row['planned_error_fixed_mm']:.3f} mm fixed by contacts, {row['planned_error_free_mm']:.3f} mm free"
+        )
+        lines.append(("planned error", planned))
+    if row["p_value"] is not None:
+        lines.append(("test", _test(row)))
     if row["sim_seconds"] is not None:
         lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
     return lines
@@ -114,6 +121,16 @@ def _predicted(said: Mapping[str, Any]) -> str:
         return f"it fits, {said['size_mm']:.2f} mm off at most"
     size = "" if said["size_mm"] is None else f", {said['size_mm']:.2f} mm"
     return f"operation {said['operation']} fails: {said['code']}{size}"
+
+
+def _test(row: Mapping[str, Any]) -> str:
+    """`chi-square 31.2 of 13, p 0.003; one of R2, R4 may be wrong; R2 was left out`."""
+    said = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_freedom']}, p {row['p_value']:.2g}"]
+    if row["suspects"]:
+        said.append(f"{'one of ' * (len(row['suspects']) > 1)}{', '.join(row['suspects'])} may be wrong")
+    if row["dropped"]:
+        said.append(f"left out: {', '.join(row['dropped'])}")
+    return "; ".join(said)
 
 
 def _result(row: Mapping[str, Any]) -> str:

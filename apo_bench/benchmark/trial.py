@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.benchmark.confidence import UNKNOWN, confidence
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import Planned, plan
-from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
+from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec, knows_relations
 from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, misshown, see, show, tell
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -48,8 +49,10 @@ def run_trial(
     noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
     seen = see(scene, shown, noise, spec.seed)
     told = tell(seen, make_relations(spec.relations), shown.layout.goals, spec.seed)
-    planned = plan(spec.method, seen, shown.layout.goals, told)
-    return head | _carry_out(planned, scene, shown.layout.goals, shown.layout.goals, watch)
+    truth = shown.layout.goals
+    planned = plan(spec.method, seen, truth, told)
+    said = confidence(planned, seen, told if knows_relations(spec.method) else seen, truth)
+    return head | _carry_out(planned, scene, truth, truth, watch) | said
 
 
 def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, watch: Any = None) -> Row:
@@ -77,7 +80,8 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
         "demonstration": "ok",
     }
     planned = plan(spec.method, seen, None)
-    return head | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch)
+    said = confidence(planned, seen, seen, None)
+    return head | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch) | said
 
 
 def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
@@ -160,6 +164,7 @@ def _result(end: Ending, *, success: bool | None) -> Row:
         "predicted": None,
         "gap_before_mm": None,
         "gap_after_mm": None,
+        **UNKNOWN,
         "reached": None,
         "pose_error_fixed_mm": None,
         "pose_error_free_mm": None,
