@@ -1,0 +1,1 @@
+"""What `python benchmarks/corrector.py` measures, one idea per file."""
