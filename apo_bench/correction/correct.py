@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench import outcomes
-from apo_bench.correction.ending import sentence
-from apo_bench.correction.equations import equations, gap, largest
-from apo_bench.correction.newton import CUT_OFF, LENGTH_M, least_step
+from apo_bench.correction.measured import measured
 from apo_bench.correction.returned import RIGID, checked
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -30,6 +27,12 @@ CORRECTORS = MappingProxyType(
         "minimal": "apo_bench.correction.ablations:minimal",
         "no-history": "apo_bench.correction.no_history:no_history",
         "no-disappeared": "apo_bench.correction.ablations:no_disappeared",
+        "snap": "apo_bench.correction.snap:snap",
+        "least-squares": "apo_bench.correction.least_squares:least_squares",
+        "penalty": "apo_bench.correction.penalty:penalty",
+        "settle": "apo_bench.simulation.settle:settle",
+        "gtsam": "apo_bench.correction.gtsam_adapter:gtsam",
+        "cadquery": "apo_bench.correction.cadquery_adapter:cadquery",
     }
 )
 STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
@@ -59,7 +62,7 @@ def correct(seen: Observation, corrector: Any = "paper") -> Correction:
     except Exception as error:
         raise InputError(f"the corrector '{name}' failed: it raised {error!r}; mend it, or use another.") from error
     if not isinstance(found, Correction):
-        return _wrapped(seen, _bare(found, len(seen.goals), name))
+        return measured(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
     if found.status not in STATUSES:
         raise InputError(
             f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
@@ -82,20 +85,6 @@ def _bare(found: Any, n: int, name: str) -> Array:
             f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; {RIGID}."
         )
     return goals
-
-
-def _wrapped(seen: Observation, goals: Array) -> Correction:
-    """Bare goals with what can be measured about them; goals that are not finite leave what was seen."""
-    before = gap(seen.assembly, seen.start, seen.goals)
-    if not np.isfinite(goals).all():
-        return Correction(seen.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
-    system = equations(seen.assembly, seen.start, goals)
-    e, J = system.linearised(goals)
-    _, rank = least_step(J / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(goals)), e, CUT_OFF)
-    freed = tuple(int(k) for k in np.flatnonzero((goals != seen.goals).any(axis=(1, 2)))[::-1])
-    after = largest(e)
-    said = sentence("converged", seen.gap_m) if after <= seen.gap_m else "the corrector returned goals and no status"
-    return Correction(goals, "converged", said, freed, before, after, rank)
 
 
 def _kind(value: Any) -> str:
