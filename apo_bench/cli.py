@@ -279,7 +279,8 @@ def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep -
     rows = read_rows(folder)
     print_cells(tally(rows))
     print_prediction(rows)
-    typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nFigure: {made.figure}\nReport: {made.page}")
+    figures = " ".join(str(path) for path in (made.figure, made.tightness) if path is not None)
+    typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nFigure: {figures}\nReport: {made.page}")
 
 
 if __name__ == "__main__":

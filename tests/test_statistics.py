@@ -16,7 +16,7 @@ from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.confusion import Confusion, confusions
 from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.effort import Effort, efforts
-from apo_bench.benchmark.figure import OTHERS, STYLES, draw
+from apo_bench.benchmark.figure import OTHERS, STYLES, draw, rows_of
 from apo_bench.benchmark.report import COLUMNS, report
 from apo_bench.benchmark.spec import ROW
 from apo_bench.benchmark.statistics import tally, wilson
@@ -207,6 +207,29 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
     confusion = list(csv.DictReader(made.confusion.open()))
     assert [line["method"] for line in confusion] == ["oracle", "none", "paper", "all"]
     assert (confusion[1]["predicted_fail_failed"], confusion[2]["excluded"]) == ("9", "3")
+
+
+def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
+    """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
+    levels = ({"level": x, "level_deg": x} for x in (0.0, 0.5, 2.0))
+    rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("none", "paper")]
+    rows += [row("paper", clearance_mm=c, relations="missed") for c in (0.25, 1.0)]
+    cells = tally(rows)
+    assert {(c.clearance_mm, c.level, c.tightness) for c in cells if c.method == "none"} == {
+        *((0.25, 0.0, None), (1.0, 0.0, None), (0.25, 0.5, 0.5), (0.25, 2.0, 0.125), (1.0, 0.5, 2.0), (1.0, 2.0, 0.5))
+    }
+    made = report(write(tmp_path / "run", rows))
+    assert made.tightness is not None
+    assert made.tightness.read_bytes().startswith(b"\x89PNG")
+    assert made.tightness.name in made.page.read_text()
+    table = list(csv.DictReader(made.table.open()))
+    assert {line["tightness"] for line in table} == {"", "0.5", "0.125", "2.0", "0.25", "1.0"}
+    assert report(write(tmp_path / "one", [row(), row("paper")])).tightness is None
+    rows_drawn = rows_of(cells)
+    assert [(r.clearance_mm, r.relations) for r in rows_drawn] == [
+        *((0.25, "given"), (0.25, "missed"), (1.0, "given"), (1.0, "missed"))
+    ]
+    assert [sum(r.holds(c) for c in cells) for r in rows_drawn] == [6, 4, 6, 4]
 
 
 def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) -> None:

@@ -76,15 +76,15 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
             _panel(axes[i][j], [c for c in cells if row.holds(c)], f)
         axes[i][0].set_ylabel("strict success")
     figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
-    handles = {label: h for axis in axes.flat for h, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend(
-        handles.values(),
-        handles.keys(),
-        loc="outside upper center",
-        ncols=min(4 * columns, max(1, len(handles))),
-        frameon=False,
-    )
+    legend(figure, axes, columns)
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
+
+
+def legend(figure: Any, axes: Any, columns: int) -> None:
+    """One legend for all panels, above them."""
+    handles = {label: h for axis in axes.flat for h, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    many = min(4 * columns, max(1, len(handles)))
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=many, frameon=False)
 
 
 def rows_of(cells: Sequence[Cell]) -> list[Row]:
@@ -102,7 +102,7 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
     for ceiling in (c for c in cells if c.method == "oracle" and c.rate is not None):
         axis.axhline(ceiling.rate, color=CEILING, linestyle="--", linewidth=1.2, label="oracle")
     methods = list(dict.fromkeys(c.method for c in here))
-    for i, (method, style) in enumerate(_styles(methods).items()):
+    for i, (method, style) in enumerate(styles(methods).items()):
         line = [c for c in here if c.method == method and c.rate is not None]
         aside = DODGE * (i - (len(methods) - 1) / 2)
         _line(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, method)
@@ -116,7 +116,7 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _styles(methods: Sequence[str]) -> dict[str, Style]:
+def styles(methods: Sequence[str]) -> dict[str, Style]:
     """One each; a method of one's own takes the next that is left."""
     own = [method for method in methods if method not in STYLES]
     return {m: STYLES[m] if m in STYLES else OTHERS[own.index(m) % len(OTHERS)] for m in methods}

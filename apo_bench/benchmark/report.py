@@ -14,13 +14,14 @@ from apo_bench.benchmark.confusion_table import WORDS, confusion_lines, write_co
 from apo_bench.benchmark.effort import WORDS as EFFORT
 from apo_bench.benchmark.effort import effort_lines, efforts
 from apo_bench.benchmark.figure import draw, level_label
+from apo_bench.benchmark.figure_tightness import draw_tightness, varies
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.spec import knows_relations
 from apo_bench.benchmark.statistics import Cell, tally
 from apo_bench.errors import InputError
 
 COLUMNS = (
-    *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "method"),
+    *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method"),
     *("trials", "successes", "rate", "low_95", "high_95", "loose_successes", "loose_rate", "excluded", "failures"),
 )
 
@@ -32,10 +33,12 @@ class Report(NamedTuple):
     figure: Path
     page: Path
     confusion: Path
+    tightness: Path | None
+    """The figure over tightness; None where a sweep has one clearance per scenario."""
 
 
 def report(folder: str | Path) -> Report:
-    """Write `table.csv`, `confusion.csv`, `success_over_level.png` and `report.md` beside the rows of a sweep.
+    """Write tables, figures and the page that shows them beside the rows of a sweep.
 
     Raises:
         InputError: No rows there, or the folder cannot be written.
@@ -46,12 +49,18 @@ def report(folder: str | Path) -> Report:
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     cells = tally(rows)
     made = Report(
-        folder / "table.csv", folder / "success_over_level.png", folder / "report.md", folder / "confusion.csv"
+        table=folder / "table.csv",
+        figure=folder / "success_over_level.png",
+        page=folder / "report.md",
+        confusion=folder / "confusion.csv",
+        tightness=folder / "success_over_tightness.png" if varies(cells) else None,
     )
     try:
         _write_table(cells, made.table)
         write_confusions(confusions(rows), made.confusion)
         draw(cells, made.figure)
+        if made.tightness is not None:
+            draw_tightness(cells, made.tightness)
         made.page.write_text(_page(rows, cells, made), encoding="utf-8")
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
@@ -79,9 +88,22 @@ def _write_table(cells: Sequence[Cell], path: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for c in cells:
-            where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg, c.method)
+            where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg)
             loose = (c.loose_successes, c.loose_rate)
-            writer.writerow([*where, c.trials, c.successes, c.rate, *c.interval, *loose, c.excluded, failures(c, 99)])
+            writer.writerow(
+                [
+                    *where,
+                    c.tightness,
+                    c.method,
+                    c.trials,
+                    c.successes,
+                    c.rate,
+                    *c.interval,
+                    *loose,
+                    c.excluded,
+                    failures(c, 99),
+                ]
+            )
 
 
 def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report) -> str:
@@ -99,6 +121,7 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
         "",
         f"![Success over level]({made.figure.name})",
         "",
+        *([] if made.tightness is None else [f"![Success over tightness]({made.tightness.name})", ""]),
         "| scenario | clearance | noise | relations | careless | level | method | strict success | 95 % interval | n "
         "| excluded | loose | failures |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|",

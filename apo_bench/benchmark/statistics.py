@@ -60,6 +60,11 @@ class Cell:
         return self.successes / self.trials if self.trials else None
 
     @property
+    def tightness(self) -> float | None:
+        """Clearance per side over level, mm per mm: small is tight; None where poses are seen exactly."""
+        return self.clearance_mm / self.level if self.level > 0 else None
+
+    @property
     def loose_rate(self) -> float | None:
         return self.loose_successes / self.trials if self.trials else None
 

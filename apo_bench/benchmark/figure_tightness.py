@@ -1,0 +1,63 @@
+"""Success over tightness, clearance over level: how much room a part has for what the camera errs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from apo_bench.benchmark.figure import Row, legend, rows_of, styles
+from apo_bench.benchmark.statistics import Cell
+
+
+def varies(cells: Sequence[Cell]) -> bool:
+    """Whether there is more than one clearance for a scenario, and a level above zero."""
+    swept = {(c.scenario, c.clearance_mm) for c in cells}
+    return len(swept) > len({scenario for scenario, _ in swept}) and any(c.tightness for c in cells)
+
+
+def draw_tightness(cells: Sequence[Cell], path: Path) -> None:
+    """Write the figure as PNG: a panel per scenario, noise, relations and carelessness; a line per method and level."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    seen = [c for c in cells if c.method != "oracle" and c.tightness and c.rate is not None]
+    rows = {(row.scenario, row.noise, row.relations): row for row in rows_of(cells)}
+    careless = sorted({c.careless for c in seen})
+    columns = max(1, len(careless))
+    figure = Figure(figsize=(0.9 + 4.3 * columns, 1.0 + 3.1 * len(rows)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(rows), columns, squeeze=False, sharey=True)
+    for i, row in enumerate(rows.values()):
+        for j, f in enumerate(careless):
+            axes[i][j].set_title(row.title(f).replace(f", {row.clearance_mm:g} mm clearance", ""), fontsize=10)
+            _panel(axes[i][j], [c for c in seen if c.careless == f and _here(row, c)])
+        axes[i][0].set_ylabel("strict success")
+    figure.supxlabel("tightness: clearance per side over level [mm per mm]", fontsize=10)
+    legend(figure, axes, columns)
+    figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
+
+
+def _here(row: Row, c: Cell) -> bool:
+    """Whether a cell belongs into the panels of a row, at whatever clearance."""
+    return row._replace(clearance_mm=c.clearance_mm).holds(c)
+
+
+def _panel(axis: Any, cells: Sequence[Cell]) -> None:
+    for method, style in styles(list(dict.fromkeys(c.method for c in cells))).items():
+        shape = {"color": style.color, "marker": style.marker, "linestyle": style.dashes, "linewidth": 1.2}
+        for level in sorted({(c.level, c.level_deg) for c in cells if c.method == method}):
+            line = [c for c in cells if c.method == method and (c.level, c.level_deg) == level]
+            x, y = [c.tightness for c in line], [float(c.rate or 0.0) for c in line]
+            bars = [[r - c.interval.low for r, c in zip(y, line, strict=True)]]
+            bars += [[c.interval.high - r for r, c in zip(y, line, strict=True)]]
+            axis.errorbar(x, y, yerr=bars, color=style.color, fmt="none", capsize=2, linewidth=0.8, alpha=0.6)
+            axis.plot(x, y, markersize=5, label=method, clip_on=False, **shape)
+    if cells:
+        axis.set_xscale("log")
+        axis.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+        axis.xaxis.set_minor_formatter(lambda *_: "")
+    axis.set_ylim(-0.04, 1.06)
+    axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
+    axis.grid(axis="y", alpha=0.3)
+    axis.spines[["top", "right"]].set_visible(False)
