@@ -208,6 +208,7 @@ def test_a_part_falls_onto_the_table_or_is_pushed_out_of_it(height_mm: float) ->
 
 
 ADAPTED = """
+from dataclasses import replace
 import numpy as np
 from apo_bench.correction.correct import correct
 from apo_bench.correction.equations import equations
@@ -215,6 +216,8 @@ from tests.test_baselines import noisy
 for name in ("stick_in_tower", "fixture"):
     seen = noisy(name)
     {check}
+blind = replace(seen, seen=~seen.seen)
+assert correct(blind, "{package}").sentence == "operation 1 was not seen"
 """
 AGREES = 'assert np.allclose(correct(seen, "gtsam").goals, correct(seen, "least-squares").goals, atol=1e-7)'
 MATES = """made = correct(seen, "cadquery")
@@ -228,7 +231,7 @@ def test_adapters_solve_what_they_can_say(package: str, check: str) -> None:
     """GTSAM finds the optimum of `least-squares`; mates hold at the end. Each in a process of its own."""
     if find_spec(package) is None:
         pytest.skip(f"{package} is not installed")
-    code = ADAPTED.format(check=check)
+    code = ADAPTED.format(check=check, package=package)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
