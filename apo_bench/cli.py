@@ -280,7 +280,8 @@ def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep -
     print_cells(tally(rows))
     print_prediction(rows)
     figures = " ".join(str(path) for path in (made.figure, made.tightness) if path is not None)
-    typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nFigure: {figures}\nReport: {made.page}")
+    typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nPairs:  {made.paired}")
+    typer.echo(f"Figure: {figures}\nReport: {made.page}")
 
 
 if __name__ == "__main__":

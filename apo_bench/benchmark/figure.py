@@ -48,14 +48,19 @@ class Style(NamedTuple):
 
 STYLES = {
     "none": Style("#D55E00", "o", "-"),
+    "contact": Style("#332288", "p", "-"),
     "paper": Style("#0072B2", "s", "-"),
     "paper-track": Style("#009E73", "D", "-"),
     "last-only": Style("#E69F00", "v", (0, (4, 1.5))),
     "no-history": Style("#CC79A7", "^", (0, (4, 1.5))),
     "no-disappeared": Style("#56B4E9", "P", (0, (4, 1.5))),
     "minimal": Style("#8C6BB1", "X", (0, (1, 1))),
+    "snap": Style("#A6761D", "*", (0, (1, 1))),
+    "least-squares": Style("#117733", "<", (0, (1, 1))),
+    "settle": Style("#882255", ">", (0, (1, 1))),
+    "penalty": Style("#88CCEE", "d", (0, (1, 1))),
 }
-OTHERS = (Style("#6B6B6B", "h", (0, (1, 1))), Style("#A6761D", "*", (0, (1, 1))), Style("#332288", "<", (0, (1, 1))))
+OTHERS = (Style("#6B6B6B", "h", (0, (1, 1))), Style("#DDCC77", "H", (0, (1, 1))), Style("#000000", "1", (0, (1, 1))))
 
 
 def draw(cells: Sequence[Cell], path: Path) -> None:

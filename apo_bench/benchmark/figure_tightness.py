@@ -9,6 +9,9 @@ from typing import Any
 from apo_bench.benchmark.figure import Row, legend, rows_of, styles
 from apo_bench.benchmark.statistics import Cell
 
+DODGE = 1.03
+"""Methods stand this factor from each other at one tightness, so that equal rates do not hide each other."""
+
 
 def varies(cells: Sequence[Cell]) -> bool:
     """Whether there is more than one clearance for a scenario, and a level above zero."""
@@ -44,19 +47,22 @@ def _here(row: Row, c: Cell) -> bool:
 
 
 def _panel(axis: Any, cells: Sequence[Cell]) -> None:
-    for method, style in styles(list(dict.fromkeys(c.method for c in cells))).items():
+    methods = list(dict.fromkeys(c.method for c in cells))
+    for i, (method, style) in enumerate(styles(methods).items()):
+        aside = DODGE ** (i - (len(methods) - 1) / 2)
         shape = {"color": style.color, "marker": style.marker, "linestyle": style.dashes, "linewidth": 1.2}
         for level in sorted({(c.level, c.level_deg) for c in cells if c.method == method}):
             line = [c for c in cells if c.method == method and (c.level, c.level_deg) == level]
-            x, y = [c.tightness for c in line], [float(c.rate or 0.0) for c in line]
+            x, y = [(c.tightness or 0.0) * aside for c in line], [float(c.rate or 0.0) for c in line]
             bars = [[r - c.interval.low for r, c in zip(y, line, strict=True)]]
             bars += [[c.interval.high - r for r, c in zip(y, line, strict=True)]]
             axis.errorbar(x, y, yerr=bars, color=style.color, fmt="none", capsize=2, linewidth=0.8, alpha=0.6)
             axis.plot(x, y, markersize=5, label=method, clip_on=False, **shape)
     if cells:
         axis.set_xscale("log")
-        axis.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
-        axis.xaxis.set_minor_formatter(lambda *_: "")
+        ticks = sorted({c.tightness for c in cells if c.tightness})
+        axis.set_xticks(ticks, [f"{x:g}" for x in ticks], fontsize=8)
+        axis.minorticks_off()
     axis.set_ylim(-0.04, 1.06)
     axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
     axis.grid(axis="y", alpha=0.3)

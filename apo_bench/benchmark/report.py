@@ -16,6 +16,9 @@ from apo_bench.benchmark.effort import effort_lines, efforts
 from apo_bench.benchmark.figure import draw, level_label
 from apo_bench.benchmark.figure_tightness import draw_tightness, varies
 from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.paired import paired
+from apo_bench.benchmark.paired_table import WORDS as PAIRED
+from apo_bench.benchmark.paired_table import paired_lines, write_paired
 from apo_bench.benchmark.spec import knows_relations
 from apo_bench.benchmark.statistics import Cell, tally
 from apo_bench.errors import InputError
@@ -33,6 +36,7 @@ class Report(NamedTuple):
     figure: Path
     page: Path
     confusion: Path
+    paired: Path
     tightness: Path | None
     """The figure over tightness; None where a sweep has one clearance per scenario."""
 
@@ -53,11 +57,13 @@ def report(folder: str | Path) -> Report:
         figure=folder / "success_over_level.png",
         page=folder / "report.md",
         confusion=folder / "confusion.csv",
+        paired=folder / "paired.csv",
         tightness=folder / "success_over_tightness.png" if varies(cells) else None,
     )
     try:
         _write_table(cells, made.table)
         write_confusions(confusions(rows), made.confusion)
+        write_paired(paired(rows), made.paired)
         draw(cells, made.figure)
         if made.tightness is not None:
             draw_tightness(cells, made.tightness)
@@ -129,6 +135,12 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
         "",
         "Strict and loose are the judge's; intervals are Wilson's; the same numbers stand in "
         f"[{made.table.name}]({made.table.name}). Excluded are trials whose demonstration was not right.",
+        "",
+        "## Pairs",
+        "",
+        PAIRED,
+        "",
+        *paired_lines(paired(rows)),
         "",
         "## Prediction and physics",
         "",

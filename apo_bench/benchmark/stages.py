@@ -70,7 +70,8 @@ def show(scene: Scene, careless: float, seed: int) -> Shown:
 def see(scene: Scene, shown: Shown, noise: Noise, seed: int) -> Observation:
     """Watch the demonstration of a trial through a noise model."""
     rng = stream(seed, OBSERVATION)
-    return observe(shown.demonstration, noise, rng, gap_m=scene.scenario.gap_mm * 1e-3)
+    gap_m, play_m = scene.scenario.gap_mm * 1e-3, scene.clearance_mm * 1e-3
+    return observe(shown.demonstration, noise, rng, gap_m=gap_m, play_m=play_m)
 
 
 def tell(seen: Observation, relations: Relations | None, truth: Array, seed: int) -> Observation:

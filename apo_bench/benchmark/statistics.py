@@ -85,8 +85,8 @@ def wilson(successes: int, trials: int) -> Interval:
 
 
 def rank(method: str) -> int:
-    """The ceiling first, then what has no correction, then the paper's two ways, then all others."""
-    first = ("oracle", "none", "paper", "paper-track")
+    """The ceiling first, then what has no correction, then `contact`, the paper's two ways, and all others."""
+    first = ("oracle", "none", "contact", "paper", "paper-track")
     return first.index(method) if method in first else len(first)
 
 
@@ -104,7 +104,7 @@ def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
     for row in rows:
         if row["level"] is not None:
             groups.setdefault(Place(*(row[name] for name in Place._fields)), []).append(row)
-    return tuple(_cell(key, groups[key]) for key in sorted(groups, key=_order))
+    return tuple(_cell(key, groups[key]) for key in sorted(groups, key=order))
 
 
 def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
@@ -120,7 +120,7 @@ def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
     )
 
 
-def _order(key: Place) -> tuple[Any, ...]:
-    k = key
+def order(k: Place) -> tuple[Any, ...]:
+    """How cells are sorted: by what is asked, then by method (`oracle` first), then by level."""
     where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
     return (*where, rank(k.method), k.method, k.level, k.level_deg)

@@ -1,0 +1,126 @@
+"""Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+from apo_bench.benchmark.spec import knows_relations
+from apo_bench.benchmark.statistics import CONFIDENCE, Interval, Place, order
+
+REFERENCES = ("paper", "none")
+EDGE = 1e-9
+"""Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
+
+
+@final
+@dataclass(frozen=True)
+class Paired:
+    """A method against another one, in one cell."""
+
+    place: Place
+    """Of the method."""
+    reference: str
+    pairs: int
+    """Seeds of which both have a result."""
+    only_method: int
+    """Seeds at which the method alone was right (strict)."""
+    only_reference: int
+    planned: int
+    """Seeds at which both had a plan."""
+    free_mm: float | None
+    """Mean of the differences of the errors in directions that contacts leave free, method minus reference."""
+    free_interval: Interval | None
+    """Student's t interval of that mean; None with fewer than two pairs."""
+
+    @property
+    def difference(self) -> float | None:
+        """Success rate of the method minus that of the reference; None without a pair."""
+        return (self.only_method - self.only_reference) / self.pairs if self.pairs else None
+
+    @property
+    def interval(self) -> Interval:
+        """Tango's 95 % interval of the difference."""
+        return tango(self.only_method, self.only_reference, self.pairs)
+
+
+def paired(rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
+    """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
+
+    `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
+    """
+    cells: dict[Place, dict[int, Mapping[str, Any]]] = {}
+    for row in rows:
+        if row["level"] is not None and row["success"] is not None:
+            place = Place(*(row[name] for name in Place._fields))
+            cells.setdefault(place, {})[row["seed"]] = row
+    found = []
+    for place in sorted(cells, key=order):
+        for reference in references:
+            other = place._replace(method=reference)
+            other = other if knows_relations(reference) else other._replace(relations="given")
+            if place.method not in ("oracle", reference) and other in cells:
+                found.append(_paired(place, reference, cells[place], cells[other]))
+    return tuple(found)
+
+
+def tango(b: int, c: int, n: int) -> Interval:
+    """The score interval of a difference of paired proportions, (b - c) / n, at 95 %.
+
+    The differences at which Tango's score statistic is within the normal quantile; sensible where no pair is
+    discordant, when it is 0 -+ z^2 / (n + z^2). After T. Tango, Equivalence test and confidence interval for the
+    difference in proportions for the paired-sample design, Statistics in Medicine 17 (1998), 891-908.
+
+    Args:
+        b: Pairs in which the first alone succeeded.
+        c: Pairs in which the second alone succeeded.
+        n: All pairs; without one nothing is known: -1 to 1.
+    """
+    from scipy.optimize import brentq
+    from scipy.stats import norm
+
+    if n == 0:
+        return Interval(-1.0, 1.0)
+    z, d = float(norm.ppf((1 + CONFIDENCE) / 2)), (b - c) / n
+    low = -1.0 if c == n else brentq(lambda x: _score(b, c, n, x) - z, -1 + EDGE, d - EDGE)
+    high = 1.0 if b == n else brentq(lambda x: _score(b, c, n, x) + z, d + EDGE, 1 - EDGE)
+    return Interval(float(low), float(high))
+
+
+def _score(b: int, c: int, n: int, delta: float) -> float:
+    """The score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
+    B = -b - c + (2 * n - b + c) * delta
+    q = (math.sqrt(max(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
+    return (b - c - n * delta) / math.sqrt(n * (2 * q + delta * (1 - delta)))
+
+
+def _paired(
+    place: Place, reference: str, ours: Mapping[int, Mapping[str, Any]], theirs: Mapping[int, Mapping[str, Any]]
+) -> Paired:
+    pairs = [(ours[seed], theirs[seed]) for seed in sorted(set(ours) & set(theirs))]
+    free = [(a["planned_error_free_mm"], b["planned_error_free_mm"]) for a, b in pairs]
+    apart = [a - b for a, b in free if a is not None and b is not None]
+    return Paired(
+        place=place,
+        reference=reference,
+        pairs=len(pairs),
+        only_method=sum(a["success"] and not b["success"] for a, b in pairs),
+        only_reference=sum(b["success"] and not a["success"] for a, b in pairs),
+        planned=len(apart),
+        free_mm=sum(apart) / len(apart) if apart else None,
+        free_interval=_student(apart),
+    )
+
+
+def _student(x: Sequence[float]) -> Interval | None:
+    """Student's t interval of a mean at 95 %."""
+    import numpy as np
+    from scipy.stats import t
+
+    if len(x) < 2:
+        return None
+    half = float(t.ppf((1 + CONFIDENCE) / 2, len(x) - 1) * np.std(x, ddof=1) / math.sqrt(len(x)))
+    mean = float(np.mean(x))
+    return Interval(mean - half, mean + half)
