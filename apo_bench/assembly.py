@@ -121,6 +121,16 @@ class Assembly:
             for contact in operation.contacts
         )
 
+    def arcs(self) -> tuple[tuple[int, ...], ...]:
+        """The contacts of R1, R2, ..: all that one operation makes between one pair of parts (Section 3.1).
+
+        Contacts by their number in `relations()`; arcs in the order in which they were made.
+        """
+        together: dict[tuple[int, str, str], list[int]] = {}
+        for i, (contact, made, _) in enumerate(self.relations()):
+            together.setdefault((made, contact.manipulated.part, contact.environment.part), []).append(i)
+        return tuple(map(tuple, together.values()))
+
     def _lost(self, contact: Contact, made: int) -> int | None:
         ends = {contact.manipulated.part, contact.environment.part}
         for k in range(made + 1, len(self.operations)):

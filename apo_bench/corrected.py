@@ -22,7 +22,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
     again is executed with its schedule; the twist of an operation then acts on every target of that operation.
     """
 
-    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = "paper") -> None:
+    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = "contact") -> None:
         """Wrap an `APOReplay` environment.
 
         Args:

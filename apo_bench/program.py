@@ -80,6 +80,8 @@ class Observation:
     """(n,): whether the operation was seen at all."""
     gap_m: float = 1e-4
     """Largest |e| at which the contact equations count as solved, [m]."""
+    play_m: float = 0.0
+    """How far from nominal a contact of parts that fit may really be: their clearance per side, [m]."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)

@@ -21,6 +21,9 @@ Corrector = Callable[[Observation], Correction]
 
 CORRECTORS = MappingProxyType(
     {
+        "contact": "apo_bench.correction.contact:contact",
+        "contact-refuse": "apo_bench.correction.contact:contact_refuse",
+        "contact-drop": "apo_bench.correction.contact:contact_drop",
         "paper": "apo_bench.correction.paper:paper",
         "paper-track": "apo_bench.correction.track:paper_track",
         "last-only": "apo_bench.correction.ablations:last_only",
@@ -38,7 +41,7 @@ CORRECTORS = MappingProxyType(
 STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
 
 
-def correct(seen: Observation, corrector: Any = "paper") -> Correction:
+def correct(seen: Observation, corrector: Any = "contact") -> Correction:
     """What the corrector makes of an observation.
 
     Args:

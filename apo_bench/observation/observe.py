@@ -14,13 +14,16 @@ from apo_bench.observation.noise import Noise
 from apo_bench.program import Demonstration, Observation
 
 
-def observe(shown: Demonstration, noise: Noise, rng: np.random.Generator, gap_m: float = 1e-4) -> Observation:
+def observe(
+    shown: Demonstration, noise: Noise, rng: np.random.Generator, gap_m: float = 1e-4, play_m: float = 0.0
+) -> Observation:
     """What the noise model makes of a demonstration, checked.
 
     Args:
         noise: A function `(assembly, shown, rng) -> Observation`; `make_noise` finds one by name.
         rng: The only source of chance.
         gap_m: Largest |e| at which the contact equations will count as solved, [m].
+        play_m: Clearance per side of parts that fit, [m].
 
     Raises:
         InputError: The noise model returned something that is not an observation of this demonstration.
@@ -35,7 +38,7 @@ def observe(shown: Demonstration, noise: Noise, rng: np.random.Generator, gap_m:
     complaint = _complaint(shown, seen)
     if complaint:
         raise InputError(f"the noise model '{name}' {complaint}.")
-    return replace(seen, gap_m=gap_m)
+    return replace(seen, gap_m=gap_m, play_m=play_m)
 
 
 def _complaint(shown: Demonstration, seen: Any) -> str:

@@ -1,0 +1,148 @@
+"""The contact equations in their smallest form: three per contact, whatever the number of vertices.
+
+The vertices of a face lie in a plane, so e, which is linear in them, is known everywhere once it is known at their
+centre, and how fast it grows along the two principal axes. Scaled by the square root of the number of vertices and by
+the singular values of the centred vertices, these three have the same sum of squares as e of all vertices. Nothing is
+lost, and the matrices are smaller by a quarter.
+
+Every array may have leading axes: many observations of one assembly are linearised at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.correction.equations import Equations
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import GENERATORS
+
+_GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
+_ONE = np.eye(4)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Compact:
+    """c contacts with three equations each, in the motion parameters of n operations."""
+
+    start: Array
+    """(p, 4, 4): the constant motion parameters."""
+    letters: NDArray[np.intp]
+    """(c, w): as in `Equations`."""
+    columns: NDArray[np.intp]
+    """(c, w): the operation of each letter; n for letters that are constants or padding."""
+    inverse: NDArray[np.bool_]
+    """(c, w)."""
+    plane: Array
+    """(c, 4): n of Eq. 1, frame of the manipulated part."""
+    points: Array
+    """(*, c, 3, 4): what stands for the vertices, homogeneous; the last two are directions."""
+    n: int
+
+    def __len__(self) -> int:
+        return len(self.letters)
+
+    def only(self, some: NDArray[np.bool_]) -> Compact:
+        """The same for some of the observations, if each has points of its own."""
+        return self if self.points.ndim == 3 else replace(self, points=self.points[some])
+
+    def among(self, contacts: NDArray[np.bool_]) -> Compact:
+        """The equations of these contacts, (c,), alone."""
+        return replace(
+            self,
+            letters=self.letters[contacts],
+            columns=self.columns[contacts],
+            inverse=self.inverse[contacts],
+            plane=self.plane[contacts],
+            points=self.points[..., contacts, :, :],
+        )
+
+    def residual(self, T: Array) -> Array:
+        """e of every equation, (*, 3 c), at the goals T, (*, n, 4, 4), [m]."""
+        e = self._behind(self._factors(T))[..., 0, :, :, :] @ self.plane[:, :, None]
+        return np.asarray(e.reshape(*e.shape[:-3], -1))
+
+    def blocks(self, T: Array, B: Array) -> tuple[Array, Array]:
+        """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's goal, (*, c, w, 6, 3) (Eq. 14).
+
+        A letter T in n .. T .. v turns n (everything up to T) = f and (everything behind T) v = p, and a unit twist G
+        changes e by f G p; T^-1 stays on the side of p, with the opposite sign. A T that occurs twice adds up.
+
+        Args:
+            B: (*, n, 6, 6), the body twist of each goal per unit of its coordinates.
+        """
+        F = self._factors(T)
+        c, w = self.letters.shape
+        behind = self._behind(F)
+        forms = np.empty((*F.shape[:-4], w + 1, c, 1, 4))
+        forms[..., 0, :, 0, :] = self.plane
+        for j in range(w):
+            np.matmul(forms[..., j, :, :, :], F[..., j, :, :], out=forms[..., j + 1, :, :, :])
+        e = behind[..., 0, :, :, :] @ self.plane[:, :, None]
+        number, side = np.arange(c)[:, None], np.arange(w) + ~self.inverse
+        fG = forms[..., side, number, 0, :] @ _GENERATORS
+        p = behind[..., side, number, :, :]
+        padded = np.zeros((*B.shape[:-3], self.n + 1, 6, 6))
+        padded[..., : self.n, :, :] = np.swapaxes(B, -1, -2)
+        scaled = padded[..., self.columns, :, :] * np.where(self.inverse, -1.0, 1.0)[..., None, None]
+        return e.reshape(*e.shape[:-3], -1), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
+
+    def gathered(self, blocks: Array) -> Array:
+        """The transposed Jacobian (*, 6 n, 3 c) out of its blocks (*, c, w, 6, 3)."""
+        lead, c = blocks.shape[:-4], len(self)
+        J = np.zeros((*lead, self.n + 1, c, 6, 3))
+        at = np.arange(c)
+        for j in range(self.letters.shape[1]):
+            J[..., self.columns[:, j], at, :, :] += blocks[..., j, :, :]
+        return np.swapaxes(J[..., : self.n, :, :, :], -3, -2).reshape(*lead, 6 * self.n, 3 * c)
+
+    def _behind(self, F: Array) -> Array:
+        """(everything from letter j on) v, (*, w + 1, c, 3, 4)."""
+        c, w = self.letters.shape
+        points, transposed = np.empty((*F.shape[:-4], w + 1, c, 3, 4)), np.swapaxes(F, -1, -2)
+        points[..., w, :, :, :] = self.points
+        for j in reversed(range(w)):
+            np.matmul(points[..., j + 1, :, :, :], transposed[..., j, :, :], out=points[..., j, :, :, :])
+        return points
+
+    def _factors(self, T: Array) -> Array:
+        """Every letter of every word, (*, c, w, 4, 4)."""
+        p, n = len(self.start), self.n
+        stack = np.empty((*T.shape[:-3], 2 * (p + n + 1), 4, 4))
+        stack[..., :p, :, :], stack[..., p : p + n, :, :], stack[..., p + n, :, :] = self.start, T, _ONE
+        there, back = stack[..., : p + n + 1, :, :], stack[..., p + n + 1 :, :, :]
+        back[..., :3, :3] = np.swapaxes(there[..., :3, :3], -1, -2)
+        back[..., :3, 3:] = -back[..., :3, :3] @ there[..., :3, 3:]
+        back[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+        return stack[..., self.letters + self.inverse * (p + n + 1), :, :]
+
+
+def compact(system: Equations, n: int) -> Compact:
+    """The same equations, three per contact, in the motion parameters of `n` operations."""
+    letters = system.letters
+    k = letters - len(system.start)
+    columns = np.where((k >= 0) & (k < n), k, n)
+    plane = np.zeros((len(letters), 4))
+    plane[system.contact] = system.plane
+    return Compact(system.start, letters, columns, system.inverse, plane, _points(system), n)
+
+
+def _points(system: Equations) -> Array:
+    """Centre and principal axes of the vertices of each contact, (c, 3, 4), with the same moments."""
+    c = len(system.letters)
+    count = np.bincount(system.contact, minlength=c)
+    total = np.zeros((c, 4))
+    np.add.at(total, system.contact, system.vertex)
+    center = total / count[:, None] if len(system) else total
+    padded = np.zeros((c, max(3, int(count.max(initial=0))), 3))
+    number = np.arange(len(system)) - (np.cumsum(count) - count)[system.contact]
+    padded[system.contact, number] = system.vertex[:, :3] - center[system.contact, :3]
+    _, size, axes = np.linalg.svd(padded, full_matrices=False)
+    points = np.zeros((c, 3, 4))
+    points[:, 0] = center * np.sqrt(count)[:, None]
+    points[:, 1:, :3] = axes[:, :2] * size[:, :2, None]
+    return points

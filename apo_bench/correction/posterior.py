@@ -1,0 +1,91 @@
+"""What is still uncertain after a correction: the rank of the contacts, the free directions, the posterior covariance.
+
+At a solution, singular values of the Jacobian that belong to redundant equations or free directions are rounding, so
+the rank is beyond doubt there, where it is a matter of thresholds at what was seen. The corrected z is uncertain
+within the tangent space of the contact manifold only, and there as much as the observation was: with an orthonormal
+basis N of the null space, cov(z) = N N^t.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.correction.compact import compact
+from apo_bench.correction.equations import equations
+from apo_bench.correction.manifold import Nearest
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import right_jacobian
+from apo_bench.program import Correction, Observation
+
+CUT_OFF = 1e-7
+"""Singular values below this part of the largest one are rounding, at a solution."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """What the contacts fix and leave free at one solution."""
+
+    rank: int
+    """Directions that the contacts fix."""
+    redundant: int
+    """Equations, three per contact, that follow from the others."""
+    spectral_gap: float
+    """The smallest singular value that counts over the largest that does not; infinite if every one counts."""
+    free: Array
+    """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z."""
+
+
+def freedom(Jt: Array) -> Freedom:
+    """Read off the transposed Jacobian (6 n, 3 c) at a solution."""
+    unknowns, equations_ = Jt.shape
+    if not Jt.size:
+        return Freedom(0, equations_, np.inf, np.eye(unknowns))
+    U, w, _ = np.linalg.svd(Jt, full_matrices=True)
+    rank = int(np.count_nonzero(w > CUT_OFF * w[0]))
+    left = w[rank:].max(initial=0.0)
+    gap = float(w[rank - 1] / left) if rank and left > 0.0 else np.inf
+    return Freedom(rank, equations_ - rank, gap, U[:, rank:])
+
+
+def rank(Jt: Array) -> int:
+    """The rank alone."""
+    if not Jt.size:
+        return 0
+    w = np.linalg.svd(Jt, compute_uv=False)
+    return int(np.count_nonzero(w > CUT_OFF * w[0]))
+
+
+def marginals(found: Nearest, free: Array) -> Array:
+    """The posterior covariance of the body twist of each corrected goal, (n, 6, 6), [m, rad]."""
+    spread = found.B @ free.reshape(len(found.B), 6, -1)
+    return np.asarray(spread @ np.swapaxes(spread, 1, 2))
+
+
+def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.95) -> bool | None:
+    """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
+
+    The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
+    deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
+
+    Returns:
+        None if the correction states no posterior, did not converge, or nothing is free.
+    """
+    from scipy.special import chdtri
+
+    if made.covariance is None or not made.ok:
+        return None
+    L = np.linalg.cholesky(seen.covariance)
+    xi = pose.log(pose.inverse(seen.goals) @ made.goals)
+    system = compact(equations(seen.assembly, seen.start, seen.goals), len(made.goals))
+    _, blocks = system.blocks(made.goals, right_jacobian(xi) @ L)
+    free = freedom(system.gathered(blocks)).free
+    if not free.shape[1]:
+        return None
+    true = pose.log(pose.inverse(seen.goals) @ truth)
+    off = free.T @ np.linalg.solve(L, (true - xi)[..., None]).ravel()
+    return bool(off @ off <= chdtri(free.shape[1], 1.0 - level))

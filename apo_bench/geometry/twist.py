@@ -1,0 +1,80 @@
+"""The exponential of SE(3) with its derivative, as matrix polynomials: few operations for many twists."""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from apo_bench.geometry.arrays import Array
+
+TERMS = 24
+"""Of the series in the square of the angle: up to two whole turns, what is left out is rounding."""
+
+
+def _generators() -> Array:
+    """The matrices of the six unit twists, (6, 4, 4)."""
+    G = np.zeros((6, 4, 4))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        G[i, i, 3] = 1.0
+        G[3 + i, j, k], G[3 + i, k, j] = -1.0, 1.0
+    return G
+
+
+def _adjoints() -> Array:
+    """The adjoint matrices of the six unit twists, (6, 6, 6)."""
+    G = np.zeros((6, 6, 6))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        for block in (slice(0, 3), slice(3, 6)):
+            turn = G[3 + i, block, block]
+            turn[j, k], turn[k, j] = -1.0, 1.0
+        shift = G[i, :3, 3:]
+        shift[j, k], shift[k, j] = -1.0, 1.0
+    return G
+
+
+def _series() -> Array:
+    """Coefficients of X^2 and X^3 in exp(X), and of ad, .., ad^4 in J_r, by powers of the squared angle q, (TERMS, 6).
+
+    With x = -q: X^4 = x X^2, and odd powers of ad are ad^(2k+1) = k x^(k-1) ad^3 - (k-1) x^k ad, even ones alike.
+    """
+    C = np.zeros((TERMS, 6))
+    for k in range(TERMS):
+        sign, even, odd = (-1.0) ** k, 1.0 / factorial(2 * k + 2), 1.0 / factorial(2 * k + 3)
+        C[k, :2] = sign * even, sign * odd
+        C[k, 2:4] = (k - 1) * sign * even, -(k - 1) * sign * odd
+        if k > 0:
+            C[k - 1, 4:] = k * sign * even, -k * sign * odd
+    return C
+
+
+GENERATORS = _generators()
+"""A twist xi is the matrix X = sum_i xi_i GENERATORS[i], (6, 4, 4)."""
+_TO_MATRIX = GENERATORS.reshape(6, 16)
+_TO_ADJOINT = _adjoints().reshape(6, 36)
+_SERIES = _series()
+_POWERS = np.arange(TERMS)
+_ONE4, _ONE6 = np.eye(4), np.eye(6)
+
+
+def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
+    """exp(xi), (*, 4, 4), and J_r in exp(xi + d) = exp(xi) exp(J_r d + O(d^2)), (*, 6, 6), of twists (*, 6).
+
+    The matrix of a twist satisfies a polynomial of degree four, its adjoint matrix one of degree five, so three and
+    four powers of them suffice (Bullo and Murray, "Proportional derivative (PD) control on the Euclidean group",
+    1995). Twists of more than two whole turns are beyond the series.
+    """
+    xi = np.asarray(twist, dtype=np.float64)
+    lead = xi.shape[:-1]
+    q = (xi[..., 3:] * xi[..., 3:]).sum(axis=-1)
+    B, C, a, b, c, d = np.moveaxis((q[..., None] ** _POWERS) @ _SERIES, -1, 0)[..., None, None]
+    X = (xi @ _TO_MATRIX).reshape(*lead, 4, 4)
+    ad = (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
+    X2, ad2 = X @ X, ad @ ad
+    return _ONE4 + X + (B * _ONE4 + C * X) @ X2, _ONE6 + a * ad + (b * _ONE6 + c * ad + d * ad2) @ ad2
+
+
+def right_jacobian(twist: ArrayLike) -> Array:
+    """J_r alone, (*, 6) -> (*, 6, 6)."""
+    return exp_and_jacobian(twist)[1]
