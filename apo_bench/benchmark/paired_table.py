@@ -24,8 +24,8 @@ WORDS = (
     "Over the same seeds: at how many of them one of the two alone was right, the difference of their success rates in "
     "points with Tango's score interval for paired proportions, and the mean difference of the errors of their planned "
     "goals in directions that contacts leave free, over seeds at which both had a plan, with Student's t interval "
-    "(both 95 %). Negative errors are smaller than the other's. With no discordant pair among n the score interval still "
-    "reaches 3.84 / (n + 3.84) to both sides: 3.7 points at 100 pairs, less than 3 from 125 on."
+    "(both 95 %). Negative errors are smaller than the other's. With no discordant pair among n the score interval "
+    "still reaches 3.84 / (n + 3.84) to both sides: 3.7 points at 100 pairs, less than 3 from 125 on."
 )
 
 
