@@ -124,8 +124,9 @@ def chain(castles: int) -> Problem:
 
 
 def grid(side: int) -> Problem:
-    """G x G castles with crossing slots, a stick between each two neighbours (52 G^2 - 48 G rows, rank 16 G^2 - 12 G - 1).
+    """G x G castles with crossing slots, a stick between each two neighbours.
 
+    52 G^2 - 48 G rows, n = 6 (3 G^2 - 2 G), rank 16 G^2 - 12 G - 1.
     Whole rows may move across, whole columns along, and every stick along its slots.
     """
     cross, stick, table = crossed(), load_part("stick"), load_part("table")
@@ -160,14 +161,14 @@ def crossed() -> Solid:
     inner, outer, floor, top = 0.01, 0.03, 0.03, 0.04
     boxes = [Box("base", np.array([0, 0, floor / 2]), np.array([outer, outer, floor / 2]))]
     middle, half = (inner + outer) / 2, (outer - inner) / 2
-    for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
-        boxes.append(
-            Box(f"merlon{len(boxes)}", np.array([sx * middle, sy * middle, (floor + top) / 2]), np.array([half, half, 0.005]))
-        )
+    for k, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        center = np.array([sx * middle, sy * middle, (floor + top) / 2])
+        boxes.append(Box(f"merlon{k}", center, np.array([half, half, (top - floor) / 2])))
     slot = np.array([[outer, inner, floor], [-outer, inner, floor], [-outer, -inner, floor], [outer, -inner, floor]])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    wall = np.array([[outer, inner, top], [-outer, inner, top], [-outer, inner, floor], [outer, inner, floor]])[::-1]
-    faces = [Face("bottom", np.array([[x, y, 0] for x, y in ((outer, outer), (outer, -outer), (-outer, -outer), (-outer, outer))]))]
+    wall = np.array([[outer, inner, floor], [-outer, inner, floor], [-outer, inner, top], [outer, inner, top]])
+    bottom = np.array([[outer, outer, 0], [outer, -outer, 0], [-outer, -outer, 0], [-outer, outer, 0]])
+    faces = [Face("bottom", bottom)]
     half_turn = turn @ turn
     for axis, R in (("x", np.eye(3)), ("y", turn)):
         faces.append(Face(f"floor_{axis}", slot @ R.T))

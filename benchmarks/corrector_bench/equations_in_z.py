@@ -1,0 +1,46 @@
+"""The contact equations as a function of z, sigma units, for solvers that know nothing of poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.correction.equations import Equations
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import right_jacobian
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class InZ:
+    """e(z) in millimetres with T = T_seen exp(L z), chart around what was seen."""
+
+    system: Equations
+    seen: Array
+    """(n, 4, 4)."""
+    L: Array
+    """(n, 6, 6), Cholesky factors of the covariance, [m, rad]."""
+
+    @property
+    def zero(self) -> Array:
+        return np.zeros(6 * len(self.seen))
+
+    def twists(self, z: Array) -> Array:
+        return np.asarray((self.L @ z.reshape(-1, 6, 1))[..., 0])
+
+    def goals(self, z: Array) -> Array:
+        return np.asarray(self.seen @ pose.exp(self.twists(z)))
+
+    def value(self, z: Array) -> Array:
+        """e, (m,), [mm]."""
+        return 1e3 * self.system.residual(self.goals(z))
+
+    def slope(self, z: Array) -> Array:
+        """de/dz, (m, 6 n), [mm] per sigma."""
+        _, J = self.system.linearised(self.goals(z))
+        n = len(self.seen)
+        B = right_jacobian(self.twists(z)) @ self.L
+        return 1e3 * np.asarray(np.einsum("mki,kij->mkj", J.reshape(-1, n, 6), B).reshape(-1, 6 * n))

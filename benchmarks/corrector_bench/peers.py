@@ -1,0 +1,53 @@
+"""Every solver behind one shape: `prepare(task)` may build what it likes; what it returns is timed.
+
+The equations of a draw are one `Equations` object that all share, built before the clock runs. `newton` is the frozen
+yardstick: the paper's Newton with the package's own settings, all goals free. Whatever a peer needs to have been built
+from Python objects (a factor graph) is built before the clock runs too, in its favour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.correction.equations import Equations
+from apo_bench.geometry.arrays import Array
+from benchmarks.corrector_bench.equations_in_z import InZ
+from benchmarks.corrector_bench.problems import Problem
+
+
+class Task(NamedTuple):
+    """One observation to be corrected."""
+
+    of: Problem
+    system: Equations
+    seen: Array
+    """(n, 4, 4)."""
+    covariance: Array
+    """(n, 6, 6)."""
+
+    @property
+    def in_z(self) -> InZ:
+        return InZ(self.system, self.seen, np.linalg.cholesky(self.covariance))
+
+
+Run = Callable[[], Array]
+"""Solves the task; corrected goals (n, 4, 4)."""
+Peer = Callable[[Task], Run]
+
+
+def peers() -> dict[str, Peer]:
+    """Name -> how to prepare it."""
+    from benchmarks.corrector_bench import own, peers_gtsam, peers_scipy
+
+    return {"newton": newton, **own.PEERS, **peers_scipy.PEERS, **peers_gtsam.PEERS}
+
+
+def newton(task: Task) -> Run:
+    """Section 3.3's Newton with minimum-norm steps, as `paper` uses it."""
+    from apo_bench.correction.newton import solve
+
+    free = range(len(task.seen))
+    return lambda: solve(task.system, task.seen, free).goals

@@ -1,0 +1,71 @@
+"""P1 to P3: milliseconds of one solve, every peer in its own process, the yardstick and `contact` beside it in turn."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+
+from benchmarks.corrector_bench.draws import draw
+from benchmarks.corrector_bench.measures import quality
+from benchmarks.corrector_bench.own import COMPILED
+from benchmarks.corrector_bench.peers import peers
+from benchmarks.corrector_bench.problems import FIGURES, problem
+from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.runner import Ran, run
+
+COMPILED_TARGET = {"fig2": "<= 0.15", "fig3": "<= 0.15", "fig6": "<= 0.25"}
+OURS = ("newton", "contact", COMPILED)
+LIMIT_S = 40.0
+
+
+def suite(draws: int) -> list[Row]:
+    """Our own with half of the draws, others with a tenth."""
+    rows = []
+    for name in FIGURES:
+        rows += _own(name, max(3, draws // 2))
+        for peer in peers():
+            if peer not in OURS and (not peer.startswith("gtsam") or importlib.util.find_spec("gtsam")):
+                rows += _peer(name, peer, max(3, draws // 10))
+    return rows
+
+
+def _own(name: str, draws: int) -> list[Row]:
+    ran = run("contact", name, "2/1", draws, beside=("newton",))
+    rows = [
+        Row("P1", name, "contact over the paper's Newton, time", _ratio(ran, 0, 1), "<= 1.5", "", _times(ran, "newton"))
+    ]
+    ran = run(COMPILED, name, "2/1", draws, beside=("newton", "contact"))
+    note = "" if ran.ended == "ok" and (ran.ms > 0).all() else f"not measured: {ran.ended}, or numba is missing"
+    value = _ratio(ran, 0, 1) if not note else None
+    what = "compiled over the paper's Newton, time"
+    return [*rows, Row("P2", name, what, value, COMPILED_TARGET[name], note, _times(ran, "newton", "contact"))]
+
+
+def _peer(name: str, peer: str, draws: int) -> list[Row]:
+    ran = run(peer, name, "2/1", draws, beside=("newton", "contact"), limit_s=LIMIT_S)
+    if not len(ran.goals):
+        return [Row("peer", name, f"{peer}: no solution", None, "", ran.ended)]
+    of = problem(name)
+    rated = [quality(of, draw(of, "2/1", seed), goals) for seed, goals in enumerate(ran.goals)]
+    largest = {f: np.max([getattr(q, f) for q in rated]) for f in ("residual_mm", "drift")}
+    detail = {**_times(ran, "newton", "contact"), **largest, "over_newton": _ratio(ran, 0, 1)}
+    detail |= {"bad": np.mean([q.overlong for q in rated]), "draws": len(rated), "ended": ran.ended}
+    target = {"scipy trf": ">= 5", "gtsam cholesky": ">= 1", "gtsam qr": ">= 1"}.get(peer, "")
+    note = f"residual {largest['residual_mm']:.1e} mm, drift {largest['drift']:.1e} sigma, longer than truth {detail['bad']:.0%}"
+    if ran.ended != "ok":
+        note = f"{ran.ended} after {len(rated)} draws; {note}"
+    return [
+        Row("P3" if target else "peer", name, f"{peer} over contact, time", _ratio(ran, 0, 2), target, note, detail)
+    ]
+
+
+def _ratio(ran: Ran, a: int, b: int) -> float:
+    """Median of the ratios of paired times."""
+    ms = ran.ms[(ran.ms > 0).all(axis=1)]
+    return float(np.median(ms[:, a] / ms[:, b])) if len(ms) else float("nan")
+
+
+def _times(ran: Ran, *beside: str) -> dict[str, float]:
+    names = ("ms", *(f"{other}_ms" for other in beside))
+    return {n: float(np.median(x)) for n, x in zip(names, ran.ms.T, strict=True)} if len(ran.ms) else {}

@@ -1,0 +1,53 @@
+"""One peer on one problem, in a process of its own (`python -m benchmarks.corrector_bench.worker`, called by the runner).
+
+Arguments: peer, problem, level, per_part (0 or 1), seeds (first:last), the file to write (.npz), what else is timed in
+turn (comma-separated). Every draw is solved by each in turn, so that a machine whose speed drifts treats all alike.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import numpy as np
+
+from benchmarks.corrector_bench.draws import draw
+from benchmarks.corrector_bench.peers import Task, peers
+from benchmarks.corrector_bench.problems import problem
+
+FAILED = -1.0
+
+
+def main(peer: str, name: str, level: str, per_part: str, seeds: str, out: str, beside: str = "") -> None:
+    """Writes goals (k, n, 4, 4) of the peer and milliseconds (k, 1 + beside) of all."""
+    known, of = peers(), problem(name)
+    turn = [peer, *[other for other in beside.split(",") if other]]
+    first, last = map(int, seeds.split(":"))
+    goals, times = [], []
+    for seed in range(first, last):
+        given = draw(of, level, seed, per_part == "1")
+        task = Task(of, of.system(given.seen), given.seen, given.covariance)
+        ended = [_timed(known[each], task, again=seed == first) for each in turn]
+        goals.append(ended[0][0])
+        times.append([ms for _, ms in ended])
+        np.savez(out + ".part.npz", goals=np.array(goals), ms=np.array(times), first=first)
+        os.replace(out + ".part.npz", out)
+
+
+def _timed(peer, task: Task, again: bool):
+    """Goals and milliseconds; goals of NaN and `FAILED` if it raised. The first call of a process warms up."""
+    try:
+        for _ in range(1 + again):
+            run = peer(task)
+            start = time.perf_counter()
+            goals = run()
+            ms = 1e3 * (time.perf_counter() - start)
+        return np.asarray(goals, dtype=np.float64), ms
+    except Exception as error:  # a peer may fail in any way; that is a result
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        return np.full(task.seen.shape, np.nan), FAILED
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
