@@ -11,10 +11,8 @@ from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
 from apo_bench.scenario import Scenario
-from apo_bench.simulation.touch import heights, held_by, sides_of
+from apo_bench.simulation.touch import OVER_M, ends_of, held_by, sides_of
 
-OVER_M = 0.02
-"""Room between what is carried and what it is carried over."""
 SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
 
@@ -76,9 +74,8 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
 
 
 def _over(assembly: Assembly, main: str, moves: tuple[str, ...], poses: Poses) -> float:
-    ends = {part: heights(assembly.solids[part], poses[part]) for part in assembly.solids}
-    hangs = float(poses[main][2, 3]) - min(ends[part][0] for part in moves)
-    return max((top for part, (_, top) in ends.items() if part not in moves), default=0.0) + hangs + OVER_M
+    top, bottom = ends_of(assembly, moves, poses)
+    return top + (float(poses[main][2, 3]) - bottom) + OVER_M
 
 
 def _out(scenario: Scenario, k: int, poses: Poses) -> Array:

@@ -24,15 +24,22 @@ from apo_bench.simulation.grasping import (
 )
 from apo_bench.simulation.paths import turn_from
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.touch import heights, held_by, later_walls, neighbours, restored, sides_of, slow_before
+from apo_bench.simulation.touch import (
+    OVER_M,
+    ends_of,
+    held_by,
+    later_walls,
+    neighbours,
+    restored,
+    sides_of,
+    slow_before,
+)
 from apo_bench.simulation.transfer import SAFE_M, Grip, Line, Transfer, key_poses
 
 GRAVITY = 9.81
 PLACE_WEIGHTS, INSERT_WEIGHTS, SLIDE_WEIGHTS = 6.0, 2.5, 0.5
 """Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
-OVER_M = 0.02
-"""Room between what is carried and what it is carried over."""
 FINGER_M = 0.01
 """So far fingers reach below their tip."""
 PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
@@ -122,7 +129,8 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     sides = () if into.level else sides_of(plan.assembly, contacts, operation.moves, after)
     leaves = operation.contacts if undo or task.was == k else restored(plan.assembly, k)
     away = () if out.level else tuple(-side for side in sides_of(plan.assembly, leaves, operation.moves, believed))
-    top, hangs = _over(plan.assembly, operation.moves, believed, start @ grips[0].T_part_tip)
+    top, bottom = ends_of(plan.assembly, operation.moves, believed)
+    hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
@@ -219,13 +227,6 @@ def _centring(
             grasp = clear_across(scene, part, np.abs(wall), place)
             grips += [] if grasp is None else [_grip(scene, part, grasp, T, T)]
     return tuple(grips)
-
-
-def _over(assembly: Assembly, moved: tuple[str, ...], poses: Poses, tip: Array) -> tuple[float, float]:
-    """The top of what stands, and how far what moves hangs below the tip, [m]."""
-    ends = {part: heights(assembly.solids[part], poses[part]) for part in assembly.solids}
-    top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)
-    return top, float(tip[2, 3]) - min(ends[part][0] for part in moved)
 
 
 def _mass(scene: Scene, part: str) -> float:

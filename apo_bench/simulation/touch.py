@@ -14,6 +14,8 @@ from apo_bench.program import Poses
 
 SLOW_M = 0.003
 WALL_MARGIN_M = 0.002
+OVER_M = 0.02
+"""Room between what is carried and what it is carried over."""
 
 
 def restored(assembly: Assembly, k: int) -> tuple[Contact, ...]:
@@ -72,6 +74,13 @@ def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
 def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:
     """What the moved part touches."""
     return {of.part for contact in contacts for of in contact} - set(moved)
+
+
+def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
+    """The top of what stands, and the bottom of what moves, [m]."""
+    ends = {part: heights(assembly.solids[part], poses[part]) for part in assembly.solids}
+    top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)
+    return top, min(ends[part][0] for part in moved)
 
 
 def heights(solid: Solid, T: Array) -> tuple[float, float]:
