@@ -1,9 +1,8 @@
 """What the baselines are set to: `python benchmarks/tune.py [SEEDS]` (6 seeds: some 10 minutes of one core).
 
-Every baseline with a setting replays two scenes, with a careless human, at levels 1 and 2, once for each value of a
-grid; seeds count from 100,000, where no table of results takes any. The value with the most strict successes is chosen;
-of equals the one whose goals have the smallest mean error along what contacts fix. Prints the table and writes
-`benchmarks/results/tuning.json`.
+Every baseline replays two scenes, with a careless human, at levels 1 and 2, once for each point of a grid; seeds count
+from 100,000, where no table of results takes any. The point with the most strict successes is chosen; of equals the one
+whose goals are nearest to the truth. Prints the table and writes `benchmarks/results/tuning.json`.
 """
 
 from __future__ import annotations
@@ -14,9 +13,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import json
+import math
 import sys
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import product
 from pathlib import Path
 from statistics import mean
 from typing import Any, NamedTuple
@@ -34,15 +35,26 @@ from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.simulation.settle import settle
 
 SCENARIOS, LEVELS, CARELESS, FIRST_SEED = ("stick_in_tower", "vanished_fixture"), (1.0, 2.0), 1.0, 100_000
-GRIDS: Mapping[str, tuple[Callable[..., Any], str, tuple[float, ...]]] = {
-    "least-squares": (least_squares, "contact_m", (1e-3, 3e-4, 1e-4, 1e-5, 1e-6)),
-    "penalty": (penalty, "contact_m", (1e-3, 3e-4, 1e-4, 3e-5)),
-    "settle": (settle, "lift_m", (0.0, 1e-3, 3e-3)),
+GRIDS: Mapping[str, tuple[Callable[..., Any], Mapping[str, tuple[float, ...]]]] = {
+    "least-squares": (least_squares, {"contact_m": (1e-3, 3e-4, 1e-4, 1e-5, 1e-6)}),
+    "penalty": (penalty, {"contact_m": (3e-4, 1e-4, 3e-5), "length": (0.05, 0.1, 0.2)}),
+    "settle": (settle, {"lift_m": (0.0, 1e-3, 3e-3)}),
+    "snap": (snap, {}),
 }
-"""Corrector -> what is tuned, the keyword, its values [m]."""
-UNTUNED = {"snap": snap}
-"""Shown beside them; it has nothing to set."""
+"""Corrector -> its settings and their values, [m], a length of `penalty` in standard deviations; `snap` has none."""
 RESULT = Path(__file__).parent / "results" / "tuning.json"
+
+
+Values = tuple[float, ...]
+
+
+class Case(NamedTuple):
+    """A cell of the table."""
+
+    scenario: str
+    level: float
+    method: str
+    values: Values
 
 
 class Replayed(NamedTuple):
@@ -56,32 +68,30 @@ class Replayed(NamedTuple):
 
 
 def main(seeds: int = 6) -> None:
-    cells: dict[tuple[str, str, float | None, float], list[Replayed]] = {}
+    cells: dict[Case, list[Replayed]] = {}
     for name in SCENARIOS:
         scene = build_scene(load_scenario(name))
         for seed in range(FIRST_SEED, FIRST_SEED + seeds):
             shown = show(scene, CARELESS, seed)
-            for level in LEVELS:
-                for method, value, corrector in _settings():
-                    key = (name, method, value, level)
-                    cells.setdefault(key, []).append(_replayed(scene, shown, level, seed, corrector))
-    lines = [_line(key, replays) for key, replays in cells.items()]
-    chosen = {method: _best(method, cells) for method in GRIDS}
-    for line in lines:
-        print(*(f"{key} {value}" for key, value in line.items()), sep=", ")
-    print("chosen:", *(f"{method} {GRIDS[method][1]} = {value:g}" for method, value in chosen.items()), sep="\n")
+            for level, method in product(LEVELS, GRIDS):
+                for values in product(*GRIDS[method][1].values()):
+                    replayed = _replayed(scene, shown, level, seed, _corrector(method, values))
+                    cells.setdefault(Case(name, level, method, values), []).append(replayed)
+    lines = [_line(case, replays) for case, replays in cells.items()]
+    chosen = {method: _settings(method, _best(method, cells)) for method in GRIDS}
+    for line in (*lines, chosen):
+        print(line)
     command = f"python benchmarks/tune.py {seeds}"
     RESULT.parent.mkdir(exist_ok=True)
     RESULT.write_text(json.dumps({"command": command, "chosen": chosen, "cells": lines}, indent=1) + "\n")
 
 
-def _settings() -> list[tuple[str, float | None, Callable[..., Any]]]:
-    tuned = [
-        (method, value, partial(corrector, **{keyword: value}))
-        for method, (corrector, keyword, values) in GRIDS.items()
-        for value in values
-    ]
-    return [*tuned, *((method, None, corrector) for method, corrector in UNTUNED.items())]
+def _settings(method: str, values: Values) -> dict[str, float]:
+    return dict(zip(GRIDS[method][1], values, strict=True))
+
+
+def _corrector(method: str, values: Values) -> Callable[..., Any]:
+    return partial(GRIDS[method][0], **_settings(method, values))
 
 
 def _replayed(scene: Scene, shown: Shown, level: float, seed: int, corrector: Callable[..., Any]) -> Replayed:
@@ -92,13 +102,12 @@ def _replayed(scene: Scene, shown: Shown, level: float, seed: int, corrector: Ca
     return Replayed(bool(won), made.gap_after_m * 1e3, fixed_mm, free_mm)
 
 
-def _line(key: tuple[str, str, float | None, float], replays: list[Replayed]) -> dict[str, Any]:
-    scenario, method, value, level = key
+def _line(case: Case, replays: list[Replayed]) -> dict[str, Any]:
     return {
-        "scenario": scenario,
-        "level": level,
-        "method": method,
-        "value": value,
+        "scenario": case.scenario,
+        "level": case.level,
+        "method": case.method,
+        **_settings(case.method, case.values),
         "n": len(replays),
         "won": sum(replay.success for replay in replays),
         "gap_mm": round(mean(replay.gap_mm for replay in replays), 4),
@@ -107,12 +116,12 @@ def _line(key: tuple[str, str, float | None, float], replays: list[Replayed]) ->
     }
 
 
-def _best(method: str, cells: Mapping[tuple[str, str, float | None, float], list[Replayed]]) -> float:
-    def worth(value: float) -> tuple[int, float]:
-        replays = [replay for key, cell in cells.items() if key[1:3] == (method, value) for replay in cell]
-        return sum(replay.success for replay in replays), -mean(replay.fixed_mm for replay in replays)
+def _best(method: str, cells: Mapping[Case, list[Replayed]]) -> Values:
+    def worth(values: Values) -> tuple[int, float]:
+        replays = [r for case, cell in cells.items() if case[2:] == (method, values) for r in cell]
+        return sum(r.success for r in replays), -mean(math.hypot(r.fixed_mm, r.free_mm) for r in replays)
 
-    return max(GRIDS[method][2], key=worth)
+    return max(product(*GRIDS[method][1].values()), key=worth)
 
 
 if __name__ == "__main__":

@@ -197,6 +197,13 @@ def test_parts_that_lie_right_settle_by_their_play_and_no_more(name: str) -> Non
     assert np.array_equal(correct(seen, "settle").goals, made.goals)
 
 
+@pytest.mark.parametrize("play_mm", [0.1, 1.0])
+def test_a_stick_sinks_by_the_play_that_is_stated(play_mm: float) -> None:
+    built = scenes.stick_on_castles()
+    made = correct(replace(scenes.seen(built, built.goals), play_m=play_mm * 1e-3), "settle")
+    assert made.goals[2, 2, 3] == pytest.approx(built.goals[2, 2, 3] - play_mm * 1e-3, abs=0.03e-3)
+
+
 @pytest.mark.parametrize("height_mm", [-3.0, 3.0])
 def test_a_part_falls_onto_the_table_or_is_pushed_out_of_it(height_mm: float) -> None:
     built = scenes.bridge()

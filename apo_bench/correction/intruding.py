@@ -40,16 +40,13 @@ def meeting(assembly: Assembly, system: Equations) -> Meeting:
     Args:
         system: All equations, in the order of `assembly.relations()`.
     """
-    arcs = dict[tuple[int, str, str], int]()
-    for i, (contact, made, _) in enumerate(assembly.relations()):
-        arcs.setdefault((made, contact.manipulated.part, contact.environment.part), i)
+    contacts, first = [r.contact for r in assembly.relations()], np.array([arc[0] for arc in assembly.arcs()], np.intp)
     pairs = [
         (w, a, b)
-        for w, (_, one, other) in enumerate(arcs)
-        for a in assembly.solids[one].boxes
-        for b in assembly.solids[other].boxes
+        for w, i in enumerate(first)
+        for a in assembly.solids[contacts[i].manipulated.part].boxes
+        for b in assembly.solids[contacts[i].environment.part].boxes
     ]
-    first = np.array(list(arcs.values()), dtype=np.intp)
     letters, inverse = system.letters[first], system.inverse[first]
     words = Equations(
         start=system.start,

@@ -28,17 +28,18 @@ from apo_bench.program import Correction, Observation
 CONTACT_M = 1e-4
 """Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`."""
 STEPS = 600
-LENGTH = 0.05
-"""Step of Adam at the beginning, in standard deviations."""
+LENGTH = 0.1
+"""Step of Adam at the beginning, in standard deviations, tuned likewise."""
 MEAN, SQUARE, TINY = 0.9, 0.999, 1e-8
 """Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
 
 
-def penalty(seen: Observation, *, contact_m: float = CONTACT_M, steps: int = STEPS) -> Correction:
+def penalty(seen: Observation, *, contact_m: float = CONTACT_M, length: float = LENGTH) -> Correction:
     """The goals at which the descent ends.
 
     Args:
         contact_m: Gap or depth that costs as much as one standard deviation of noise, [m].
+        length: Step of Adam at the beginning, in standard deviations.
 
     Returns:
         `converged` with the gap that is left in the sentence, since it is meant to be executed as it is; or `not_seen`.
@@ -46,7 +47,7 @@ def penalty(seen: Observation, *, contact_m: float = CONTACT_M, steps: int = STE
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(seen, lambda seen: _descended(seen, contact_m, steps), f"the descent ended after {steps} steps")
+    return as_it_ends(seen, lambda seen: _descended(seen, contact_m, length), f"the descent ended after {STEPS} steps")
 
 
 @final
@@ -76,13 +77,13 @@ def loss(seen: Observation, contact_m: float = CONTACT_M) -> Loss:
     return Loss(whitened(seen), system, meeting(seen.assembly, system), contact_m)
 
 
-def _descended(seen: Observation, contact_m: float, steps: int) -> Array:
+def _descended(seen: Observation, contact_m: float, length: float) -> Array:
     down = loss(seen, contact_m)
     z = np.zeros(6 * len(seen.goals))
     m, v = np.zeros_like(z), np.zeros_like(z)
-    for t in range(1, steps + 1):
+    for t in range(1, STEPS + 1):
         _, g = down(z)
         m, v = MEAN * m + (1 - MEAN) * g, SQUARE * v + (1 - SQUARE) * g**2
-        length = LENGTH * np.cos(0.5 * np.pi * t / steps)
-        z = z - length * (m / (1 - MEAN**t)) / (np.sqrt(v / (1 - SQUARE**t)) + TINY)
+        step = length * np.cos(0.5 * np.pi * t / STEPS)
+        z = z - step * (m / (1 - MEAN**t)) / (np.sqrt(v / (1 - SQUARE**t)) + TINY)
     return down.space.goals(z)

@@ -6,7 +6,7 @@ pose of the main part is the corrected goal, and all parts stay where they came 
 parts move as in syrup, so that those that were put inside each other part slowly instead of leaping.
 
 Physics knows neither which faces should touch nor how uncertain a pose is, so contacts and covariances are not looked
-at. Nor does an observation know how parts are made: fit faces recede by `CLEARANCE_M`, all have one density.
+at. Fit faces recede by the play that the observation states, or by `CLEARANCE_M`; all parts have one density.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from apo_bench.simulation.world import World, fresh, part_pose, place, unstable,
 LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned by `python benchmarks/tune.py`."""
 CLEARANCE_M = 0.25e-3
-"""Play per side of fit faces; that of the scenarios unless they say otherwise."""
+"""Play per side of fit faces where none is stated, since parts without any cannot be put together."""
 DENSITY, FRICTION = 600.0, 0.8
 """[kg/m^3] and coefficient of sliding, of wood, as in the part files."""
 SOFT_S, LONGEST_S, REST_S = 0.3, 1.5, 0.05
@@ -41,7 +41,7 @@ SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
 SLOW.flags.writeable = False
 
 
-def settle(seen: Observation, *, lift_m: float = LIFT_M, clearance_m: float = CLEARANCE_M) -> Correction | Array:
+def settle(seen: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
     """Where the parts come to rest, (n, 4, 4), world frame, [m].
 
     Returns:
@@ -54,7 +54,7 @@ def settle(seen: Observation, *, lift_m: float = LIFT_M, clearance_m: float = CL
     goals = np.array(seen.goals)
     if not len(goals):
         return goals
-    scene = _world(seen, clearance_m)
+    scene = _world(seen)
     data = fresh(scene, seen.start)
     for k, operation in enumerate(seen.assembly.operations):
         _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ seen.goals[k])
@@ -86,12 +86,12 @@ def _rest(scene: World, data: mujoco.MjData) -> None:
         quiet = quiet + model.opt.timestep if still else 0.0
 
 
-def _world(seen: Observation, clearance_m: float) -> World:
+def _world(seen: Observation) -> World:
     """The parts of an assembly as boxes, and nothing else; parts that no operation moves are fixed."""
     moved = {part for operation in seen.assembly.operations for part in operation.moves}
     free = tuple(part for part in seen.assembly.solids if part in moved)
     fixed = tuple(part for part in seen.assembly.solids if part not in moved)
-    xml = _xml(seen.assembly.solids, free, clearance_m, physics())
+    xml = _xml(seen.assembly.solids, free, seen.play_m or CLEARANCE_M, physics())
     model = mujoco.MjModel.from_xml_string(xml)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return world(model, xml, free, fixed)
