@@ -1,4 +1,4 @@
-"""The package's corrector behind the shape of a peer: the one place that knows its calls."""
+"""The package's corrector behind the shapes that are measured: the one place that knows its calls."""
 
 from __future__ import annotations
 
@@ -7,7 +7,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from apo_bench.assembly import Assembly
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Correction, Observation
+from benchmarks.corrector_bench.draws import Draw
 from benchmarks.corrector_bench.peers import Run, Task
+from benchmarks.corrector_bench.problems import Problem
 
 
 def contact(task: Task) -> Run:
@@ -20,10 +25,35 @@ def contact(task: Task) -> Run:
 
 def compiled(task: Task) -> Run:
     """The same by the optional compiled kernel."""
-    from apo_bench.correction.compiled import nearest  # type: ignore[import-not-found]
+    from apo_bench.correction.compiled import nearest
 
     return lambda: nearest(task.system, task.seen, np.linalg.cholesky(task.covariance)).goals
 
 
 COMPILED = "contact compiled"
 PEERS: Mapping[str, Callable[[Task], Run]] = MappingProxyType({"contact": contact, COMPILED: compiled})
+
+
+def observation(of: Problem, given: Draw, assembly: Assembly | None = None) -> Observation:
+    """What a corrector is handed, of another assembly if one is given."""
+    seen = np.ones(of.n, dtype=np.bool_)
+    return Observation(of.assembly if assembly is None else assembly, of.start, given.seen, given.covariance, seen)
+
+
+def corrected(seen: Observation, name: str = "contact") -> Correction:
+    """By the corrector itself, with its test and its posterior."""
+    from apo_bench.correction.correct import correct
+
+    return correct(seen, name)
+
+
+def reported(of: Problem, given: Draw) -> tuple[int, Array]:
+    """Rank and free directions as the corrector states them: an orthonormal basis in z, (6 n, f)."""
+    from apo_bench.correction.compact import compact
+    from apo_bench.correction.manifold import nearest
+    from apo_bench.correction.posterior import freedom
+
+    system = compact(of.system(given.seen), of.n)
+    found = nearest(system, given.seen, np.linalg.cholesky(given.covariance))
+    known = freedom(found.Jt)
+    return known.rank, known.free

@@ -46,6 +46,12 @@ def written(rows: Iterable[Row], path: Path, head: Mapping[str, Any]) -> None:
     path.write_text(json.dumps(_plain({**head, "rows": table}), indent=1) + "\n", encoding="utf-8")
 
 
+def read(path: Path) -> list[Row]:
+    """The rows of a file."""
+    rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return [Row(**{field: row[field] for field in Row._fields}) for row in rows]
+
+
 def printed(rows: Iterable[Row]) -> str:
     """The table for a terminal."""
     lines = [("", "problem", "what", "measured", "target", "")]

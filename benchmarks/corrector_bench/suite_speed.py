@@ -52,7 +52,7 @@ def _peer(name: str, peer: str, draws: int) -> list[Row]:
     detail = {**_times(ran, "newton", "contact"), **largest, "over_newton": _ratio(ran, 0, 1)}
     detail |= {"bad": np.mean([q.overlong for q in rated]), "draws": len(rated), "ended": ran.ended}
     target = {"scipy trf": ">= 5", "gtsam cholesky": ">= 1", "gtsam qr": ">= 1"}.get(peer, "")
-    note = f"residual {largest['residual_mm']:.1e} mm, drift {largest['drift']:.1e} sigma, longer than truth {detail['bad']:.0%}"
+    note = "residual {residual_mm:.1e} mm, drift {drift:.1e} sigma, longer than truth {bad:.0%}".format(**detail)
     if ran.ended != "ok":
         note = f"{ran.ended} after {len(rated)} draws; {note}"
     return [

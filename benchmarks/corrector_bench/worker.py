@@ -1,4 +1,4 @@
-"""One peer on one problem, in a process of its own (`python -m benchmarks.corrector_bench.worker`, called by the runner).
+"""One peer on one problem, in a process of its own: `python -m benchmarks.corrector_bench.worker`, as the runner says.
 
 Arguments: peer, problem, level, per_part (0 or 1), seeds (first:last), the file to write (.npz), what else is timed in
 turn (comma-separated). Every draw is solved by each in turn, so that a machine whose speed drifts treats all alike.

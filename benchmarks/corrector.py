@@ -1,0 +1,81 @@
+"""The corrector against its targets and against other solvers: `python benchmarks/corrector.py` (a quarter of an hour).
+
+Prints a table of targets, what was measured and whether it was met, and writes every number as JSON. Draws are
+synthetic and Gaussian around an exactly consistent truth; each peer runs in a process of its own with a time limit.
+GTSAM and numba are measured if they are installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import time
+from importlib import metadata
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from benchmarks.corrector_bench import suite_quality, suite_speed
+from benchmarks.corrector_bench.part import part
+from benchmarks.corrector_bench.rows import Row, printed, written
+
+OUT = Path(__file__).resolve().parent / "results" / "corrector.json"
+APART = {"freedom": 300.0, "wrong": 600.0, "calibration": 900.0}
+"""Suites that run in one process each, and their limits in seconds."""
+SUITES = ("quality", "speed", *APART)
+PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam")
+
+
+def main() -> int:
+    given = _arguments()
+    rows, took = list[Row](), dict[str, float]()
+    for suite in given.only:
+        start = time.monotonic()
+        found = _measured(suite, given.draws)
+        took[suite] = round(time.monotonic() - start, 1)
+        print(f"\n{suite} ({took[suite]:.0f} s)\n{printed(found)}", flush=True)
+        rows += found
+        written(rows, given.out, _head(given.draws, took))
+    missed = [row for row in rows if row.met is False]
+    judged = sum(row.met is not None for row in rows)
+    print(f"\n{judged - len(missed)} of {judged} targets met; every number is in {given.out}")
+    if missed:
+        print(printed(missed))
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=200, help="draws per figure; other counts scale with it (200)")
+    parser.add_argument("--only", nargs="+", choices=SUITES, default=list(SUITES), help="suites to run (all)")
+    parser.add_argument("--out", type=Path, default=OUT, help="JSON file to write")
+    return parser.parse_args()
+
+
+def _measured(suite: str, draws: int) -> list[Row]:
+    if suite == "quality":
+        return suite_quality.suite(draws)
+    if suite == "speed":
+        return suite_speed.suite(draws)
+    return part(suite, draws, APART[suite])
+
+
+def _head(draws: int, took: dict[str, float]) -> dict[str, object]:
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            versions[package] = "not installed"
+    command = "python benchmarks/corrector.py " + " ".join(sys.argv[1:])
+    machine = f"{platform.machine()}, {os.cpu_count()} cores"
+    head = {"command": command.strip(), "draws": draws, "versions": versions, "machine": machine}
+    return {**head, "seconds": took}
+
+
+if __name__ == "__main__":
+    sys.exit(main())
