@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry.solid import extent
 from apo_bench.program import Layout
 from apo_bench.scenario import Scenario
 
@@ -60,13 +60,8 @@ def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Arr
     if part in scenario.assembly.fixed or clearance_m == 0.0 or not any(face.fit for face in solid.faces.values()):
         return T
     lowered = np.array(T)
-    lowered[2, 3] -= _lowest(T, physical_boxes(solid, clearance_m)) - _lowest(T, solid.boxes)
+    lowered[2, 3] -= extent(physical_boxes(solid, clearance_m), T[2, :3])[0] - extent(solid.boxes, T[2, :3])[0]
     return lowered
-
-
-def _lowest(T: Array, boxes: tuple[Box, ...]) -> float:
-    up = T[2, :3]
-    return float(min(up @ box.center - np.abs(up) @ box.half for box in boxes))
 
 
 def _between(low: float, high: float, unit: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import final
@@ -56,6 +56,12 @@ class Box:
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen(self.center, 3))
         object.__setattr__(self, "half", frozen(self.half, 3))
+
+
+def extent(boxes: Iterable[Box], along: Array) -> tuple[float, float]:
+    """How far boxes reach along a direction, (3,), of their own frame: the least and the greatest coordinate, [m]."""
+    ends = [(along @ box.center, np.abs(along) @ box.half) for box in boxes]
+    return float(min(at - reach for at, reach in ends)), float(max(at + reach for at, reach in ends))
 
 
 @final

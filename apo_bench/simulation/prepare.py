@@ -10,6 +10,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.solid import extent
 from apo_bench.program import Plan, Poses, Step
 from apo_bench.scenario import Attach, Grasp
 from apo_bench.simulation.grasping import (
@@ -198,15 +199,8 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
     rest = scene.kinematics.forward(scene.arm.home)
     tips = [tip_frame(each, start) for each in (grasp, other)]
     tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
-    return Grip(tip, _half_width(scene, part, grasp))
-
-
-def _half_width(scene: Scene, part: str, grasp: Grasp) -> float:
-    """Half the physical width between the fingers, [m]."""
-    boxes = physical_boxes(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3)
-    far = max(float(grasp.across @ box.center + np.abs(grasp.across) @ box.half) for box in boxes)
-    near = min(float(grasp.across @ box.center - np.abs(grasp.across) @ box.half) for box in boxes)
-    return (far - near) / 2
+    near, far = extent(physical_boxes(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3), grasp.across)
+    return Grip(tip, (far - near) / 2)
 
 
 def _centring(

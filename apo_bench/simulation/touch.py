@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.solid import Solid, extent
 from apo_bench.program import Poses
 
 SLOW_M = 0.003
@@ -78,13 +78,12 @@ def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str
 
 def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
     """The top of what stands, and the bottom of what moves, [m]."""
-    ends = {part: heights(assembly.solids[part], poses[part]) for part in assembly.solids}
+    ends = {part: _heights(solid, poses[part]) for part, solid in assembly.solids.items()}
     top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)
     return top, min(ends[part][0] for part in moved)
 
 
-def heights(solid: Solid, T: Array) -> tuple[float, float]:
+def _heights(solid: Solid, T: Array) -> tuple[float, float]:
     """The lowest and the highest point of a part, [m]."""
-    ends = [(T[2, :3] @ box.center, np.abs(T[2, :3]) @ box.half) for box in solid.boxes]
-    low, high = min(at - reach for at, reach in ends), max(at + reach for at, reach in ends)
+    low, high = extent(solid.boxes, T[2, :3])
     return float(T[2, 3] + low), float(T[2, 3] + high)
