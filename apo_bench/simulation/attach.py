@@ -25,15 +25,15 @@ def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
     robot.stage = "attach"
     guard, rise = Guard(t.into.way, t.insert_n), t.floats
     if t.into.left is not None and second is not None:
-        there = moved(moved(t.T_world_goal, t.into.way, -t.into.left), rise, 1.0)
+        there = moved(moved(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
         left = robot.follow(steady(robot.T, there @ grip.T_part_tip, INSERT), guard)
         if left > ARRIVED_M:
             return left + t.into.left, grip
-        change(robot, t, grip, second, moved(there, rise, -1.0) @ second.T_part_tip)
-        grip, rise = second, t.clearance * UP
-        robot.follow(smooth(robot.T, moved(robot.T, rise, 1.0), 0.01))
-    left = robot.follow(steady(robot.T, moved(t.T_world_goal @ grip.T_part_tip, rise, 1.0), INSERT), guard)
-    lower = moved(robot.T, UP, -rise[2] - OVERTRAVEL_M)
+        change(robot, t, grip, second, moved(there, UP, -rise) @ second.T_part_tip)
+        grip, rise = second, t.clearance
+        robot.follow(smooth(robot.T, moved(robot.T, UP, rise), 0.01))
+    left = robot.follow(steady(robot.T, moved(t.T_world_goal @ grip.T_part_tip, UP, rise), INSERT), guard)
+    lower = moved(robot.T, UP, -rise - OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
     return left, grip
@@ -64,14 +64,14 @@ def _slide(robot: Robot, t: Transfer, side: Array) -> None:
 def pull_out(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> Grip:
     """Backwards along the way of an insertion; returns the grip at its end."""
     robot.stage = "lift"
-    robot.follow(smooth(robot.T, moved(robot.T, t.floats, 1.0), 0.01))
+    robot.follow(smooth(robot.T, moved(robot.T, UP, t.floats), 0.01))
     if t.out.left is None or second is None:
         robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.travel), PULL))
         return grip
     robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.left), PULL))
     part = moved(t.T_world_start, t.out.way, -t.out.left)
     change(robot, t, grip, second, part @ second.T_part_tip)
-    robot.follow(smooth(robot.T, moved(robot.T, t.floats, 1.0), 0.01))
+    robot.follow(smooth(robot.T, moved(robot.T, UP, t.floats), 0.01))
     robot.follow(smooth(robot.T, moved(robot.T, t.out.way, t.out.left - t.out.travel), PULL))
     return second
 

@@ -57,7 +57,7 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "carry"
     before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
     if t.into.level:
-        before = moved(before, t.floats, 1.0)
+        before = moved(before, UP, t.floats)
     robot.go(at_height(before, max(t.safe, before[2, 3])), CARRY)
     robot.follow(smooth(robot.T, before, LOWER))
     robot.wait(0.1)

@@ -82,9 +82,9 @@ class Transfer:
     """What lay free falls by this onto the floor of its slot, [m]."""
 
     @property
-    def floats(self) -> Array:
-        """Half the clearance up: a part that was seen at rest lay on the floor of its slot."""
-        return 0.5 * self.clearance * UP
+    def floats(self) -> float:
+        """How far up a part must be to be free all round: seen at rest it lay on the floor of its slot, [m]."""
+        return 0.5 * self.clearance
 
 
 def aim(t: Transfer) -> Array:
