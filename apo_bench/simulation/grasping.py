@@ -71,21 +71,13 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place])
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
     if _clear(scene, part, [preferred], places, MARGINS_M[-1]):
         return preferred
-    for margin in MARGINS_M:
-        clear = _clear(scene, part, _candidates(scene, part, places[0].T), places, margin)
-        if clear:
-            return clear[0]
-    return preferred
+    return _first_clear(scene, part, _candidates(scene, part, places[0].T), places) or preferred
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: Place) -> Grasp | None:
     """The first clear grasp that closes along a direction of the part, or None."""
     able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ across) > 0.99]
-    for margin in MARGINS_M:
-        clear = _clear(scene, part, able, [place], margin)
-        if clear:
-            return clear[0]
-    return None
+    return _first_clear(scene, part, able, [place])
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place], stroke: Stroke) -> Grips:
@@ -159,6 +151,15 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
             for offset in sorted(offsets, key=abs):
                 found.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
     return found
+
+
+def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place]) -> Grasp | None:
+    """The first of those around which there is most room at every place, or None."""
+    for margin in MARGINS_M:
+        clear = _clear(scene, part, grasps, places, margin)
+        if clear:
+            return clear[0]
+    return None
 
 
 def _clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place], margin: float) -> list[Grasp]:
