@@ -6,8 +6,8 @@ have now; one that disappeared joins those they had when it was made, and keeps 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import final
 
 from apo_bench.assembly import ODL, Assembly, Contact, Relation, inverted, simplified, spelled
@@ -102,9 +102,10 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
 
 def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
     """The largest |e| of every arc, [m], at `goals` (n, 4, 4), world frame, [m] (Section 3.3)."""
-    done = assembly.first(graph.step)
-    systems = (equations(_only(done, arc), start, goals[: graph.step]) for arc in graph.arcs)
-    return tuple(largest(system.residual(goals[: graph.step])) for system in systems)
+    done, reached = assembly.first(graph.step), goals[: graph.step]
+    gaps = equations(done, start, reached).gaps(reached)
+    mine = [[r.made == arc.made and r.contact in arc.contacts for r in done.relations()] for arc in graph.arcs]
+    return tuple(largest(gaps[chosen]) for chosen in mine)
 
 
 def seen_residuals(seen: Observation, graph: Graph) -> tuple[float | None, ...]:
@@ -145,16 +146,6 @@ def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]
         nodes = history[-1 if lost is None else made + 1]
         arcs.append(Arc(f"R{i}", nodes[a], nodes[b], tuple(r.contact for r in relations), made, lost))
     return tuple(arcs)
-
-
-def _only(assembly: Assembly, arc: Arc) -> Assembly:
-    """The same operations with no contacts but those of the arc."""
-
-    def kept(k: int, contacts: Iterable[Contact]) -> tuple[Contact, ...]:
-        return tuple(c for c in contacts if k == arc.made and c in arc.contacts)
-
-    operations = (replace(o, contacts=kept(k, o.contacts)) for k, o in enumerate(assembly.operations))
-    return Assembly(assembly.solids, tuple(operations), assembly.fixed)
 
 
 def _order(node: Node) -> tuple[int, int]:
