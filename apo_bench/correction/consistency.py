@@ -23,6 +23,8 @@ from apo_bench.program import Consistency, Suspect
 
 LEVEL = 0.01
 """False alarms that are accepted."""
+MOST = 64
+"""Relations that are left out in turn; of more, those that pull hardest."""
 SOFT_M = 0.05e-3
 """Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured."""
 
@@ -44,12 +46,14 @@ def consistency(
 def suspects(
     assembly: Assembly, system: Compact, seen: Array, L: Array, slack_m: Array, among: NDArray[np.bool_]
 ) -> tuple[Suspect, ...]:
-    """Every relation whose contacts are `among`, (c,), those considered, left out in turn; the most suspect first."""
+    """Every relation whose contacts are `among`, (c,), those considered, left out in turn; the most suspect first.
+
+    Of more than `MOST`, only the likeliest are tried.
+    """
     relations, ranked = assembly.relations(), list[tuple[tuple[float, float], Suspect]]()
     every = assembly.arcs()
-    for i in range(len(every)):
-        if not among[list(every[i])].any():
-            continue
+    considered = [i for i, arc in enumerate(every) if among[list(arc)].any()]
+    for i in _likely(assembly, considered, system, seen, L, slack_m, among):
         kept = among.copy()
         kept[list(every[i])] = False
         slack = slack_m[np.repeat(kept, 3)]
@@ -60,6 +64,26 @@ def suspects(
         suspect = Suspect(f"R{i + 1}", contacts, relations[every[i][0]].made, chi_square, freedom, p)
         ranked.append(((-p, (chi_square - freedom) / sqrt(2 * freedom + 1)), suspect))
     return tuple(suspect for _, suspect in sorted(ranked, key=lambda one: one[0]))
+
+
+def _likely(
+    assembly: Assembly,
+    considered: list[int],
+    system: Compact,
+    seen: Array,
+    L: Array,
+    slack_m: Array,
+    among: NDArray[np.bool_],
+) -> list[int]:
+    """At most `MOST` of the arcs: those that pull hardest, by the weighted multipliers of their equations."""
+    if len(considered) <= MOST:
+        return considered
+    soft = np.hypot(slack_m, SOFT_M)[np.repeat(among, 3)]
+    pull = np.zeros((len(system), 3))
+    pull[among] = (nearest(system.among(among), seen, L, soft).e / soft).reshape(-1, 3)
+    size = (pull * pull).sum(axis=1)
+    arcs = assembly.arcs()
+    return sorted(sorted(considered, key=lambda i: -size[list(arcs[i])].sum())[:MOST])
 
 
 def slack(fits: NDArray[np.bool_], system: Compact, play_m: float) -> Array:

@@ -16,7 +16,7 @@ from apo_bench.correction.consistency import LEVEL, consistency, slack, suspects
 from apo_bench.correction.ending import refused, sentence
 from apo_bench.correction.equations import Equations, equations, largest
 from apo_bench.correction.manifold import Nearest, nearest
-from apo_bench.correction.posterior import freedom, marginals
+from apo_bench.correction.posterior import freedom, marginals, rank
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Consistency, Correction, Iterate, Observation, Suspect
@@ -85,6 +85,7 @@ class ContactCorrector:
     ) -> Correction:
         seen, system = now.seen, now.system
         known = freedom(found.Jt)
+        directions = rank(found.Jt) if known is None else known.rank
         status = _status(found, largest(system.gaps(found.goals)[kept]), seen.gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not tested.passes:
             status = "doubtful"
@@ -97,10 +98,10 @@ class ContactCorrector:
             freed=system.variables(len(seen.goals)),
             gap_before_m=largest(system.residual(seen.goals)),
             gap_after_m=largest(system.residual(found.goals)),
-            rank=known.rank,
-            trace=tuple(Iterate(turn.gap_m, known.rank, turn.step) for turn in found.trace),
+            rank=directions,
+            trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),
             test=first,
-            covariance=marginals(found, known.free) if status == "converged" else None,
+            covariance=marginals(found, known.free) if known is not None and status == "converged" else None,
             dropped=dropped,
         )
 

@@ -33,13 +33,15 @@ STEP = 1e-7
 SURE = 1e-5
 """Steps shorter than this shrink by a constant factor."""
 DAMPING = 0.05
-"""mu, per mean square of the rows of J and per square of the gap in that unit."""
+"""mu, per mean square of the rows of J and per mean square of the gaps in that unit."""
 FALL = 0.3
 """mu is at most `DAMPING` times this to the number of turns, so that it cannot hold a gap open."""
 FLOOR = 1e-14
 """mu is at least this part of the mean square of the rows: rounding."""
 LARGEST_TURN = 0.25
 """[rad]. No goal turns further in one step."""
+LARGE = 48
+"""Unknowns above which one observation is solved with sparse matrices."""
 SMALLEST = 1e-300
 
 
@@ -61,8 +63,8 @@ class Nearest:
     """(*, 6 n): the correction in standard deviations."""
     e: Array
     """(*, 3 c): what is left of every compact equation, [m]."""
-    Jt: Array
-    """(*, 6 n, 3 c): the derivative of e by z, transposed, [m]."""
+    Jt: Any
+    """(*, 6 n, 3 c): the derivative of e by z, transposed, [m]; of many operations, a sparse matrix of SciPy."""
     B: Array
     """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected goal k: J_r(xi) L, [m, rad]."""
     at_rest: NDArray[np.bool_]
@@ -83,6 +85,10 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
     """
     lead, n = goals.shape[:-3], system.n
+    if not lead and 6 * n > LARGE:
+        from apo_bench.correction.large import nearest_large
+
+        return nearest_large(system, goals, L, soft_m)
     b = math.prod(lead)
     seen = goals.reshape(b, n, 4, 4)
     scale = np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)
@@ -105,9 +111,9 @@ def _many(system: Compact, seen: Array, L: Array, soft_m: Array | None) -> Neare
         step, finite = project(e, Jt, now.z, soft_m, turn)
         size = np.abs(step).max(axis=1, initial=0.0)
         trace.append(Turn(float(np.abs(e).max(initial=0.0)), float(size.max(initial=0.0))))
-        rest = finite & _settles(size, now.size)
+        rest = finite & settles(size, now.size)
         over = ~finite | rest if turn + 1 < TURNS else np.ones(b, dtype=np.bool_)[now.which]
-        z = now.z + (step if rest.all() else _short(step, now.L))
+        z = now.z + (step if rest.all() else shortened(step, now.L))
         D, Jr = exp_and_jacobian((now.L @ z.reshape(-1, n, 6, 1))[..., 0])
         now = now._replace(z=z, T=now.seen @ D, B=Jr @ now.L, size=size)
         if over.any():
@@ -118,7 +124,7 @@ def _many(system: Compact, seen: Array, L: Array, soft_m: Array | None) -> Neare
     return _sorted(system, seen, done, tuple(trace))
 
 
-def _settles(size: Array, before: Array) -> NDArray[np.bool_]:
+def settles(size: Array, before: Array) -> NDArray[np.bool_]:
     """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor."""
     return np.asarray((size < STEP) | ((size < SURE) & (size * size < STEP * before)))
 
@@ -169,7 +175,7 @@ def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> t
         A[~finite], size[~finite] = 0.0, 1.0
     size = np.maximum(size, SMALLEST)
     demanded = e if soft_m is None else e * (soft_m == 0.0)
-    diagonal += (damping((demanded * demanded).sum(axis=1) / size, turn) * size)[:, None]
+    diagonal += (damping((demanded * demanded).sum(axis=1) / (m * size), turn) * size)[:, None]
     if soft_m is not None:
         diagonal += soft_m * soft_m
     wanted = J @ z[..., None] - e[..., None]
@@ -177,11 +183,11 @@ def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> t
 
 
 def damping(gap2: Array, turn: int) -> Array:
-    """mu as a part of the mean square of the rows of J; `gap2` is |e|^2 in that unit."""
+    """mu as a part of the mean square of the rows of J; `gap2` is the mean e^2 in that unit."""
     return np.maximum(DAMPING * np.minimum(np.minimum(gap2, 1.0), FALL**turn), FLOOR)
 
 
-def _short(step: Array, L: Array) -> Array:
+def shortened(step: Array, L: Array) -> Array:
     """The same step, shortened for an observation in which a goal would turn further than `LARGEST_TURN`."""
     turned = (L[:, :, 3:] @ step.reshape(*L.shape[:2], 6, 1))[..., 0]
     largest = np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0))

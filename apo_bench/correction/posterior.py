@@ -9,10 +9,11 @@ basis N of the null space, cov(z) = N N^t.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
+from apo_bench.correction import sparse
 from apo_bench.correction.compact import compact
 from apo_bench.correction.equations import equations
 from apo_bench.correction.manifold import Nearest
@@ -21,6 +22,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 from apo_bench.program import Correction, Observation
 
+LARGE = 600
+"""Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
 CUT_OFF = 1e-7
 """Singular values below this part of the largest one are rounding, at a solution."""
 
@@ -40,9 +43,13 @@ class Freedom:
     """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z."""
 
 
-def freedom(Jt: Array) -> Freedom:
-    """Read off the transposed Jacobian (6 n, 3 c) at a solution."""
+def freedom(Jt: Any) -> Freedom | None:
+    """Read off the transposed Jacobian (6 n, 3 c) at a solution, dense or sparse; None above `LARGE` unknowns."""
     unknowns, equations_ = Jt.shape
+    if unknowns > LARGE:
+        return None
+    if not isinstance(Jt, np.ndarray):
+        Jt = Jt.toarray()
     if not Jt.size:
         return Freedom(0, equations_, np.inf, np.eye(unknowns))
     U, w, _ = np.linalg.svd(Jt, full_matrices=True)
@@ -52,8 +59,10 @@ def freedom(Jt: Array) -> Freedom:
     return Freedom(rank, equations_ - rank, gap, U[:, rank:])
 
 
-def rank(Jt: Array) -> int:
-    """The rank alone."""
+def rank(Jt: Any) -> int:
+    """The rank alone, of a dense or a sparse matrix."""
+    if not isinstance(Jt, np.ndarray):
+        return sparse.rank(Jt)
     if not Jt.size:
         return 0
     w = np.linalg.svd(Jt, compute_uv=False)
@@ -83,9 +92,10 @@ def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.9
     xi = pose.log(pose.inverse(seen.goals) @ made.goals)
     system = compact(equations(seen.assembly, seen.start, seen.goals), len(made.goals))
     _, blocks = system.blocks(made.goals, right_jacobian(xi) @ L)
-    free = freedom(system.gathered(blocks)).free
-    if not free.shape[1]:
+    known = freedom(system.gathered(blocks))
+    if known is None or not known.free.shape[1]:
         return None
+    free = known.free
     true = pose.log(pose.inverse(seen.goals) @ truth)
     off = free.T @ np.linalg.solve(L, (true - xi)[..., None]).ravel()
     return bool(off @ off <= chdtri(free.shape[1], 1.0 - level))
