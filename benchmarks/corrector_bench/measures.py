@@ -98,12 +98,18 @@ def spread(of: Problem, given: Draw, goals: Array) -> float:
     return float(np.sum((Q.T @ (lengths(given, given.truth) - lengths(given, goals))) ** 2))
 
 
-def alike(A: Array, B: Array) -> float:
-    """Sine of the largest angle between the spans of A and B, (m, a) and (m, b); 1 if a and b differ."""
-    if A.shape[1] != B.shape[1]:
-        return 1.0
-    A, B = np.linalg.qr(A)[0], np.linalg.qr(B)[0]
-    return float(np.linalg.norm(A - B @ (B.T @ A), 2)) if A.shape[1] else 0.0
+def freedom_error(of: Problem, given: Draw, goals: Array, covariance: Array) -> float:
+    """How far the stated posterior, (n, 6, 6), is from what the geometry leaves free, as a part of the noise.
+
+    In sigma units the posterior of the free directions Q is Q Q^t; a direction that is called fixed or free wrongly
+    shows in the blocks of its parts.
+    """
+    L = np.linalg.cholesky(given.covariance)
+    B = right_jacobian(pose.log(pose.inverse(given.seen) @ goals)) @ L
+    Q = free_basis(of, given, goals).reshape(of.n, 6, -1)
+    inward = np.linalg.inv(B)
+    stated = inward @ covariance @ np.swapaxes(inward, 1, 2)
+    return float(np.abs(stated - Q @ np.swapaxes(Q, 1, 2)).max())
 
 
 def _spanned(blocks: Array, N: Array) -> Array:

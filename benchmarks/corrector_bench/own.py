@@ -8,7 +8,6 @@ from types import MappingProxyType
 import numpy as np
 
 from apo_bench.assembly import Assembly
-from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 from benchmarks.corrector_bench.draws import Draw
 from benchmarks.corrector_bench.peers import Run, Task
@@ -30,8 +29,20 @@ def compiled(task: Task) -> Run:
     return lambda: nearest(task.system, task.seen, np.linalg.cholesky(task.covariance)).goals
 
 
+def dense(task: Task) -> Run:
+    """The same on dense matrices, whatever the size."""
+    from apo_bench.correction.compact import compact
+    from apo_bench.correction.manifold import nearest
+
+    return lambda: nearest(
+        compact(task.system, len(task.seen)), task.seen[None], np.linalg.cholesky(task.covariance)[None]
+    ).goals[0]
+
+
 COMPILED = "contact compiled"
-PEERS: Mapping[str, Callable[[Task], Run]] = MappingProxyType({"contact": contact, COMPILED: compiled})
+PEERS: Mapping[str, Callable[[Task], Run]] = MappingProxyType(
+    {"contact": contact, COMPILED: compiled, "contact dense": dense}
+)
 
 
 def observation(of: Problem, given: Draw, assembly: Assembly | None = None) -> Observation:
@@ -45,15 +56,3 @@ def corrected(seen: Observation, name: str = "contact") -> Correction:
     from apo_bench.correction.correct import correct
 
     return correct(seen, name)
-
-
-def reported(of: Problem, given: Draw) -> tuple[int, Array]:
-    """Rank and free directions as the corrector states them: an orthonormal basis in z, (6 n, f)."""
-    from apo_bench.correction.compact import compact
-    from apo_bench.correction.manifold import nearest
-    from apo_bench.correction.posterior import freedom
-
-    system = compact(of.system(given.seen), of.n)
-    found = nearest(system, given.seen, np.linalg.cholesky(given.covariance))
-    known = freedom(found.Jt)
-    return known.rank, known.free
