@@ -1,0 +1,108 @@
+"""Directions in which a part is free, in words: shifts along its own axes and turns about them, as far as they go.
+
+A space of twists is split into pure shifts and, beyond them, turns; each half gets an orthonormal basis that keeps to
+the axes of the part where it can. A turn is about the point of its axis that is nearest to the origin of the part,
+once shifts that are free anyway are taken out. What is left of a shift along the axis makes it a screw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array, frozen
+
+SHIFTS = ("x", "y", "z")
+TURNS = ("roll", "pitch", "yaw")
+LENGTH_M = 0.05
+"""Way of a point per radian, at which a turn weighs as much as a shift."""
+ZERO = 1e-6
+"""Components below this part of the largest one are rounding."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """One free direction of a part."""
+
+    twist: Array
+    """(6,), body frame of the part: one metre of a shift, or one radian of a turn."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "twist", frozen(self.twist, 6))
+
+    def __str__(self) -> str:
+        """`x`, `yaw`, `x with y` (oblique), `yaw with z` (a screw)."""
+        return " with ".join(self.names)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The axes that take part, the most important first; of a turn whose point is not the origin, the axes only."""
+        words = TURNS if self.turns else SHIFTS
+        order = np.argsort(-np.abs(self.axis).round(6), kind="stable")
+        own = [words[i] for i in order if abs(self.axis[i]) > ZERO]
+        screwed = abs(self.pitch_m) > ZERO * LENGTH_M
+        return (*own, *(SHIFTS[i] for i in order if screwed and abs(self.axis[i]) > ZERO))
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a turn, maybe with a shift along its axis; otherwise a shift."""
+        return bool(np.any(self.twist[3:]))
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector, (3,), frame of the part."""
+        return self.twist[3:] if self.turns else self.twist[:3]
+
+    @property
+    def point(self) -> Array:
+        """Of a turn, the point of its axis that is nearest to the origin of the part, (3,), [m]."""
+        return np.cross(self.twist[3:], self.twist[:3])
+
+    @property
+    def pitch_m(self) -> float:
+        """How far a turn goes along its own axis, per radian, [m]; 0 of a shift."""
+        return float(self.twist[:3] @ self.twist[3:])
+
+
+def directions(space: Array) -> tuple[Direction, ...]:
+    """A readable basis of a space of body twists, given by the columns of (6, f), [m, rad]: shifts, then turns."""
+    weights = np.array([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M])
+    F = _span(space * weights[:, None])
+    _, w, Vt = np.linalg.svd(F[3:], full_matrices=True)
+    turning = int(np.count_nonzero(w > ZERO))
+    shifts = _aligned(_span(F[:3] @ Vt[turning:].T))
+    turns = F @ Vt[:turning].T
+    found = [Direction(np.concatenate([axis, np.zeros(3)])) for axis in shifts]
+    for axis in _aligned(_span(turns[3:])):
+        one = turns @ np.linalg.lstsq(turns[3:], axis, rcond=None)[0] * LENGTH_M
+        v = one[:3] - sum((b @ one[:3]) * b for b in shifts)
+        found.append(Direction(np.concatenate([np.where(np.abs(v) < ZERO * LENGTH_M, 0.0, v), axis])))
+    return tuple(found)
+
+
+def held(free: Sequence[Direction]) -> tuple[str, ...]:
+    """The words for what is not free: six less those that free directions are mainly along."""
+    taken = {direction.names[0] for direction in free}
+    return tuple(name for name in (*SHIFTS, *TURNS) if name not in taken)
+
+
+def _span(columns: Array) -> Array:
+    """An orthonormal basis of the column space."""
+    U, w, _ = np.linalg.svd(columns, full_matrices=False)
+    return U[:, : np.count_nonzero(w > ZERO * w.max(initial=0.0))]
+
+
+def _aligned(basis: Array) -> list[Array]:
+    """Of a space of vectors, (3, d), an orthonormal basis that takes the nearest axis each time, (3,) each."""
+    P, found = basis @ basis.T, list[Array]()
+    for _ in range(basis.shape[1]):
+        i = int(np.argmax(np.diag(P).round(6)))
+        b = P[:, i] / np.linalg.norm(P[:, i])
+        P = P - np.outer(b, b)
+        b = np.where(np.abs(b) < ZERO, 0.0, b)
+        found.append(b / np.linalg.norm(b))
+    return found

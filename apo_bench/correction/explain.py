@@ -1,0 +1,227 @@
+"""What the contacts determine: which directions of every operation they fix, through which relations, and how well.
+
+Operations are taken in their order. Those before are given, those behind adapt: the free directions of operation k
+are its block of the null space of the Jacobian without the columns of earlier operations. Counted so, the free
+dimensions of all operations add up to the freedom of the whole, and their ranks to its rank.
+
+How uncertain a direction still is comes from the posterior of all goals at once, so a free direction is as uncertain
+as it was seen, or less where several parts that must move together were seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import ODL, Assembly, Operation
+from apo_bench.correction.compact import compact
+from apo_bench.correction.contact import scales
+from apo_bench.correction.directions import Direction, directions, held
+from apo_bench.correction.equations import equations
+from apo_bench.correction.holding import Hold, by_relation, holds
+from apo_bench.correction.posterior import LARGE, Freedom, freedom
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import right_jacobian
+from apo_bench.placement import placed
+from apo_bench.program import Observation, Poses
+
+ZERO = 1e-7
+"""Of an orthonormal basis, components below are rounding."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Free:
+    """A direction that no contact fixes."""
+
+    direction: Direction
+    deviation: float
+    """Posterior standard deviation along it, [m] of a shift, [rad] of a turn."""
+    along: tuple[int, ...] = ()
+    """The later operations that have to go with it, counted from 0."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Determined:
+    """What the contacts determine of one operation, given those before."""
+
+    operation: int
+    """Counted from 0."""
+    part: str
+    rank: int
+    """Directions that are fixed, of six."""
+    fixed: tuple[str, ...]
+    free: tuple[Free, ...]
+    through: tuple[Hold, ...]
+    """An irreducible set of relations that fix as much as all of them."""
+    agreeing: tuple[Hold, ...]
+    """The relations of this operation that are not needed for that."""
+    covariance: Array
+    """(6, 6), posterior, of the body twist at its goal, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A part at the end: where it stands in the world, and how well that is known."""
+
+    part: str
+    placed: int
+    """The operation that moved it last, counted from 0."""
+    odl: ODL
+    pose: Array
+    """(4, 4), world frame, [m]."""
+    rank: int
+    """Directions that are fixed in the world."""
+    fixed: tuple[str, ...]
+    free: tuple[Free, ...]
+    covariance: Array
+    """(6, 6), posterior, of its body twist, [m, rad]."""
+
+    @property
+    def deviations(self) -> Array:
+        """Posterior standard deviations along its axes, (6,), [m, rad]."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What the contacts determine of a whole demonstration."""
+
+    assembly: Assembly
+    goals: Array
+    """(n, 4, 4), at which it was asked."""
+    operations: tuple[Determined, ...]
+    parts: tuple[Standing, ...]
+    """Those that were moved, in the order in which they were placed."""
+    rank: int
+    freedom: int
+    redundant: int
+    """Equations, three per contact, that follow from the others."""
+    spectral_gap: float
+
+
+def explain(seen: Observation, goals: Array) -> Explanation:
+    """What the contacts determine at goals that satisfy them, and how uncertain these are after what was seen.
+
+    Args:
+        goals: (n, 4, 4), consistent with every contact, such as corrected goals, world frame, [m].
+
+    Raises:
+        InputError: The covariance of an operation is not positive definite, or there are too many operations.
+    """
+    n, assembly = len(goals), seen.assembly
+    if 6 * n > LARGE:
+        raise InputError(f"{n} operations were given; up to {LARGE // 6} can be explained, so take fewer of them.")
+    system = compact(equations(assembly, seen.start, goals), n)
+    B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ scales(seen.covariance)
+    Jt = system.gathered(system.blocks(goals, B)[1])
+    known = freedom(Jt)
+    assert known is not None
+    every, relations = holds(assembly), by_relation(assembly, system, Jt)
+    spread = (B @ known.free.reshape(n, 6, known.free.shape[1])).reshape(known.free.shape)
+    found = []
+    for k, own in enumerate(_own(known, n)):
+        block = slice(6 * k, 6 * k + 6)
+        C = spread[block] @ spread[block].T
+        named = directions(B[k] @ own[block])
+        needed = relations.holding(k, 6 - own.shape[1])
+        found.append(
+            Determined(
+                operation=k,
+                part=assembly.operations[k].main,
+                rank=6 - own.shape[1],
+                fixed=held(named),
+                free=tuple(Free(d, deviation(C, d), _along(k, own, B[k], d)) for d in named),
+                through=tuple(every[i] for i in needed),
+                agreeing=tuple(every[i] for i in relations.direct(k) if i not in needed and every[i].made == k),
+                covariance=C,
+            )
+        )
+    parts = _standing(assembly, seen.start, goals, B, known.free)
+    return Explanation(
+        assembly, goals, tuple(found), parts, known.rank, known.free.shape[1], known.redundant, known.spectral_gap
+    )
+
+
+def deviation(C: Array, direction: Direction) -> float:
+    """The standard deviation along a direction, given the covariance of the body twist, (6, 6): [m] or [rad]."""
+    half = slice(3, 6) if direction.turns else slice(0, 3)
+    return float(np.sqrt(direction.axis @ C[half, half] @ direction.axis))
+
+
+def _own(known: Freedom, n: int) -> Iterator[Array]:
+    """Of each operation, (6 n, f_k): its free directions, orthonormal in its own block, with what must go along.
+
+    One operation after the other is held fast; what goes along is the least, in standard deviations.
+    """
+    left = known.free
+    for k in range(n):
+        if not left.shape[1]:
+            yield left
+            continue
+        _, w, Vt = np.linalg.svd(left[6 * k : 6 * k + 6], full_matrices=True)
+        count = int(np.count_nonzero(w > ZERO))
+        yield left @ (Vt[:count].T / w[:count])
+        left = left @ Vt[count:].T
+
+
+def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...]:
+    """The later operations that move if operation k moves in one of its free directions."""
+    share = np.linalg.lstsq(B @ own[6 * k : 6 * k + 6], direction.twist, rcond=None)[0]
+    moved = np.linalg.norm((own @ share).reshape(-1, 6), axis=1)
+    return tuple(int(j) for j in np.flatnonzero(moved > 1e-6 * moved[k]) if j > k)
+
+
+def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Array) -> tuple[Standing, ...]:
+    """Every part that was moved, at the end; its pose is a product of goals, so errors go through all of them."""
+    if not len(assembly):
+        return ()
+    final, last, words = placed(assembly, start, goals)[-1], assembly.odls()[-1], _rooted(assembly)
+    stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
+    found = []
+    for part in last:
+        reach = _reach(words[part], stack, len(assembly.solids), B)
+        spread, unit = reach @ free, np.linalg.norm(reach, axis=1)[:, None]
+        U, w, _ = np.linalg.svd(spread / unit, full_matrices=False)
+        C = spread @ spread.T
+        named = directions(unit * U[:, w > ZERO])
+        loose = tuple(Free(d, deviation(C, d)) for d in named)
+        placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
+        found.append(Standing(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
+    return tuple(sorted(found, key=lambda one: one.placed))
+
+
+def _rooted(assembly: Assembly) -> dict[str, ODL]:
+    """The ODL of every part at the end, in which one operation per part that puts it at its start comes first."""
+    starts = map(Operation, assembly.solids)
+    return dict(Assembly(assembly.solids, (*starts, *assembly.operations), assembly.fixed).odls()[-1])
+
+
+def _reach(word: ODL, stack: Array, constants: int, B: Array) -> Array:
+    """What a standard deviation of each goal makes of the body twist of a product of poses, (6, 6 n).
+
+    T exp(xi) M = T M exp(Ad(M^-1) xi), and (T exp(xi))^-1 M = T^-1 M exp(-Ad(M^-1 T) xi).
+    """
+    behind, found = np.eye(4), np.zeros((len(B), 6, 6))
+    for k, inverse in reversed(word):
+        behind = pose.inverse(stack[k]) @ behind if inverse else behind
+        if k >= constants:
+            found[k - constants] += (-1.0 if inverse else 1.0) * _adjoint(pose.inverse(behind)) @ B[k - constants]
+        behind = behind if inverse else stack[k] @ behind
+    return np.concatenate(found, axis=1)
+
+
+def _adjoint(T: Array) -> Array:
+    """Ad(T), (6, 6): T exp(xi) T^-1 = exp(Ad(T) xi)."""
+    A = np.zeros((6, 6))
+    A[:3, :3] = A[3:, 3:] = T[:3, :3]
+    A[:3, 3:] = pose.hat(T[:3, 3]) @ T[:3, :3]
+    return A

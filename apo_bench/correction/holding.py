@@ -1,0 +1,112 @@
+"""Which relations hold a part: the fewest that leave it as free as all of them do.
+
+Relations are taken in by their distance in the graph of operations and relations until the operation is held as well
+as by all of them; then the farthest and latest that are not needed are left out again, one by one. What remains is
+irreducible: without any one of them the part would be freer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import ODL, Assembly, inverted, simplified
+from apo_bench.correction.compact import Compact
+from apo_bench.correction.posterior import CUT_OFF
+from apo_bench.geometry.arrays import Array
+
+
+@final
+@dataclass(frozen=True)
+class Hold:
+    """A relation that holds a part, and by which operations."""
+
+    relation: str
+    """R1, R2, ... as in the relation graph."""
+    parts: tuple[str, str]
+    """Manipulated, environment."""
+    made: int
+    """The operation that made it, counted from 0."""
+    lost: int | None
+    """The operation at which it disappeared, or None while it stands."""
+    word: ODL
+    """The product D_a^-1 D_b in its equations (Eq. 26); constant poses are left out."""
+
+
+def holds(assembly: Assembly) -> tuple[Hold, ...]:
+    """Every relation of an assembly."""
+    relations, history = assembly.relations(), assembly.odls()
+    found = []
+    for i, arc in enumerate(assembly.arcs(), start=1):
+        (a, b), made, lost = relations[arc[0]]
+        word = simplified((*inverted(history[made].get(a.part, ())), *history[made].get(b.part, ())))
+        found.append(Hold(f"R{i}", (a.part, b.part), made, lost, word))
+    return tuple(found)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Relations:
+    """The equations of an assembly by relation, ready to be left out."""
+
+    Jt: Array
+    """(6 n, 3 c): the transposed Jacobian at a solution."""
+    arcs: tuple[tuple[int, ...], ...]
+    """The contacts of each relation."""
+    operations: tuple[frozenset[int], ...]
+    """The operations in the equations of each relation."""
+
+    def rank(self, k: int, some: Sequence[int]) -> int:
+        """Directions of operation k that these relations fix, if earlier operations stay and later ones adapt.
+
+        The null space of the columns from k on has as many dimensions in block k as it has more than that of the
+        columns behind k.
+        """
+        later = sorted({j for i in some for j in self.operations[i] if j > k})
+        rows = [3 * c + i for arc in some for c in self.arcs[arc] for i in range(3)]
+        behind = self._blocks(later)[:, rows]
+        return _rank(np.concatenate([self._blocks([k])[:, rows], behind])) - _rank(behind)
+
+    def holding(self, k: int, rank: int) -> tuple[int, ...]:
+        """An irreducible set of relations that fix `rank` directions of operation k, the nearest preferred."""
+        order = [i for ring in self._rings(k) for i in ring]
+        count = next((m for m in range(len(order) + 1) if self.rank(k, order[:m]) >= rank), len(order))
+        kept = order[:count]
+        for i in reversed(order[:count]):
+            without = [j for j in kept if j != i]
+            if self.rank(k, without) >= rank:
+                kept = without
+        return tuple(sorted(kept))
+
+    def direct(self, k: int) -> tuple[int, ...]:
+        """The relations in whose equations operation k occurs."""
+        return tuple(i for i, operations in enumerate(self.operations) if k in operations)
+
+    def _rings(self, k: int) -> list[list[int]]:
+        """Relations by their distance from operation k, through operations that are not earlier."""
+        reached, left, rings = {k}, set(range(len(self.arcs))), list[list[int]]()
+        while ring := sorted(i for i in left if self.operations[i] & reached):
+            rings.append(ring)
+            left.difference_update(ring)
+            reached.update(j for i in ring for j in self.operations[i] if j >= k)
+        return rings
+
+    def _blocks(self, operations: Sequence[int]) -> Array:
+        return self.Jt[[6 * j + i for j in operations for i in range(6)]]
+
+
+def by_relation(assembly: Assembly, system: Compact, Jt: Array) -> Relations:
+    """Group the equations of all contacts, in the order of `assembly.relations()`."""
+    arcs = assembly.arcs()
+    operations = (frozenset(int(j) for j in system.columns[list(arc)].ravel() if j < system.n) for arc in arcs)
+    return Relations(Jt, arcs, tuple(operations))
+
+
+def _rank(Jt: Array) -> int:
+    if not Jt.size:
+        return 0
+    w = np.linalg.svd(Jt, compute_uv=False)
+    return int(np.count_nonzero(w > CUT_OFF * w[0]))
