@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from bisect import bisect
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple, final
@@ -102,21 +103,26 @@ class Assembly:
 
         A part that was never moved has none: it rests where it started.
         """
-        history: list[Mapping[str, ODL]] = []
+        return tuple(MappingProxyType(dict(now)) for now in self.walk())
+
+    def walk(self) -> Iterator[Mapping[str, ODL]]:
+        """The same one after the other; what was yielded changes when the next operation is asked for."""
         current: dict[str, ODL] = {}
         for k, operation in enumerate(self.operations):
             before = current.get(operation.main, ())
-            current = dict(current)
             for part in operation.carries:
                 current[part] = simplified((Term(k), *inverted(before), *current.get(part, ())))
             current[operation.main] = (Term(k),)
-            history.append(MappingProxyType(current))
-        return tuple(history)
+            yield current
 
     def relations(self) -> tuple[Relation, ...]:
         """Every contact ever made, in the order of the operations."""
+        moved: dict[str, list[int]] = {}
+        for k, operation in enumerate(self.operations):
+            for part in operation.moves:
+                moved.setdefault(part, []).append(k)
         return tuple(
-            Relation(contact, k, self._lost(contact, k))
+            Relation(contact, k, _lost(moved, contact, k))
             for k, operation in enumerate(self.operations)
             for contact in operation.contacts
         )
@@ -131,12 +137,12 @@ class Assembly:
             together.setdefault((made, contact.manipulated.part, contact.environment.part), []).append(i)
         return tuple(map(tuple, together.values()))
 
-    def _lost(self, contact: Contact, made: int) -> int | None:
-        ends = {contact.manipulated.part, contact.environment.part}
-        for k in range(made + 1, len(self.operations)):
-            if len(ends.intersection(self.operations[k].moves)) == 1:
-                return k
-        return None
+
+def _lost(moved: Mapping[str, Sequence[int]], contact: Contact, made: int) -> int | None:
+    """The first operation after `made` that moves one of the two parts without the other."""
+    ends = [moved.get(end.part, ()) for end in contact]
+    later = set(ends[0][bisect(ends[0], made) :]).symmetric_difference(ends[1][bisect(ends[1], made) :])
+    return min(later, default=None)
 
 
 def inverted(odl: Iterable[Term]) -> ODL:

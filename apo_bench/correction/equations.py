@@ -173,13 +173,11 @@ def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, in
     Term k stands for the start of part k, then for the operations.
     """
     rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
-    history = rooted.odls()
-    words = []
-    for contact, made, _ in rooted.relations():
-        D = history[made]
-        word = simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part]))
-        words.append((contact, made - len(parts), word))
-    return words
+    return [
+        (contact, k - len(parts), simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part])))
+        for k, (operation, D) in enumerate(zip(rooted.operations, rooted.walk(), strict=True))
+        for contact in operation.contacts
+    ]
 
 
 class _Flat(NamedTuple):

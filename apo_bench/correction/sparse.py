@@ -3,8 +3,7 @@
 Two contacts meet in J J^t only where an operation occurs in both. Contacts are numbered so that those that meet are
 near each other (reverse Cuthill-McKee); if all entries then lie in a narrow band, as in a row of castles, a banded
 Cholesky decomposition solves for the multipliers. Otherwise (grids, one part that carries everything) they are solved
-for together with z, in one sparse quasi-definite matrix [I J^t; J -mu] (Vanderbei, "Symmetric quasidefinite matrices",
-1995).
+for together with z, in the sparse matrix [I J^t; J -mu].
 """
 
 from __future__ import annotations
@@ -80,7 +79,7 @@ def solver(where: Incidence) -> Solver:
         a, b = order[where.contact[first]], order[where.contact[second]]
         if 3 * int(np.abs(a - b).max(initial=0)) + 3 <= WIDE:
             return _banded(where, first[a >= b], second[a >= b], order)
-    return _quasidefinite(where)
+    return _together(where)
 
 
 def rank(Jt: Any) -> int:
@@ -92,9 +91,13 @@ def rank(Jt: Any) -> int:
         return 0
     unknowns, m = Jt.shape
     lowest = EIGENVALUE * _largest(Jt)
-    K = block_array([[eye_array(unknowns), Jt], [Jt.T, lowest * eye_array(m)]], format="csc")
+    meets = abs(Jt).sign().sum(axis=1) / 3.0
+    if (meets**2).sum() / 6.0 <= CROWDED:
+        K, sign = (Jt.T @ Jt - lowest * eye_array(m)).tocsc(), 1.0
+    else:
+        K, sign = block_array([[eye_array(unknowns), Jt], [Jt.T, lowest * eye_array(m)]], format="csc"), -1.0
     factor = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return int(np.count_nonzero(factor.U.diagonal() < 0.0))
+    return int(np.count_nonzero(sign * factor.U.diagonal() > 0.0))
 
 
 def _largest(Jt: Any) -> float:
@@ -157,14 +160,13 @@ def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp],
     return solve
 
 
-def _quasidefinite(where: Incidence) -> Solver:
+def _together(where: Incidence) -> Solver:
     from scipy.sparse import block_array, diags_array, eye_array
     from scipy.sparse.linalg import splu
 
     def solve(added: Array, blocks: Array, right: Array) -> Array:
         J = where.matrix(blocks)
         K = block_array([[eye_array(6 * where.n), J.T], [J, diags_array(-added)]], format="csc")
-        factor = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        return np.asarray(factor.solve(np.concatenate([np.zeros(6 * where.n), right]))[: 6 * where.n])
+        return np.asarray(splu(K).solve(np.concatenate([np.zeros(6 * where.n), right]))[: 6 * where.n])
 
     return solve
