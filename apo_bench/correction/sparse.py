@@ -22,6 +22,8 @@ WIDE = 240
 """Rows of a band above which it is no longer worth it."""
 CROWDED = 2_000_000
 """Pairs of contacts that meet, above which they are not listed."""
+FEW = 100
+"""Contacts that one operation may meet, on average, if J J^t is to be formed for the rank."""
 EIGENVALUE = 1e-12
 """Eigenvalues of J J^t below this part of the largest one are rounding, at a solution."""
 
@@ -92,7 +94,7 @@ def rank(Jt: Any) -> int:
     unknowns, m = Jt.shape
     lowest = EIGENVALUE * _largest(Jt)
     meets = abs(Jt).sign().sum(axis=1) / 3.0
-    if (meets**2).sum() / 6.0 <= CROWDED:
+    if (meets**2).sum() <= FEW * meets.sum():
         K, sign = (Jt.T @ Jt - lowest * eye_array(m)).tocsc(), 1.0
     else:
         K, sign = block_array([[eye_array(unknowns), Jt], [Jt.T, lowest * eye_array(m)]], format="csc"), -1.0
