@@ -118,9 +118,9 @@ class Plan:
     """(n, 4, 4): where every operation puts its main part in the end."""
     schedule: tuple[Step, ...] = field(default=())
     """Empty stands for: every operation once, in order."""
-    targets: Array = None  # type: ignore[assignment]
+    targets: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     """(steps, 4, 4): the motion parameter that was in force at each step of the schedule; of an undo step, the one
-    that it undoes. Left out, it is filled in from `goals`."""
+    that it undoes. Empty stands for: those of `goals`."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
@@ -129,7 +129,7 @@ class Plan:
         if not self.schedule:
             object.__setattr__(self, "schedule", once_each(n))
         filled = self.goals[[step.operation for step in self.schedule]]
-        targets = filled if self.targets is None else self.targets
+        targets = self.targets if len(self.targets) else filled
         object.__setattr__(self, "targets", frozen(targets, len(self.schedule), 4, 4))
 
 

@@ -17,8 +17,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from apo_bench.benchmark.planning import plan
 from apo_bench.benchmark.stages import attempt, see, show
-from apo_bench.correction.correct import correct
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.program import Plan, ReplayResult
@@ -115,11 +115,10 @@ def _draw(name: str, strip: Strip) -> None:
     scene = build_scene(load_scenario(name))
     shown = show(scene, 1.0, SEED)
     seen = see(scene, shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
-    made = correct(seen, strip.method)
-    failed = _watched(scene, Plan(seen.assembly, seen.start, seen.goals), shown.layout.goals)
-    right = _watched(
-        scene, Plan(seen.assembly, seen.start, made.goals, made.schedule, made.targets), shown.layout.goals
-    )
+    raw, corrected = plan("none", seen, None).plan, plan(strip.method, seen, None).plan
+    assert raw is not None, "everything was seen"
+    assert corrected is not None, f"{strip.method} corrects {name}"
+    failed, right = (_watched(scene, each, shown.layout.goals) for each in (raw, corrected))
     pictures = [(strip.failure, failed[1][-1][1]), *((m.caption, _state(right, m)) for m in strip.moments)]
     figure, axes = plt.subplots(1, len(pictures), figsize=(2.35 * len(pictures), 2.5), layout="constrained")
     camera = _camera(shown.layout.goals)

@@ -184,7 +184,7 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
     corrected.reset(seed=SEED)
     corrected.step(zeros(env))
     assert asked[0].schedule == asked[1].schedule == made.schedule
-    moved = made.targets @ pose.exp(twist)[[0, 1, 1, 1, 2]]  # type: ignore[operator]
+    moved = made.targets @ pose.exp(twist)[[0, 1, 1, 1, 2]]
     np.testing.assert_allclose(asked[0].targets, moved, rtol=0, atol=1e-15)
     np.testing.assert_allclose(asked[0].goals, made.goals @ pose.exp(twist), rtol=0, atol=1e-15)
     np.testing.assert_array_equal(asked[1].targets, made.targets)
@@ -214,7 +214,9 @@ def test_info_never_holds_the_truth(env: APOReplay) -> None:
     assert info["stage"] in (*outcomes.STAGES, "done")
     assert info["code"] in outcomes.CODES
     assert all(isinstance(value, (bool, str, int, type(None))) for value in info.values())
-    assert {f.name for f in fields(env.seen)} == {"assembly", "start", "goals", "covariance", "seen", "gap_m"}
+    assert {f.name for f in fields(env.seen)} == {
+        *("assembly", "start", "goals", "covariance", "seen", "gap_m", "play_m")
+    }
 
 
 def test_one_step_is_one_episode(env: APOReplay) -> None:

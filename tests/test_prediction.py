@@ -37,7 +37,7 @@ def ways(scene: scenes.Scene) -> list[Attach]:
 
 
 def said(scene: scenes.Scene, goals: Array, attach: Sequence[Attach] | None = None, **plan: object) -> Prediction:
-    asked = Plan(scene.assembly, scene.start, goals, **plan)  # type: ignore[arg-type]
+    asked = Plan(scene.assembly, scene.start, goals, **plan)
     return predict(asked, CLEARANCE_MM, Thresholds(), ways(scene) if attach is None else attach)
 
 

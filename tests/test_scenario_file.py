@@ -208,7 +208,7 @@ def test_what_is_no_name():
     assert "did you mean 'stick_in_tower'" in refused("stick_in_towr")
     for wrong in (3, None, b"stick_in_tower"):
         with pytest.raises(InputError, match="short name"):
-            load_scenario(wrong)  # type: ignore[arg-type]
+            load_scenario(wrong)
 
 
 def test_a_file_that_may_not_be_read(tmp_path: Path):

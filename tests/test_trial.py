@@ -83,7 +83,7 @@ def rebuilds(seen: Observation) -> Correction:
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
     targets = made.goals[[step.operation for step in schedule]]
     targets[1:3] = seen.goals[1]
-    tried = (Try(np.int64(2), (np.int64(2),), 1.5e-3), Try(2, (2, 1), 1e-5))  # type: ignore[arg-type]
+    tried = (Try(np.int64(2), (np.int64(2),), 1.5e-3), Try(2, (2, 1), 1e-5))
     return replace(made, freed=(2, 1), tried=tried, schedule=schedule, targets=targets)
 
 
