@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from typing import Any
 
 from apo_bench.benchmark.planning import Planned
+from apo_bench.correction.posterior import inside
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit
 from apo_bench.pose_error import goal_errors
@@ -58,22 +58,13 @@ def _truth(planned: Planned, told: Observation, truth: Array | None) -> dict[str
     if truth is None:
         return {}
     made = planned.correction
-    covered = None if made is None or not made.ok else _inside(told, made, truth)
+    covered = None if made is None or not made.ok else inside(told, made, truth)
     fixed, free = (None, None) if planned.plan is None else _errors(planned.plan, truth)
     return {
         "inside_95": covered,
         "planned_error_fixed_mm": fixed,
         "planned_error_free_mm": free,
     }
-
-
-def _inside(told: Observation, made: Correction, truth: Array) -> bool | None:
-    """Whether the truth lies in the 95 % region of the posterior; None where nothing is stated."""
-    try:
-        posterior = importlib.import_module("apo_bench.correction.posterior")
-    except ModuleNotFoundError:
-        return None
-    return bool(found) if (found := posterior.inside(told, made, truth)) is not None else None
 
 
 def _errors(plan: Plan, truth: Array) -> tuple[float | None, float | None]:
