@@ -25,7 +25,9 @@ class Ran(NamedTuple):
     goals: Array
     """(k, n, 4, 4), NaN where the peer raised; as many draws as it finished."""
     ms: Array
-    """(k, 1 + beside): its own time first, then those of what ran beside it; -1 where one raised."""
+    """(k, 1 + beside), of the processor: its own time first, then those of what ran beside it; -1 where one raised."""
+    wall_ms: Array
+    """(k, 1 + beside): the same by the clock."""
     ended: str
     """`ok`, `killed`, or the last line of what it said when it crashed."""
     seconds: float
@@ -49,9 +51,9 @@ def run(
         arguments = [peer, problem, level, str(int(per_part)), seeds, str(out), ",".join(beside)]
         ended, seconds = process(["-m", "benchmarks.corrector_bench.worker", *arguments], limit_s)
         if not out.exists():
-            return Ran(np.zeros((0, 0, 4, 4)), np.zeros((0, 1 + len(beside))), ended, seconds)
+            return Ran(np.zeros((0, 0, 4, 4)), *[np.zeros((0, 1 + len(beside)))] * 2, ended, seconds)
         with np.load(out) as left:
-            return Ran(left["goals"], left["ms"], ended, seconds)
+            return Ran(left["goals"], left["ms"], left["wall_ms"], ended, seconds)
 
 
 def process(arguments: list[str], limit_s: float) -> tuple[str, float]:

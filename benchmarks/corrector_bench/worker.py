@@ -2,6 +2,8 @@
 
 Arguments: peer, problem, level, per_part (0 or 1), seeds (first:last), the file to write (.npz), what else is timed in
 turn (comma-separated). Every draw is solved by each in turn, so that a machine whose speed drifts treats all alike.
+Times are of the processor: on a machine with other work a clock on the wall measures that too, and favours whoever is
+done within a slice. Those of the clock are written as well.
 """
 
 from __future__ import annotations
@@ -9,14 +11,24 @@ from __future__ import annotations
 import os
 import sys
 import time
+from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.geometry.arrays import Array
 from benchmarks.corrector_bench.draws import draw
-from benchmarks.corrector_bench.peers import Task, peers
+from benchmarks.corrector_bench.peers import Peer, Task, peers
 from benchmarks.corrector_bench.problems import problem
 
 FAILED = -1.0
+
+
+class Spent(NamedTuple):
+    """Milliseconds of one solve."""
+
+    ms: float
+    """Of the processor, all threads."""
+    wall_ms: float
 
 
 def main(peer: str, name: str, level: str, per_part: str, seeds: str, out: str, beside: str = "") -> None:
@@ -24,29 +36,30 @@ def main(peer: str, name: str, level: str, per_part: str, seeds: str, out: str, 
     known, of = peers(), problem(name)
     turn = [peer, *[other for other in beside.split(",") if other]]
     first, last = map(int, seeds.split(":"))
-    goals, times = [], []
+    goals, times, wall = [], [], []
     for seed in range(first, last):
         given = draw(of, level, seed, per_part == "1")
         task = Task(of, of.system(given.seen), given.seen, given.covariance)
         ended = [_timed(known[each], task, again=seed == first) for each in turn]
         goals.append(ended[0][0])
-        times.append([ms for _, ms in ended])
-        np.savez(out + ".part.npz", goals=np.array(goals), ms=np.array(times), first=first)
+        times.append([spent.ms for _, spent in ended])
+        wall.append([spent.wall_ms for _, spent in ended])
+        np.savez(out + ".part.npz", goals=np.array(goals), ms=np.array(times), wall_ms=np.array(wall))
         os.replace(out + ".part.npz", out)
 
 
-def _timed(peer, task: Task, again: bool):
-    """Goals and milliseconds; goals of NaN and `FAILED` if it raised. The first call of a process warms up."""
+def _timed(peer: Peer, task: Task, again: bool) -> tuple[Array, Spent]:
+    """Goals and times; goals of NaN and `FAILED` if it raised. The first call of a process warms up."""
     try:
         for _ in range(1 + again):
             run = peer(task)
-            start = time.perf_counter()
+            clock, start = time.perf_counter(), time.process_time()
             goals = run()
-            ms = 1e3 * (time.perf_counter() - start)
-        return np.asarray(goals, dtype=np.float64), ms
+            spent = Spent(1e3 * (time.process_time() - start), 1e3 * (time.perf_counter() - clock))
+        return np.asarray(goals, dtype=np.float64), spent
     except Exception as error:  # a peer may fail in any way; that is a result
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
-        return np.full(task.seen.shape, np.nan), FAILED
+        return np.full(task.seen.shape, np.nan), Spent(FAILED, FAILED)
 
 
 if __name__ == "__main__":
