@@ -10,6 +10,7 @@ Every array may have leading axes: many observations of one assembly are lineari
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -91,6 +92,14 @@ class Compact:
         scaled = padded[..., self.columns, :, :] * np.where(self.inverse, -1.0, 1.0)[..., None, None]
         return e.reshape(*e.shape[:-3], -1), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
 
+    def words(self, T: Array) -> Array:
+        """D_a^-1 D_b of every contact, (*, c, 4, 4): from the frame of its environment part to that of its manipulated."""
+        F = self._factors(T)
+        M = F[..., 0, :, :]
+        for j in range(1, self.letters.shape[1]):
+            M = M @ F[..., j, :, :]
+        return np.asarray(M)
+
     def gathered(self, blocks: Array) -> Array:
         """The transposed Jacobian (*, 6 n, 3 c) out of its blocks (*, c, w, 6, 3)."""
         lead, c = blocks.shape[:-4], len(self)
@@ -131,18 +140,27 @@ def compact(system: Equations, n: int) -> Compact:
     return Compact(system.start, letters, columns, system.inverse, plane, _points(system), n)
 
 
+def moments(outlines: Sequence[Array]) -> Array:
+    """What stands for the corners of each outline (k, 3): the rows of `Compact.points`, (len, 3, 4), in its frame."""
+    count = np.array([len(corners) for corners in outlines])
+    return _moments(np.concatenate(outlines), np.repeat(np.arange(len(count)), count), len(count))
+
+
 def _points(system: Equations) -> Array:
     """Centre and principal axes of the vertices of each contact, (c, 3, 4), with the same moments."""
-    c = len(system.letters)
-    count = np.bincount(system.contact, minlength=c)
-    total = np.zeros((c, 4))
-    np.add.at(total, system.contact, system.vertex)
-    center = total / count[:, None] if len(system) else total
+    return _moments(system.vertex[:, :3], system.contact, len(system.letters))
+
+
+def _moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
+    """Of vertices (m, 3), those of one contact next to each other."""
+    count = np.bincount(contact, minlength=c)
+    center = np.column_stack([np.bincount(contact, vertex[:, i], c) for i in range(3)]) / np.maximum(count, 1)[:, None]
     padded = np.zeros((c, max(3, int(count.max(initial=0))), 3))
-    number = np.arange(len(system)) - (np.cumsum(count) - count)[system.contact]
-    padded[system.contact, number] = system.vertex[:, :3] - center[system.contact, :3]
+    number = np.arange(len(vertex)) - (np.cumsum(count) - count)[contact]
+    padded[contact, number] = vertex - center[contact]
     _, size, axes = np.linalg.svd(padded, full_matrices=False)
     points = np.zeros((c, 3, 4))
-    points[:, 0] = center * np.sqrt(count)[:, None]
+    points[:, 0, :3], points[:, 0, 3] = center, 1.0
+    points[:, 0] *= np.sqrt(count)[:, None]
     points[:, 1:, :3] = axes[:, :2] * size[:, :2, None]
     return points

@@ -54,6 +54,10 @@ class ContactCorrector:
         Raises:
             InputError: The covariance of an operation is not positive definite.
         """
+        return self.given(seen, None)
+
+    def given(self, seen: Observation, found: Nearest | None) -> Correction:
+        """The same, if the observation has been solved already."""
         if not seen.seen.all():
             return refused(seen)
         L, system = scales(seen.covariance), equations(seen.assembly, seen.start, seen.goals)
@@ -61,7 +65,7 @@ class ContactCorrector:
         fits = np.array([seen.assembly.is_fit(r.contact) for r in seen.assembly.relations()], dtype=np.bool_)
         now = _Attempt(seen, system, every, L, slack(fits, every, seen.play_m))
         kept, dropped = np.ones(len(every), dtype=np.bool_), tuple[str, ...]()
-        found, tested = now.solve(kept, self.level)
+        found, tested = now.solve(kept, self.level, found)
         first = tested
         while self.doubt == "drop" and not tested.passes and found.finite and len(dropped) < DROPS:
             worst = now.suspects(kept)[:1]
@@ -143,9 +147,9 @@ class _Attempt:
     L: Array
     slack_m: Array
 
-    def solve(self, kept: NDArray[np.bool_], level: float) -> tuple[Nearest, Consistency]:
+    def solve(self, kept: NDArray[np.bool_], level: float, found: Nearest | None = None) -> tuple[Nearest, Consistency]:
         part, slack_m = self.every.among(kept), self.slack_m[np.repeat(kept, 3)]
-        found = nearest(part, self.seen.goals, self.L)
+        found = nearest(part, self.seen.goals, self.L) if found is None else found
         return found, consistency(part, self.seen.goals, self.L, found, slack_m, level)
 
     def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:

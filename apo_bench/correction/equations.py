@@ -157,6 +157,11 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
     return system if free is None else system.among(system.containing(free))
 
 
+def lies_on(assembly: Assembly, contact: Contact) -> bool:
+    """Whether the vertices are the corners of the manipulated face, so that they depend on the goals."""
+    return _smaller(_flat(assembly.face(contact.manipulated)), _flat(assembly.face(contact.environment)))
+
+
 def gap(assembly: Assembly, start: Poses, goals: Array) -> float:
     """The largest |e| of all contacts at `goals`, [m]; 0 if there are none."""
     return largest(equations(assembly, start, goals).residual(goals))
@@ -199,11 +204,15 @@ def _flat(face: Face) -> _Flat:
 
 def _vertices(manipulated: _Flat, environment: _Flat, word: ODL, stack: Array) -> Array:
     """The contact vertices of a pair of faces, (k, 3), frame of the environment part, [m]."""
-    if environment.area <= manipulated.area * (1 + 1e-9):
+    if not _smaller(manipulated, environment):
         return environment.corners
     corners = pose.apply(pose.inverse(product(word, stack)), manipulated.corners)
     n = environment.plane
     return corners - np.outer(corners @ n[:3] + n[3], n[:3])
+
+
+def _smaller(manipulated: _Flat, environment: _Flat) -> bool:
+    return environment.area > manipulated.area * (1 + 1e-9)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -1,0 +1,83 @@
+"""Correct many observations of one assembly at once: what they share is worked out once, the rest is one array."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from apo_bench.assembly import Assembly
+from apo_bench.correction.compact import Compact, compact, moments
+from apo_bench.correction.contact import ContactCorrector, contact, scales
+from apo_bench.correction.equations import Equations, equations, lies_on
+from apo_bench.correction.manifold import Nearest, nearest
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Correction, Observation
+
+CHUNK = 64
+"""Observations that are solved together: more would leave the cache of the processor."""
+
+
+def correct_many(seen: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
+    """The same corrections as one after the other, to rounding, some times faster.
+
+    Args:
+        seen: Observations of one and the same assembly with the same start poses.
+
+    Raises:
+        InputError: They are not, or a covariance is not positive definite.
+    """
+    if not seen:
+        return ()
+    for i, other in enumerate(seen, start=1):
+        if other.assembly is not seen[0].assembly or not _same_start(other, seen[0]):
+            raise InputError(
+                f"observation {i} is of another assembly or start than observation 1; "
+                "correct those of one assembly with one start together."
+            )
+    return tuple(made for i in range(0, len(seen), CHUNK) for made in _chunk(seen[i : i + CHUNK], corrector))
+
+
+def _chunk(seen: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
+    goals, L = np.array([one.goals for one in seen]), np.array([scales(one.covariance) for one in seen])
+    pattern = equations(seen[0].assembly, seen[0].start, seen[0].goals)
+    found = nearest(compact_many(seen[0].assembly, pattern, goals), goals, L)
+    return [corrector.given(one, _one(found, i)) for i, one in enumerate(seen)]
+
+
+def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> Compact:
+    """The compact equations of many observations, goals (b, n, 4, 4), each with the vertices that it gives itself.
+
+    Vertices of the environment's face are the same for all; those of the manipulated face are laid onto the other one
+    at each observation's own goals, which takes their centre and axes along, since it is an affine map.
+
+    Args:
+        pattern: The equations of one of them.
+    """
+    one = compact(pattern, goals.shape[1])
+    contacts = [relation.contact for relation in assembly.relations()]
+    laid = np.array([lies_on(assembly, contact) for contact in contacts], dtype=np.bool_)
+    points = np.array(np.broadcast_to(one.points, (len(goals), *one.points.shape)))
+    if laid.any():
+        some = [contact for contact, chosen in zip(contacts, laid, strict=True) if chosen]
+        own = moments([assembly.face(contact.manipulated).outline for contact in some])
+        back = pose.inverse(one.among(laid).words(goals))
+        there = own @ np.swapaxes(back, -1, -2)
+        plane = np.array([assembly.face(contact.environment).plane for contact in some])
+        points[:, laid] = there
+        points[:, laid, :, :3] -= (there @ plane[:, :, None]) * plane[:, None, :3]
+    return replace(one, points=points)
+
+
+def _same_start(a: Observation, b: Observation) -> bool:
+    return a.start is b.start or (
+        a.start.keys() == b.start.keys() and all(np.array_equal(T, b.start[part]) for part, T in a.start.items())
+    )
+
+
+def _one(found: Nearest, i: int) -> Nearest:
+    parts = (x[i] for x in (found.goals, found.z, found.e, found.Jt, found.B, found.at_rest, found.finite))
+    return Nearest(*parts, trace=found.trace)
