@@ -1,25 +1,35 @@
 """Does a robot's replay of an observed assembly fit, with and without correction by face contacts?
 
 Importing the package registers `APOReplay-v0` with Gymnasium and does nothing else; what needs MuJoCo is imported
-by `gymnasium.make`.
+by `gymnasium.make`. Without a simulator: `read_observation`, `correct` and `explain`.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
+from types import MappingProxyType
 from typing import Any
 
 import gymnasium
 
 __version__ = "0.1.0"
-__all__ = ["Corrected", "__version__"]
+__all__ = ["Corrected", "__version__", "correct", "explain", "load_scenario", "read_observation"]
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.env:APOReplay")
 
+_LATER = MappingProxyType(
+    {
+        "Corrected": "apo_bench.corrected",
+        "correct": "apo_bench.correction.correct",
+        "explain": "apo_bench.correction.explain",
+        "load_scenario": "apo_bench.scenario_file",
+        "read_observation": "apo_bench.observed",
+    }
+)
+
 
 def __getattr__(name: str) -> Any:
-    """`apo_bench.Corrected`, imported when it is first asked for."""
-    if name == "Corrected":
-        from apo_bench.corrected import Corrected
-
-        return Corrected
+    """What is exported, imported when it is first asked for."""
+    if name in _LATER:
+        return getattr(import_module(_LATER[name]), name)
     raise AttributeError(f"module 'apo_bench' has no attribute '{name}'")

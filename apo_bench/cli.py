@@ -1,4 +1,4 @@
-"""The command line: `apo-bench scenarios | graph | scene | replay | sweep | report`.
+"""The command line: `apo-bench scenarios | graph | explain | correct | scene | replay | sweep | report`.
 
 Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
 request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees.
@@ -17,6 +17,7 @@ import typer
 
 from apo_bench import __version__
 from apo_bench.arguments import check_writable, cores, numbers, words
+from apo_bench.cli_correction import register
 from apo_bench.errors import InputError
 
 app = typer.Typer(
@@ -133,6 +134,9 @@ def graph(
             raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
         if not as_json:
             typer.echo(f"\nWrote {out}")
+
+
+register(app)
 
 
 @app.command()

@@ -10,7 +10,7 @@ as it was seen, or less where several parts that must move together were seen.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import final
 
@@ -108,11 +108,12 @@ class Explanation:
     spectral_gap: float
 
 
-def explain(seen: Observation, goals: Array) -> Explanation:
+def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> Explanation:
     """What the contacts determine at goals that satisfy them, and how uncertain these are after what was seen.
 
     Args:
         goals: (n, 4, 4), consistent with every contact, such as corrected goals, world frame, [m].
+        dropped: Relations, R1, R2, .., that are left out.
 
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
@@ -123,9 +124,11 @@ def explain(seen: Observation, goals: Array) -> Explanation:
     system = compact(equations(assembly, seen.start, goals), n)
     B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ scales(seen.covariance)
     Jt = system.gathered(system.blocks(goals, B)[1])
-    known = freedom(Jt)
+    every = holds(assembly)
+    without = {i for i, hold in enumerate(every) if hold.relation in dropped}
+    relations = by_relation(assembly, system, Jt, without)
+    known = freedom(relations.Jt)
     assert known is not None
-    every, relations = holds(assembly), by_relation(assembly, system, Jt)
     spread = (B @ known.free.reshape(n, 6, known.free.shape[1])).reshape(known.free.shape)
     found = []
     for k, own in enumerate(_own(known, n)):
@@ -145,9 +148,15 @@ def explain(seen: Observation, goals: Array) -> Explanation:
                 covariance=C,
             )
         )
-    parts = _standing(assembly, seen.start, goals, B, known.free)
     return Explanation(
-        assembly, goals, tuple(found), parts, known.rank, known.free.shape[1], known.redundant, known.spectral_gap
+        assembly=assembly,
+        goals=goals,
+        operations=tuple(found),
+        parts=_standing(assembly, seen.start, goals, B, known.free),
+        rank=known.rank,
+        freedom=known.free.shape[1],
+        redundant=known.redundant - 3 * sum(len(relations.arcs[i]) for i in without),
+        spectral_gap=known.spectral_gap,
     )
 
 

@@ -7,7 +7,7 @@ irreducible: without any one of them the part would be freer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -98,11 +98,14 @@ class Relations:
         return self.Jt[[6 * j + i for j in operations for i in range(6)]]
 
 
-def by_relation(assembly: Assembly, system: Compact, Jt: Array) -> Relations:
-    """Group the equations of all contacts, in the order of `assembly.relations()`."""
+def by_relation(assembly: Assembly, system: Compact, Jt: Array, dropped: Collection[int] = ()) -> Relations:
+    """Group the equations of all contacts, in the order of `assembly.relations()`; those `dropped` say nothing."""
+    kept = np.ones(len(system), dtype=np.bool_)
     arcs = assembly.arcs()
-    operations = (frozenset(int(j) for j in system.columns[list(arc)].ravel() if j < system.n) for arc in arcs)
-    return Relations(Jt, arcs, tuple(operations))
+    operations = [frozenset(int(j) for j in system.columns[list(arc)].ravel() if j < system.n) for arc in arcs]
+    for i in dropped:
+        kept[list(arcs[i])], operations[i] = False, frozenset()
+    return Relations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, tuple(operations))
 
 
 def _rank(Jt: Array) -> int:

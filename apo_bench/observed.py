@@ -1,0 +1,91 @@
+"""Observed poses from a file: the JSON form of `apo_bench.files`, or a table of comma-separated values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.csv_observation import DEVIATION_DEG, DEVIATION_MM, read_table
+from apo_bench.errors import InputError
+from apo_bench.layout import layout_at
+from apo_bench.program import Observation
+from apo_bench.scenario import Scenario
+
+
+class Observed(NamedTuple):
+    """An observation with its scenario."""
+
+    observation: Observation
+    scenario: Scenario
+    assumed: bool
+    """Whether a standard deviation had to be assumed."""
+
+
+def read_observation(
+    path: str | Path,
+    scenario: Scenario | str | Path,
+    *,
+    deviation_mm: float = DEVIATION_MM,
+    deviation_deg: float = DEVIATION_DEG,
+) -> Observation:
+    """An observation from a `.csv` file, or from the JSON form of any other.
+
+    Args:
+        scenario: The scenario it is of, its name, or its file.
+        deviation_mm: Standard deviation along each axis where a CSV file states none.
+        deviation_deg: The same about each axis.
+
+    Raises:
+        InputError: Anything that is not as described, with the place where it stands.
+    """
+    return observed(path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg).observation
+
+
+def observed(
+    path: str | Path,
+    scenario: Scenario | str | Path,
+    *,
+    deviation_mm: float = DEVIATION_MM,
+    deviation_deg: float = DEVIATION_DEG,
+) -> Observed:
+    """The same, with what is known of it."""
+    from apo_bench import files
+    from apo_bench.scenario_file import load_scenario
+
+    check_deviations(deviation_mm, deviation_deg)
+    known = load_scenario(scenario)
+    if Path(path).suffix.lower() != ".csv":
+        seen = files.read_observation(path, known)
+        return Observed(replace(seen, play_m=known.clearance_mm * 1e-3), known, False)
+    seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
+    return Observed(seen, known, assumed)
+
+
+def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
+    """The nominal goals of a scenario, as if they had been seen with these standard deviations."""
+    check_deviations(deviation_mm, deviation_deg)
+    layout, n = layout_at(scenario, 0.0, 0.0, 0.0), len(scenario.assembly)
+    covariance = np.diag([deviation_mm * 1e-3] * 3 + [radians(deviation_deg)] * 3) ** 2
+    return Observation(
+        assembly=scenario.assembly,
+        start=layout.start,
+        goals=layout.goals,
+        covariance=np.tile(covariance, (n, 1, 1)),
+        seen=np.ones(n, dtype=np.bool_),
+        gap_m=scenario.gap_mm * 1e-3,
+    )
+
+
+def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
+    """Refuse standard deviations that make no sense.
+
+    Raises:
+        InputError: One is not above 0, or absurdly large.
+    """
+    for name, given, largest in (("deviation_mm", deviation_mm, 1e6), ("deviation_deg", deviation_deg, 360.0)):
+        if not 0.0 < given <= largest:
+            raise InputError(f"{name} {given:g} was given; a number above 0 and at most {largest:g} is allowed.")
