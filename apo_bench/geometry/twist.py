@@ -53,7 +53,7 @@ GENERATORS = _generators()
 """A twist xi is the matrix X = sum_i xi_i GENERATORS[i], (6, 4, 4)."""
 _TO_MATRIX = GENERATORS.reshape(6, 16)
 _TO_ADJOINT = _adjoints().reshape(6, 36)
-_SERIES = _series()
+SERIES = _series()
 _POWERS = np.arange(TERMS)
 _ONE4, _ONE6 = np.eye(4), np.eye(6)
 
@@ -68,7 +68,7 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     xi = np.asarray(twist, dtype=np.float64)
     lead = xi.shape[:-1]
     q = (xi[..., 3:] * xi[..., 3:]).sum(axis=-1)
-    B, C, a, b, c, d = np.moveaxis((q[..., None] ** _POWERS) @ _SERIES, -1, 0)[..., None, None]
+    B, C, a, b, c, d = np.moveaxis((q[..., None] ** _POWERS) @ SERIES, -1, 0)[..., None, None]
     X = (xi @ _TO_MATRIX).reshape(*lead, 4, 4)
     ad = (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
     X2, ad2 = X @ X, ad @ ad

@@ -1,0 +1,348 @@
+"""The solver of `manifold`, written out in loops over numbers, for a compiler.
+
+The algorithm is that of `manifold.nearest`, with the same constants. Three things differ in how it is calculated:
+
+- J is kept as blocks of 3 x 6, one for each motion parameter in the word of each contact, and J J^t is summed over
+  pairs of contacts that share a motion parameter.
+- J J^t + mu is factored inside its envelope (George and Liu, "Computer solution of large sparse positive definite
+  systems", 1981). J J^t is positive semidefinite, so no pivot is below mu; one that rounding made smaller is raised.
+- exp and J_r are put together from 3 x 3 matrices: with W = hat(w) and V = hat(v), the upper right block of ad^k is
+  the derivative of W^k along V, and W^3 = -q W.
+
+Everything here is plain Python that runs as it stands, if slowly; `compiled` hands it to Numba, which keeps what it
+compiled for as long as this file stays as it is, so nothing is imported from the package. Names are those of
+`manifold` and `compact`; arrays are C-contiguous, those behind `out` are overwritten.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Words = tuple[Index, Index, Index]
+"""Letters, columns and inverse (0 or 1) of `Compact`, each (c, w)."""
+Rule = tuple[int, float, float, float, float, float, float, float]
+"""TURNS, STEP, SURE, DAMPING, FALL, FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
+SHORT = 9
+"""Terms of the series of exp that are enough below one radian."""
+
+
+def solve(
+    start: Array,
+    words: Words,
+    plane: Array,
+    points: Array,
+    seen: Array,
+    L: Array,
+    soft_m: Array,
+    series: Array,
+    rule: Rule,
+    out: tuple[Array, Array, Array, Array, Array],
+    rest: NDArray[np.bool_],
+    finite: NDArray[np.bool_],
+    trace: Array,
+) -> int:
+    """One observation after the other; returns the turns of the one that took longest.
+
+    Args:
+        points: (b or 1, c, 3, 4).
+        seen: (b, n, 4, 4).
+        L: (b or 1, n, 6, 6).
+        soft_m: (3 c,); (0,) demands every equation.
+        series: As in `twist`.
+        out: goals (b, n, 4, 4), z (b, 6 n), e (b, 3 c), Jt (b, 6 n, 3 c), B (b, n, 6, 6), as in `Nearest`.
+        rest: (b,), overwritten; so is `finite`.
+        trace: (TURNS, 2), zeros: the largest |e| and the largest step of each turn.
+    """
+    turns, step_size, sure, damp, fall, floor, largest_turn, smallest = rule
+    b, n, c, w, p = len(seen), seen.shape[1], len(plane), words[0].shape[1], len(start)
+    m, longest, soft = 3 * c, 0, len(soft_m) > 0
+    width, slot, first, begin, users = ordered(words, p + n, n)
+    factors = np.zeros((p + n + 1, 2, 4, 4))
+    for k in range(p):
+        both(start[k], factors[k])
+    blocks, behind, A = np.zeros((c, w, 3, 6)), np.zeros((w + 1, 3, 4)), np.zeros((m, m))
+    y, step = np.zeros(m), np.zeros(6 * n)
+    for o in range(b):
+        T, z, e, B = out[0][o], out[1][o], out[2][o], out[4][o]
+        v, Lo = points[o if len(points) > 1 else 0], L[o if len(L) > 1 else 0]
+        T[:], z[:], B[:], size = seen[o], 0.0, Lo, np.inf
+        for turn in range(turns):
+            longest = max(longest, turn + 1)
+            for k in range(n):
+                both(T[k], factors[p + k])
+            linearise(words, width, slot, factors, plane, v, B, e, blocks, behind)
+            gram(blocks, first, begin, users, A)
+            mean, gap2, total, gap = 0.0, 0.0, 0.0, 0.0
+            for i in range(m):
+                mean += A[i, i] / m
+                total += e[i]
+                gap = worse(gap, abs(e[i]))
+                if not soft or soft_m[i] == 0.0:
+                    gap2 += e[i] * e[i]
+            finite[o] = math.isfinite(mean + total)
+            if finite[o]:
+                mean = max(mean, smallest)
+                mu = max(damp * min(min(gap2 / (m * mean), 1.0), fall**turn), floor) * mean
+                for i in range(m):
+                    A[i, i] += mu + (soft_m[i] * soft_m[i] if soft else 0.0)
+                towards(blocks, words[1], slot, z, e, y)
+                factored(A, first, mu)
+                substituted(A, first, y)
+                back(blocks, words[1], slot, y, z, step)
+            else:
+                step[:] = np.nan
+            before, size = size, 0.0
+            for i in range(6 * n):
+                size = worse(size, abs(step[i]))
+            trace[turn, 0], trace[turn, 1] = worse(trace[turn, 0], gap), worse(trace[turn, 1], size)
+            rest[o] = size < step_size or (size < sure and size * size < step_size * before)
+            if not finite[o]:
+                break
+            share = 1.0 if rest[o] else shortened(Lo, step, largest_turn, smallest)
+            for i in range(6 * n):
+                z[i] += share * step[i]
+            for k in range(n):
+                moved(seen[o, k], Lo[k], z[6 * k : 6 * k + 6], series, T[k], B[k])
+            if rest[o]:
+                break
+        scattered(blocks, words[1], slot, out[3][o])
+        if not finite[o]:
+            T[:], z[:] = seen[o], 0.0
+        for k in range(n):
+            both(T[k], factors[p + k])
+        linearise(words, width, slot, factors, plane, v, B, e, blocks, behind)
+    return longest
+
+
+def worse(a: float, b: float) -> float:
+    """The larger one; what is not a number is larger than any."""
+    return b if b > a or math.isnan(b) else a
+
+
+def ordered(words: Words, padding: int, n: int) -> tuple[Index, Index, Index, Index, Index]:
+    """What the words say about where numbers stand.
+
+    Returns:
+        width: (c,), letters of each word.
+        slot: (c, w), where the block of a letter is kept: that of its motion parameter's first occurrence; or -1.
+        first: (c,), the first contact that a contact shares a motion parameter with, its own number if none is before.
+        begin: (n + 1,), motion parameter k is in the contacts of number begin[k] .. begin[k + 1] - 1 in `users`.
+        users: (*, 2): a contact and its slot.
+    """
+    letters, columns, _ = words
+    c, w = letters.shape
+    width, slot, first = np.zeros(c, np.intp), np.full((c, w), -1, np.intp), np.arange(c)
+    begin, users, count = np.zeros(n + 1, np.intp), np.zeros((c * w, 2), np.intp), 0
+    for i in range(c):
+        for j in range(w):
+            if letters[i, j] != padding:
+                width[i] = j + 1
+            for other in range(j, -1, -1):
+                if columns[i, j] < n and columns[i, other] == columns[i, j]:
+                    slot[i, j] = other
+    for k in range(n):
+        begin[k] = count
+        for i in range(c):
+            for j in range(w):
+                if columns[i, j] == k and slot[i, j] == j:
+                    users[count, 0], users[count, 1] = i, j
+                    first[i] = min(first[i], users[begin[k], 0])
+                    count += 1
+    begin[n] = count
+    return width, slot, first, begin, users
+
+
+def both(T: Array, out: Array) -> None:
+    """A pose and its inverse, out (2, 4, 4), upper three rows."""
+    for i in range(3):
+        t = 0.0
+        for j in range(3):
+            out[0, i, j], out[1, i, j] = T[i, j], T[j, i]
+            t += T[j, i] * T[j, 3]
+        out[0, i, 3], out[1, i, 3] = T[i, 3], -t
+
+
+def linearise(
+    words: Words,
+    width: Index,
+    slot: Index,
+    factors: Array,
+    plane: Array,
+    points: Array,
+    B: Array,
+    e: Array,
+    blocks: Array,
+    behind: Array,
+) -> None:
+    """e, (3 c,), and its derivative, blocks (c, w, 3, 6), as `Compact.blocks`; `behind`, (w + 1, 3, 4), is scratch."""
+    letters, columns, inverse = words
+    n = len(B)
+    blocks[:] = 0.0
+    for i in range(len(plane)):
+        behind[width[i]] = points[i]
+        for j in range(width[i] - 1, -1, -1):
+            F, v = factors[letters[i, j], inverse[i, j]], behind[j + 1]
+            for r in range(3):
+                for d in range(3):
+                    behind[j, r, d] = F[d, 0] * v[r, 0] + F[d, 1] * v[r, 1] + F[d, 2] * v[r, 2] + F[d, 3] * v[r, 3]
+                behind[j, r, 3] = v[r, 3]
+        a0, a1, a2, h = plane[i, 0], plane[i, 1], plane[i, 2], plane[i, 3]
+        for r in range(3):
+            v = behind[0]
+            e[3 * i + r] = a0 * v[r, 0] + a1 * v[r, 1] + a2 * v[r, 2] + h * v[r, 3]
+        for j in range(width[i]):
+            F, k = factors[letters[i, j], inverse[i, j]], columns[i, j]
+            if inverse[i, j] and k < n:
+                added(blocks[i, slot[i, j]], -a0, -a1, -a2, behind[j], B[k])
+            b0 = a0 * F[0, 0] + a1 * F[1, 0] + a2 * F[2, 0]
+            b1 = a0 * F[0, 1] + a1 * F[1, 1] + a2 * F[2, 1]
+            a0, a1, a2 = b0, b1, a0 * F[0, 2] + a1 * F[1, 2] + a2 * F[2, 2]
+            if not inverse[i, j] and k < n:
+                added(blocks[i, slot[i, j]], a0, a1, a2, behind[j + 1], B[k])
+
+
+def added(block: Array, a0: float, a1: float, a2: float, points: Array, B: Array) -> None:
+    """block (3, 6) += (a h, p x a) B of the points (p, h), (3, 4)."""
+    for r in range(3):
+        x, y, z, h = points[r, 0], points[r, 1], points[r, 2], points[r, 3]
+        t0, t1, t2 = y * a2 - z * a1, z * a0 - x * a2, x * a1 - y * a0
+        for q in range(6):
+            block[r, q] += t0 * B[3, q] + t1 * B[4, q] + t2 * B[5, q]
+        if h != 0.0:
+            for q in range(6):
+                block[r, q] += h * (a0 * B[0, q] + a1 * B[1, q] + a2 * B[2, q])
+
+
+def gram(blocks: Array, first: Index, begin: Index, users: Index, A: Array) -> None:
+    """J J^t, its lower triangle inside the envelope."""
+    for i in range(len(first)):
+        A[3 * i : 3 * i + 3, 3 * first[i] : 3 * i + 3] = 0.0
+    for k in range(len(begin) - 1):
+        for x in range(begin[k], begin[k + 1]):
+            i, P = users[x, 0], blocks[users[x, 0], users[x, 1]]
+            for y in range(begin[k], x + 1):
+                j, Q = users[y, 0], blocks[users[y, 0], users[y, 1]]
+                for r in range(3):
+                    for s in range(3):
+                        t = P[r, 0] * Q[s, 0] + P[r, 1] * Q[s, 1] + P[r, 2] * Q[s, 2]
+                        A[3 * i + r, 3 * j + s] += t + P[r, 3] * Q[s, 3] + P[r, 4] * Q[s, 4] + P[r, 5] * Q[s, 5]
+
+
+def towards(blocks: Array, columns: Index, slot: Index, z: Array, e: Array, y: Array) -> None:
+    """y = J z - e."""
+    for i in range(len(e)):
+        y[i] = -e[i]
+    for i in range(len(columns)):
+        for j in range(columns.shape[1]):
+            if slot[i, j] == j:
+                for r in range(3):
+                    for q in range(6):
+                        y[3 * i + r] += blocks[i, j, r, q] * z[6 * columns[i, j] + q]
+
+
+def factored(A: Array, first: Index, mu: float) -> None:
+    """A becomes its Cholesky factor, with the inverse of each pivot's root on the diagonal."""
+    for r in range(len(A)):
+        begin = 3 * first[r // 3]
+        for s in range(begin, r + 1):
+            t = A[r, s]
+            for q in range(max(begin, 3 * first[s // 3]), s):
+                t -= A[r, q] * A[s, q]
+            A[r, s] = t * A[s, s] if s < r else 1.0 / math.sqrt(max(t, mu))
+
+
+def substituted(A: Array, first: Index, y: Array) -> None:
+    """y becomes the solution of the factored equations."""
+    for r in range(len(A)):
+        t = y[r]
+        for q in range(3 * first[r // 3], r):
+            t -= A[r, q] * y[q]
+        y[r] = t * A[r, r]
+    for r in range(len(A) - 1, -1, -1):
+        y[r] *= A[r, r]
+        for q in range(3 * first[r // 3], r):
+            y[q] -= A[r, q] * y[r]
+
+
+def back(blocks: Array, columns: Index, slot: Index, y: Array, z: Array, step: Array) -> None:
+    """step = J^t y - z."""
+    for i in range(len(step)):
+        step[i] = -z[i]
+    for i in range(len(columns)):
+        for j in range(columns.shape[1]):
+            if slot[i, j] == j:
+                for r in range(3):
+                    for q in range(6):
+                        step[6 * columns[i, j] + q] += blocks[i, j, r, q] * y[3 * i + r]
+
+
+def shortened(L: Array, step: Array, largest_turn: float, smallest: float) -> float:
+    """The share of the step at which no goal turns further than `largest_turn`."""
+    largest = 0.0
+    for k in range(len(L)):
+        turned = 0.0
+        for i in range(3, 6):
+            t = 0.0
+            for q in range(6):
+                t += L[k, i, q] * step[6 * k + q]
+            turned += t * t
+        largest = max(largest, turned)
+    return min(1.0, largest_turn / max(math.sqrt(largest), smallest))
+
+
+def moved(seen: Array, L: Array, z: Array, series: Array, T: Array, B: Array) -> None:
+    """T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z."""
+    xi = np.zeros(6)
+    for i in range(6):
+        for j in range(6):
+            xi[i] += L[i, j] * z[j]
+    v, w = xi[:3], xi[3:]
+    square, s = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
+    f = np.zeros(6)
+    for i in range((SHORT if square < 1.0 else len(series)) - 1, -1, -1):
+        for j in range(6):
+            f[j] = f[j] * square + series[i, j]
+    W, V = hat(w), hat(v)
+    R, G, P, S = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            one = 1.0 if i == j else 0.0
+            W2, M = w[i] * w[j] - one * square, v[i] * w[j] + w[i] * v[j] - 2.0 * one * s
+            R[i, j] = one + (1.0 - square * f[1]) * W[i, j] + f[0] * W2
+            G[i, j] = one + f[0] * W[i, j] + f[1] * W2
+            a, b = f[2] - square * f[4], f[3] - square * f[5]
+            P[i, j] = one + a * W[i, j] + b * W2
+            S[i, j] = a * V[i, j] + b * M - 2.0 * s * (f[4] * W[i, j] + f[5] * W2)
+    for i in range(3):
+        T[i, 3] = seen[i, 3]
+        for j in range(3):
+            T[i, j] = seen[i, 0] * R[0, j] + seen[i, 1] * R[1, j] + seen[i, 2] * R[2, j]
+            T[i, 3] += seen[i, j] * (G[j, 0] * v[0] + G[j, 1] * v[1] + G[j, 2] * v[2])
+        for q in range(6):
+            B[i, q] = P[i, 0] * L[0, q] + P[i, 1] * L[1, q] + P[i, 2] * L[2, q]
+            B[i, q] += S[i, 0] * L[3, q] + S[i, 1] * L[4, q] + S[i, 2] * L[5, q]
+            B[i + 3, q] = P[i, 0] * L[3, q] + P[i, 1] * L[4, q] + P[i, 2] * L[5, q]
+
+
+def hat(a: Array) -> Array:
+    """hat(a) b = a x b."""
+    out = np.zeros((3, 3))
+    out[0, 1], out[0, 2], out[1, 2] = -a[2], a[1], -a[0]
+    out[1, 0], out[2, 0], out[2, 1] = a[2], -a[1], a[0]
+    return out
+
+
+def scattered(blocks: Array, columns: Index, slot: Index, Jt: Array) -> None:
+    """The transposed Jacobian, (6 n, 3 c)."""
+    Jt[:] = 0.0
+    for i in range(len(columns)):
+        for j in range(columns.shape[1]):
+            if slot[i, j] == j:
+                for r in range(3):
+                    for q in range(6):
+                        Jt[6 * columns[i, j] + q, 3 * i + r] = blocks[i, j, r, q]
