@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import NamedTuple, final
+from typing import Literal, NamedTuple, final
 
 import numpy as np
 
@@ -33,6 +33,30 @@ class Contact(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.manipulated} on {self.environment}"
+
+
+Kind = Literal["contact", "centred", "clearance"]
+
+
+class Gap(NamedTuple):
+    """How far apart the nominal faces of a contact are asked to be.
+
+    `centred` (the default): they coincide, so that parts with play stand in the middle of it. `contact`: the physical
+    faces touch, so nominal faces of parts that fit overlap by the play. `clearance`: walls, anywhere in an interval.
+    """
+
+    kind: Kind = "centred"
+    low_m: float | None = None
+    """Of `clearance`: the least distance, negative for overlap; None stands for all the play there is."""
+    high_m: float | None = None
+
+    def interval(self, play_m: float) -> tuple[float, float]:
+        """Least and greatest distance along the normal, [m], of parts with this play per side."""
+        if self.kind == "centred":
+            return 0.0, 0.0
+        if self.kind == "contact":
+            return -play_m, -play_m
+        return -play_m if self.low_m is None else self.low_m, play_m if self.high_m is None else self.high_m
 
 
 @final
@@ -80,9 +104,12 @@ class Assembly:
     operations: tuple[Operation, ...]
     fixed: frozenset[str]
     """Stable objects (Section 2.3): parts that no operation moves, such as the table."""
+    gaps: Mapping[Contact, Gap] = field(default_factory=dict)
+    """Contacts that are not simply asked to coincide."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))
+        object.__setattr__(self, "gaps", MappingProxyType(dict(self.gaps)))
 
     def __len__(self) -> int:
         return len(self.operations)
@@ -94,9 +121,13 @@ class Assembly:
         """Whether the physical faces stay apart by the clearance when the nominal ones touch."""
         return self.face(contact.manipulated).fit or self.face(contact.environment).fit
 
+    def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
+        """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play."""
+        return self.gaps.get(contact, Gap()).interval(play_m if self.is_fit(contact) else 0.0)
+
     def first(self, n: int) -> Assembly:
         """What is known after n operations: the same parts, no later operation."""
-        return Assembly(self.solids, self.operations[:n], self.fixed)
+        return replace(self, operations=self.operations[:n])
 
     def odls(self) -> tuple[Mapping[str, ODL], ...]:
         """The ODL of every part moved so far, after each operation (Section 3.2.1).

@@ -93,7 +93,7 @@ class Compact:
         return e.reshape(*e.shape[:-3], -1), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
 
     def words(self, T: Array) -> Array:
-        """D_a^-1 D_b of every contact, (*, c, 4, 4): from the frame of its environment part to that of its manipulated."""
+        """D_a^-1 D_b of every contact, (*, c, 4, 4)."""
         F = self._factors(T)
         M = F[..., 0, :, :]
         for j in range(1, self.letters.shape[1]):

@@ -11,15 +11,13 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.compact import Compact, compact
-from apo_bench.correction.consistency import LEVEL, consistency, slack, suspects
+from apo_bench.correction.consistency import LEVEL
 from apo_bench.correction.ending import refused, sentence
-from apo_bench.correction.equations import Equations, equations, largest
 from apo_bench.correction.manifold import Nearest, nearest
 from apo_bench.correction.posterior import freedom, marginals, rank
+from apo_bench.correction.problem import Problem, Solver, problem
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.program import Consistency, Correction, Iterate, Observation, Suspect
+from apo_bench.program import Consistency, Correction, Iterate, Observation
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
 DROPS = 3
@@ -36,6 +34,7 @@ class ContactCorrector:
     `drop` leaves the most suspect relation out, up to three in turn, until the test passes."""
     level: float = LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
+    solver: Solver = nearest
 
     def __post_init__(self) -> None:
         if self.doubt not in ("apply", "warn", "refuse", "drop"):
@@ -47,9 +46,9 @@ class ContactCorrector:
         """Correct an observation.
 
         Returns:
-            `converged`, `not_seen`, `inconsistent` (the contacts contradict each other), `doubtful` (only of `refuse`),
-            `not_converged` or `not_finite`; only the first is meant to be executed. `freed` are all operations that a
-            contact depends on; `covariance` is the posterior.
+            `converged`, `not_seen`, `inconsistent` (the contacts contradict each other), `doubtful` (of `refuse` and
+            `drop`: the test fails), `not_converged` or `not_finite`; only the first is meant to be executed. `freed`
+            are all operations that a contact depends on; `covariance` is the posterior.
 
         Raises:
             InputError: The covariance of an operation is not positive definite.
@@ -57,51 +56,50 @@ class ContactCorrector:
         return self.given(seen, None)
 
     def given(self, seen: Observation, found: Nearest | None) -> Correction:
-        """The same, if the observation has been solved already."""
+        """The same, if the nearest goals without walls are known already."""
         if not seen.seen.all():
             return refused(seen)
-        L, system = scales(seen.covariance), equations(seen.assembly, seen.start, seen.goals)
-        every = compact(system, len(seen.goals))
-        fits = np.array([seen.assembly.is_fit(r.contact) for r in seen.assembly.relations()], dtype=np.bool_)
-        now = _Attempt(seen, system, every, L, slack(fits, every, seen.play_m))
-        kept, dropped = np.ones(len(every), dtype=np.bool_), tuple[str, ...]()
-        found, tested = now.solve(kept, self.level, found)
-        first = tested
+        asked = problem(seen, self.solver)
+        every = asked.without(())
+        found, first = asked.solve(every, found)
+        first = replace(first, level=self.level)
+        if not first.passes and self.doubt != "apply" and found.finite:
+            first = replace(first, suspects=asked.suspects(every))
+        kept, dropped, tested = every, tuple[str, ...](), first
         while self.doubt == "drop" and not tested.passes and found.finite and len(dropped) < DROPS:
-            worst = now.suspects(kept)[:1]
+            worst = (asked.suspects(kept) if dropped else first.suspects)[:1]
+            dropped += tuple(suspect.relation for suspect in worst)
             if not worst:
                 break
-            dropped += (worst[0].relation,)
-            kept = now.without(dropped)
-            found, tested = now.solve(kept, self.level)
-        if self.doubt != "apply" and not first.passes and found.finite:
-            first = replace(first, suspects=now.suspects(np.ones(len(every), dtype=np.bool_)))
-        return self._report(now, found, kept, tested, first, dropped)
+            kept = asked.without(dropped)
+            found, tested = asked.solve(kept)
+            tested = replace(tested, level=self.level)
+        return self._report(asked, found, kept, tested, first, dropped)
 
     def _report(
         self,
-        now: _Attempt,
+        asked: Problem,
         found: Nearest,
         kept: NDArray[np.bool_],
         tested: Consistency,
         first: Consistency,
         dropped: tuple[str, ...],
     ) -> Correction:
-        seen, system = now.seen, now.system
-        known = freedom(found.Jt)
+        seen, known = asked.seen, freedom(found.Jt)
         directions = rank(found.Jt) if known is None else known.rank
-        status = _status(found, largest(system.gaps(found.goals)[kept]), seen.gap_m)
+        status = _status(found, asked.gap(found.goals, kept), seen.gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not tested.passes:
             status = "doubtful"
         of = "every contact" if kept.all() else f"every contact but those of {', '.join(dropped)}"
         said = sentence(status, seen.gap_m, of) + ("" if self.doubt == "apply" else _doubts(first, dropped))
+        every = asked.without(())
         return Correction(
             goals=found.goals,
             status=status,
             sentence=said,
-            freed=system.variables(len(seen.goals)),
-            gap_before_m=largest(system.residual(seen.goals)),
-            gap_after_m=largest(system.residual(found.goals)),
+            freed=asked.system.variables(len(seen.goals)),
+            gap_before_m=asked.gap(seen.goals, every),
+            gap_after_m=asked.gap(found.goals, every),
             rank=directions,
             trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),
             test=first,
@@ -114,52 +112,6 @@ contact = ContactCorrector()
 contact_apply = ContactCorrector("apply")
 contact_refuse = ContactCorrector("refuse")
 contact_drop = ContactCorrector("drop")
-
-
-def scales(covariance: Array) -> Array:
-    """L with L L^t = covariance, (n, 6, 6).
-
-    Raises:
-        InputError: One is not positive definite.
-    """
-    L = np.zeros(covariance.shape)
-    for k, C in enumerate(covariance):
-        try:
-            L[k] = np.linalg.cholesky(C)
-        except np.linalg.LinAlgError:
-            L[k] = np.nan
-        if not np.isfinite(L[k]).all():
-            raise InputError(
-                f"the covariance of operation {k + 1} is not positive definite; "
-                "state finite numbers and a variance above zero in every direction."
-            )
-    return L
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Attempt:
-    """One observation with its equations, to be solved with some of its contacts."""
-
-    seen: Observation
-    system: Equations
-    every: Compact
-    L: Array
-    slack_m: Array
-
-    def solve(self, kept: NDArray[np.bool_], level: float, found: Nearest | None = None) -> tuple[Nearest, Consistency]:
-        part, slack_m = self.every.among(kept), self.slack_m[np.repeat(kept, 3)]
-        found = nearest(part, self.seen.goals, self.L) if found is None else found
-        return found, consistency(part, self.seen.goals, self.L, found, slack_m, level)
-
-    def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
-        return suspects(self.seen.assembly, self.every, self.seen.goals, self.L, self.slack_m, kept)
-
-    def without(self, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
-        kept = np.ones(len(self.every), dtype=np.bool_)
-        for i, arc in enumerate(self.seen.assembly.arcs()):
-            kept[list(arc)] = f"R{i + 1}" not in dropped
-        return kept
 
 
 def _status(found: Nearest, left_m: float, gap_m: float) -> str:

@@ -9,9 +9,11 @@ import numpy as np
 
 from apo_bench.assembly import Assembly
 from apo_bench.correction.compact import Compact, compact, moments
-from apo_bench.correction.contact import ContactCorrector, contact, scales
+from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.equations import Equations, equations, lies_on
 from apo_bench.correction.manifold import Nearest, nearest
+from apo_bench.correction.problem import scales
+from apo_bench.correction.walls import asked
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -25,7 +27,7 @@ def correct_many(seen: Sequence[Observation], corrector: ContactCorrector = cont
     """The same corrections as one after the other, to rounding, some times faster.
 
     Args:
-        seen: Observations of one and the same assembly with the same start poses.
+        seen: Observations of one and the same assembly with the same start poses and play.
 
     Raises:
         InputError: They are not, or a covariance is not positive definite.
@@ -33,18 +35,19 @@ def correct_many(seen: Sequence[Observation], corrector: ContactCorrector = cont
     if not seen:
         return ()
     for i, other in enumerate(seen, start=1):
-        if other.assembly is not seen[0].assembly or not _same_start(other, seen[0]):
+        if other.assembly is not seen[0].assembly or not _alike(other, seen[0]):
             raise InputError(
-                f"observation {i} is of another assembly or start than observation 1; "
-                "correct those of one assembly with one start together."
+                f"observation {i} is of another assembly, start or play than observation 1; "
+                "correct those together that share them."
             )
     return tuple(made for i in range(0, len(seen), CHUNK) for made in _chunk(seen[i : i + CHUNK], corrector))
 
 
 def _chunk(seen: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
     goals, L = np.array([one.goals for one in seen]), np.array([scales(one.covariance) for one in seen])
-    pattern = equations(seen[0].assembly, seen[0].start, seen[0].goals)
-    found = nearest(compact_many(seen[0].assembly, pattern, goals), goals, L)
+    plain = equations(seen[0].assembly, seen[0].start, seen[0].goals)
+    pattern, exact, _ = asked(plain, seen[0].assembly, seen[0].play_m)
+    found = nearest(compact_many(seen[0].assembly, pattern, goals).among(exact), goals, L)
     return [corrector.given(one, _one(found, i)) for i, one in enumerate(seen)]
 
 
@@ -72,12 +75,16 @@ def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> Compac
     return replace(one, points=points)
 
 
-def _same_start(a: Observation, b: Observation) -> bool:
-    return a.start is b.start or (
-        a.start.keys() == b.start.keys() and all(np.array_equal(T, b.start[part]) for part, T in a.start.items())
+def _alike(a: Observation, b: Observation) -> bool:
+    return (
+        a.play_m == b.play_m
+        and a.start.keys() == b.start.keys()
+        and all(np.array_equal(T, b.start[part]) for part, T in a.start.items())
     )
 
 
 def _one(found: Nearest, i: int) -> Nearest:
-    parts = (x[i] for x in (found.goals, found.z, found.e, found.Jt, found.B, found.at_rest, found.finite))
-    return Nearest(*parts, trace=found.trace)
+    return Nearest(
+        *(found.goals[i], found.z[i], found.e[i], found.Jt[i], found.B[i], found.at_rest[i], found.finite[i]),
+        trace=found.trace,
+    )

@@ -1,0 +1,109 @@
+"""What one observation asks of a solver: its equations, its walls, its noise; solved with all contacts or some."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.correction.compact import Compact, compact
+from apo_bench.correction.consistency import consistency, slack, suspects
+from apo_bench.correction.equations import Equations, equations, largest
+from apo_bench.correction.manifold import Nearest
+from apo_bench.correction.walls import Walls, asked, between
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Consistency, Observation, Suspect
+
+Solver = Callable[[Compact, Array, Array], Nearest]
+"""(equations, goals seen, L) -> nearest goals; `manifold.nearest` and what does the same."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One observation with what is asked of its c contacts."""
+
+    seen: Observation
+    system: Equations
+    """Of every contact, planes shifted to where they are asked to be."""
+    compact: Compact
+    """The same, three per contact."""
+    exact: NDArray[np.bool_]
+    """(c,): contacts that are equations; the others are walls."""
+    walls: Walls
+    L: Array
+    """(n, 6, 6)."""
+    slack_m: Array
+    """(3 c,): what the play of parts that fit leaves, for the test."""
+    solver: Solver
+
+    def solve(self, kept: NDArray[np.bool_], found: Nearest | None = None) -> tuple[Nearest, Consistency]:
+        """The nearest goals by the contacts that are `kept`, (c,), and the test of the equations among them.
+
+        Args:
+            found: The nearest goals without walls, if they are known already.
+        """
+        chosen = kept & self.exact
+        part = self.compact.among(chosen)
+        slack_m = self.slack_m[np.repeat(chosen, 3)]
+        found = self.solver(part, self.seen.goals, self.L) if found is None else found
+        tested = consistency(part, self.seen.goals, self.L, found, slack_m)
+        walls = self.walls.among(kept[~self.exact])
+        if len(walls) and bool(found.finite):
+            found = between(part, walls, self.seen.goals, self.L, found)
+        return found, tested
+
+    def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
+        """Relations whose contacts are `kept`, the most suspect first."""
+        among = kept & self.exact
+        return suspects(self.seen.assembly, self.compact, self.seen.goals, self.L, self.slack_m, among)
+
+    def without(self, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
+        """The contacts that are left without these relations, (c,)."""
+        kept = np.ones(len(self.compact), dtype=np.bool_)
+        for i, arc in enumerate(self.seen.assembly.arcs()):
+            kept[list(arc)] = f"R{i + 1}" not in dropped
+        return kept
+
+    def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
+        """The largest |e| of what is kept, [m]; of walls, by how much they are overstepped."""
+        equal = largest(self.system.gaps(goals)[kept & self.exact])
+        return max(equal, self.walls.among(kept[~self.exact]).overstepped(goals))
+
+
+def problem(seen: Observation, solver: Solver) -> Problem:
+    """What an observation asks.
+
+    Raises:
+        InputError: The covariance of an operation is not positive definite.
+    """
+    L = scales(seen.covariance)
+    plain = equations(seen.assembly, seen.start, seen.goals)
+    system, exact, walls = asked(plain, seen.assembly, seen.play_m)
+    every = compact(system, len(seen.goals))
+    fits = np.array([seen.assembly.is_fit(r.contact) for r in seen.assembly.relations()], dtype=np.bool_)
+    return Problem(seen, system, every, exact, walls, L, slack(fits, every, seen.play_m), solver)
+
+
+def scales(covariance: Array) -> Array:
+    """L with L L^t = covariance, (n, 6, 6).
+
+    Raises:
+        InputError: One is not positive definite.
+    """
+    L = np.zeros(covariance.shape)
+    for k, C in enumerate(covariance):
+        try:
+            L[k] = np.linalg.cholesky(C)
+        except np.linalg.LinAlgError:
+            L[k] = np.nan
+        if not np.isfinite(L[k]).all():
+            raise InputError(
+                f"the covariance of operation {k + 1} is not positive definite; "
+                "state finite numbers and a variance above zero in every direction."
+            )
+    return L

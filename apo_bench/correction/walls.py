@@ -1,0 +1,125 @@
+"""Contacts with play, as walls: each vertex may be anywhere between two distances from its plane.
+
+Equations of exact and centred contacts are solved first, which settles their rank. After that every turn solves a
+quadratic program: the shortest z among all that satisfy the linearised equations and stay between the linearised walls.
+Redundant equations would make the active-set solver cycle, so z is written as the shortest solution of the equations
+plus a combination of their free directions; only that is the unknown of the program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Assembly
+from apo_bench.correction.compact import Compact
+from apo_bench.correction.equations import Equations
+from apo_bench.correction.manifold import TURNS, Nearest, Turn, project, settles, shortened
+from apo_bench.correction.posterior import LARGE, rank
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import exp_and_jacobian
+
+BLIND = 1e-7
+"""Part of the largest row below which a wall does not depend on the free directions."""
+EXACT = 1e-10
+"""How far the program may overstep a wall, in standard deviations."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """m inequalities low <= e <= high, one per vertex."""
+
+    system: Equations
+    low: Array
+    """(m,), [m]."""
+    high: Array
+    """(m,), [m]."""
+
+    def __len__(self) -> int:
+        return len(self.low)
+
+    def among(self, contacts: NDArray[np.bool_]) -> Walls:
+        """The walls of some of the contacts that have any."""
+        rows = contacts[self.system.contact]
+        return Walls(self.system.among(contacts), self.low[rows], self.high[rows])
+
+    def overstepped(self, goals: Array) -> float:
+        """By how much the worst vertex is beyond its walls at the goals, [m]; 0 if none is."""
+        e = self.system.residual(goals)
+        return float(np.maximum(self.low - e, e - self.high).max(initial=0.0))
+
+
+def asked(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Walls]:
+    """What is demanded of each contact: shifted planes, (c,) whether it is an equation, and the walls of the others."""
+    intervals = [assembly.interval(relation.contact, play_m) for relation in assembly.relations()]
+    low, high = np.array(intervals).reshape(-1, 2).T
+    exact = low == high
+    plane = np.array(system.plane)
+    plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]
+    walls = system.among(~exact)
+    return replace(system, plane=plane), exact, Walls(walls, low[~exact][walls.contact], high[~exact][walls.contact])
+
+
+def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest) -> Nearest:
+    """The nearest goals that satisfy the equations and stay between the walls.
+
+    Args:
+        seen: (n, 4, 4), world frame, [m].
+        L: (n, 6, 6), L L^t the covariance of the body twists.
+        start: The nearest goals without walls.
+
+    Returns:
+        Not at rest if there is no room between the walls.
+
+    Raises:
+        InputError: Too many operations for a dense program.
+    """
+    if 6 * system.n > LARGE:
+        raise InputError(
+            f"walls with {system.n} operations were given, up to {LARGE // 6} are allowed; "
+            'ask for "centred" contacts instead.'
+        )
+    known, before, trace = rank(start.Jt), np.inf, list(start.trace)
+    z, T, B, rest, Jt = start.z, start.goals, start.B, False, start.Jt
+    for _ in range(TURNS):
+        e, blocks = system.blocks(T, B)
+        Jt = system.gathered(blocks)
+        shortest = z + project(e[None], Jt[None], z[None], None, TURNS)[0][0]
+        free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
+        e_wall, J_wall = walls.system.linearised(T)
+        J_wall = (J_wall.reshape(len(walls), -1, 1, 6) @ B).reshape(len(walls), -1)
+        ahead = e_wall + J_wall @ (shortest - z)
+        u = _program(J_wall @ free, walls.low - ahead, walls.high - ahead)
+        if u is None:
+            break
+        step = shortest + free @ u - z
+        length = float(np.abs(step).max(initial=0.0))
+        trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))
+        rest = bool(settles(np.array(length), np.array(before)))
+        z = z + (step if rest else shortened(step[None], L[None])[0])
+        D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
+        T, B, before = seen @ D, Jr @ L, length
+        if rest:
+            break
+    return Nearest(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
+
+
+def _program(A: Array, low: Array, high: Array) -> Array | None:
+    """The shortest u with low <= A u <= high; None if there is none (DAQP: Arnstrom, Bemporad and Axehill, 2022)."""
+    import daqp
+
+    size = np.sqrt((A * A).sum(axis=1))
+    seeing = size > BLIND * size.max(initial=0.0)
+    A, low, high = A[seeing] / size[seeing, None], low[seeing] / size[seeing], high[seeing] / size[seeing]
+    k = A.shape[1]
+    if not len(A) or not k:
+        return np.zeros(k)
+    sense = np.zeros(len(A), dtype=np.intc)
+    A = np.ascontiguousarray(A)
+    u, _, flag, _ = daqp.solve(np.eye(k), np.zeros(k), A, high, low, sense, primal_tol=EXACT)
+    return np.asarray(u) if flag > 0 else None
