@@ -18,7 +18,7 @@ import numpy as np
 
 from apo_bench.assembly import ODL, Assembly, Operation
 from apo_bench.correction.compact import compact
-from apo_bench.correction.contact import scales
+from apo_bench.correction.problem import scales
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.equations import equations
 from apo_bench.correction.holding import Hold, by_relation, holds
