@@ -1,12 +1,14 @@
 """The package's corrector behind the shapes that are measured: the one place that knows its calls.
 
-A solve is timed whole: from the equations and a covariance to goals at rest and their rank, as the yardstick has it.
+`whole` is timed from the equations and a covariance to goals at rest and their rank, as the yardstick has it; `alone`
+has the equations in compact form and the factors of the covariance beforehand, and leaves the rank to who asks for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -19,31 +21,50 @@ from benchmarks.corrector_bench.problems import Problem
 
 
 def contact(task: Task) -> Run:
-    """Plain numpy."""
-    from apo_bench.correction.compact import compact
+    """Plain numpy, whole."""
     from apo_bench.correction.manifold import nearest
-    from apo_bench.correction.posterior import rank
 
-    def run() -> Array:
-        found = nearest(compact(task.system, len(task.seen)), task.seen, np.linalg.cholesky(task.covariance))
-        rank(found.Jt)
-        return found.goals
+    return _whole(task, nearest)
 
-    return run
+
+def contact_alone(task: Task) -> Run:
+    """Plain numpy, the solve alone."""
+    from apo_bench.correction.manifold import nearest
+
+    return _alone(task, nearest)
 
 
 def compiled(task: Task) -> Run:
-    """The same by the optional compiled kernel."""
-    from apo_bench.correction.compact import compact
+    """The optional compiled kernel, whole."""
     from apo_bench.correction.compiled import nearest
+
+    return _whole(task, nearest)
+
+
+def compiled_alone(task: Task) -> Run:
+    """The optional compiled kernel, the solve alone."""
+    from apo_bench.correction.compiled import nearest
+
+    return _alone(task, nearest)
+
+
+def _whole(task: Task, nearest: Callable[..., Any]) -> Run:
+    from apo_bench.correction.compact import compact
     from apo_bench.correction.posterior import rank
 
     def run() -> Array:
         found = nearest(compact(task.system, len(task.seen)), task.seen, np.linalg.cholesky(task.covariance))
         rank(found.Jt)
-        return found.goals
+        return np.asarray(found.goals)
 
     return run
+
+
+def _alone(task: Task, nearest: Callable[..., Any]) -> Run:
+    from apo_bench.correction.compact import compact
+
+    system, L = compact(task.system, len(task.seen)), np.linalg.cholesky(task.covariance)
+    return lambda: nearest(system, task.seen, L).goals
 
 
 def dense(task: Task) -> Run:
@@ -57,7 +78,13 @@ def dense(task: Task) -> Run:
 
 COMPILED = "contact compiled"
 PEERS: Mapping[str, Callable[[Task], Run]] = MappingProxyType(
-    {"contact": contact, COMPILED: compiled, "contact dense": dense}
+    {
+        "contact": contact,
+        "contact alone": contact_alone,
+        COMPILED: compiled,
+        f"{COMPILED} alone": compiled_alone,
+        "contact dense": dense,
+    }
 )
 
 
@@ -72,3 +99,16 @@ def corrected(seen: Observation, name: str = "contact") -> Correction:
     from apo_bench.correction.correct import correct
 
     return correct(seen, name)
+
+
+def together(of: Problem, seen: Array, covariance: Array) -> Array:
+    """Goals of many observations, (b, n, 4, 4), covariance (b, n, 6, 6), plain numpy, in chunks as the package does."""
+    from apo_bench.correction.manifold import nearest
+    from apo_bench.correction.many import CHUNK, compact_many
+
+    pattern, L = of.system(seen[0]), np.linalg.cholesky(covariance)
+    found = []
+    for i in range(0, len(seen), CHUNK):
+        some = seen[i : i + CHUNK]
+        found.append(nearest(compact_many(of.assembly, pattern, some), some, L[i : i + CHUNK]).goals)
+    return np.concatenate(found)

@@ -39,15 +39,15 @@ def suite(draws: int) -> list[Row]:
 
 
 def _own(name: str, draws: int) -> list[Row]:
-    ran = run("contact", name, "2/1", draws, beside=("newton",))
-    rows = [
-        Row("P1", name, "contact over the paper's Newton, time", _ratio(ran, 0, 1), "<= 1.5", "", _times(ran, "newton"))
-    ]
-    ran = run(COMPILED, name, "2/1", draws, beside=("newton", "contact"))
-    note = "" if ran.ended == "ok" and (ran.ms > 0).all() else f"not measured: {ran.ended}, or numba is missing"
-    value = _ratio(ran, 0, 1) if not note else None
-    what = "compiled over the paper's Newton, time"
-    return [*rows, Row("P2", name, what, value, COMPILED_TARGET[name], note, _times(ran, "newton", "contact"))]
+    rows = []
+    for id, peer, bound in (("P1", "contact", "<= 1.5"), ("P2", COMPILED, COMPILED_TARGET[name])):
+        for what, who in (("whole", peer), ("the solve alone", f"{peer} alone")):
+            ran = run(who, name, "2/1", draws, beside=("newton",))
+            ok = ran.ended == "ok" and bool((ran.ms > 0).all())
+            note = "" if ok else f"not measured ({ran.ended}); is numba installed?" if id == "P2" else ran.ended
+            text = f"{peer} over the paper's Newton, time, {what}"
+            rows.append(Row(id, name, text, _ratio(ran, 0, 1) if ok else None, bound, note, _times(ran, "newton")))
+    return rows
 
 
 def _peer(name: str, peer: str, draws: int) -> list[Row]:
