@@ -11,6 +11,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.correction import compiled
 from apo_bench.correction.consistency import LEVEL
 from apo_bench.correction.ending import refused, sentence
 from apo_bench.correction.manifold import Nearest, nearest
@@ -35,6 +36,7 @@ class ContactCorrector:
     level: float = LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
     solver: Solver = nearest
+    """What finds the nearest goals; `compiled.nearest` is the same, compiled."""
 
     def __post_init__(self) -> None:
         if self.doubt not in ("apply", "warn", "refuse", "drop"):
@@ -112,6 +114,7 @@ contact = ContactCorrector()
 contact_apply = ContactCorrector("apply")
 contact_refuse = ContactCorrector("refuse")
 contact_drop = ContactCorrector("drop")
+contact_fast = ContactCorrector(solver=compiled.nearest)
 
 
 def _status(found: Nearest, left_m: float, gap_m: float) -> str:

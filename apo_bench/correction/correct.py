@@ -24,6 +24,7 @@ CORRECTORS = MappingProxyType(
         "contact": "apo_bench.correction.contact:contact",
         "contact-refuse": "apo_bench.correction.contact:contact_refuse",
         "contact-drop": "apo_bench.correction.contact:contact_drop",
+        "contact-fast": "apo_bench.correction.contact:contact_fast",
         "paper": "apo_bench.correction.paper:paper",
         "paper-track": "apo_bench.correction.track:paper_track",
         "last-only": "apo_bench.correction.ablations:last_only",
