@@ -19,7 +19,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
-	    --methods oracle,none,paper --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
+	    --methods oracle,none,paper,contact --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
 	@$(BIN)/apo-bench report $(OUT) | tail -n 3
 
 test: $(VENV)/.installed-dev

@@ -228,7 +228,7 @@ def sweep(
     out: Annotated[Path, typer.Option(help="Folder of the rows; one that was interrupted is continued.")],
     levels: Annotated[str, typer.Option(help="Noise levels, mm and degrees.")] = "0,0.1,0.25,0.5,1,2,4",
     careless: Annotated[str, typer.Option(help="Carelessness of the human.")] = "0,1",
-    methods: Annotated[str, typer.Option(help="oracle, none and correctors.")] = "oracle,none,paper",
+    methods: Annotated[str, typer.Option(help="oracle, none and correctors.")] = "oracle,none,paper,contact",
     trials: Annotated[int, typer.Option(help="Trials per cell; the same seeds in every cell.")] = 100,
     seed: Annotated[int, typer.Option(help="First seed.")] = 0,
     clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,

@@ -21,7 +21,7 @@ from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-METHODS = ("oracle", "none", "paper")
+METHODS = ("oracle", "none", "paper", "contact")
 LARGEST_TRIALS = 1_000_000
 
 Key = tuple[str, float, int, float, float, float, str, str, str]
