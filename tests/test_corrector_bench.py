@@ -12,8 +12,10 @@ from apo_bench.correction.equations import equations
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
+from benchmarks.corrector_bench import suite_walls
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.measures import free_basis, freedom_error, lengths, quality, spread
+from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.part import part
 from benchmarks.corrector_bench.peers import Task, newton, peers
 from benchmarks.corrector_bench.problems import problem
@@ -127,6 +129,17 @@ def test_a_shifted_plane_opens_one_contact_and_no_other() -> None:
     wrong = shifted(of.assembly, 4, 0.01)
     gaps = equations(wrong, of.start, of.goals).gaps(of.goals)
     np.testing.assert_allclose(gaps, 0.01 * (np.arange(len(gaps)) == 4), atol=1e-12)
+
+
+def test_walls_that_are_touched_may_hold_a_correction_back_and_others_may_not() -> None:
+    of = problem("fig3")
+    given = draw(of, "2/1", 4)
+    middle = optimum(of, given).goals
+    assert suite_walls.pushed(of, given, middle, half_m=0.01) > 0.1
+    between = corrected(observation(of, given, suite_walls.walled(of, 1e-4))).goals
+    assert suite_walls.pushed(of, given, between, half_m=1e-4) < 1e-6
+    assert suite_walls.beyond(of, given, between, half_m=1e-4) < 1e-9
+    assert suite_walls.beyond(of, given, between, half_m=0.0) == pytest.approx(1e-4)
 
 
 def test_the_yardstick_closes_the_contacts() -> None:

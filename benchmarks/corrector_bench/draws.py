@@ -31,6 +31,11 @@ class Draw(NamedTuple):
     """(n, 6, 6), of the body twist, [m, rad]."""
 
 
+def factors(covariance: Array) -> Array:
+    """L with L L^t = covariance, (*, n, 6, 6)."""
+    return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+
+
 def draw(of: Problem, level: str, seed: int, per_part: bool = False) -> Draw:
     """The observation of one seed: T_seen = T_true exp(xi), xi ~ N(0, covariance)."""
     rng = np.random.default_rng([seed, int(per_part)])

@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
-from benchmarks.corrector_bench.draws import Draw
+from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.problems import Problem
 
 
@@ -70,7 +70,7 @@ def quality(of: Problem, given: Draw, goals: Array, residual_m: float | None = N
 def sigma(given: Draw, from_goals: Array, to_goals: Array) -> Array:
     """L^-1 log(T_from^-1 T_to), (6 n,)."""
     twist = pose.log(pose.inverse(from_goals) @ to_goals)
-    return np.linalg.solve(np.linalg.cholesky(given.covariance), twist[..., None]).ravel()
+    return np.asarray(np.linalg.solve(factors(given.covariance), twist[..., None])).ravel()
 
 
 def lengths(given: Draw, goals: Array) -> Array:
@@ -81,12 +81,12 @@ def lengths(given: Draw, goals: Array) -> Array:
 def free_basis(of: Problem, given: Draw, goals: Array) -> Array:
     """An orthonormal basis of the free directions of z at consistent goals, (6 n, f): L^-1 J_r(xi)^-1 N."""
     twist = pose.log(pose.inverse(given.seen) @ goals)
-    return _spanned(right_jacobian(twist) @ np.linalg.cholesky(given.covariance), of.free(goals))
+    return _spanned(right_jacobian(twist) @ factors(given.covariance), of.free(goals))
 
 
 def free_at_truth(of: Problem, given: Draw) -> Array:
     """An orthonormal basis of the free directions around the truth, in sigma units, (6 n, f)."""
-    return _spanned(np.linalg.cholesky(given.covariance), of.free(given.truth))
+    return _spanned(factors(given.covariance), of.free(given.truth))
 
 
 def spread(of: Problem, given: Draw, goals: Array) -> float:
@@ -104,7 +104,7 @@ def freedom_error(of: Problem, given: Draw, goals: Array, covariance: Array) -> 
     In sigma units the posterior of the free directions Q is Q Q^t; a direction that is called fixed or free wrongly
     shows in the blocks of its parts.
     """
-    L = np.linalg.cholesky(given.covariance)
+    L = factors(given.covariance)
     B = right_jacobian(pose.log(pose.inverse(given.seen) @ goals)) @ L
     Q = free_basis(of, given, goals).reshape(of.n, 6, -1)
     inward = np.linalg.inv(B)

@@ -15,7 +15,7 @@ import numpy as np
 from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
-from benchmarks.corrector_bench.draws import Draw
+from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.peers import Run, Task
 from benchmarks.corrector_bench.problems import Problem
 
@@ -53,7 +53,7 @@ def _whole(task: Task, nearest: Callable[..., Any]) -> Run:
     from apo_bench.correction.posterior import rank
 
     def run() -> Array:
-        found = nearest(compact(task.system, len(task.seen)), task.seen, np.linalg.cholesky(task.covariance))
+        found = nearest(compact(task.system, len(task.seen)), task.seen, factors(task.covariance))
         rank(found.Jt)
         return np.asarray(found.goals)
 
@@ -63,7 +63,7 @@ def _whole(task: Task, nearest: Callable[..., Any]) -> Run:
 def _alone(task: Task, nearest: Callable[..., Any]) -> Run:
     from apo_bench.correction.compact import compact
 
-    system, L = compact(task.system, len(task.seen)), np.linalg.cholesky(task.covariance)
+    system, L = compact(task.system, len(task.seen)), factors(task.covariance)
     return lambda: nearest(system, task.seen, L).goals
 
 
@@ -72,7 +72,7 @@ def dense(task: Task) -> Run:
     from apo_bench.correction.compact import compact
     from apo_bench.correction.manifold import nearest
 
-    L = np.linalg.cholesky(task.covariance)
+    L = factors(task.covariance)
     return lambda: nearest(compact(task.system, len(task.seen)), task.seen[None], L[None]).goals[0]
 
 
@@ -106,7 +106,7 @@ def together(of: Problem, seen: Array, covariance: Array) -> Array:
     from apo_bench.correction.manifold import nearest
     from apo_bench.correction.many import CHUNK, compact_many
 
-    pattern, L = of.system(seen[0]), np.linalg.cholesky(covariance)
+    pattern, L = of.system(seen[0]), factors(covariance)
     found = []
     for i in range(0, len(seen), CHUNK):
         some = seen[i : i + CHUNK]

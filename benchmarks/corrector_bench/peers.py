@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
 from apo_bench.correction.equations import Equations
 from apo_bench.geometry.arrays import Array
+from benchmarks.corrector_bench.draws import factors
 from benchmarks.corrector_bench.equations_in_z import InZ
 from benchmarks.corrector_bench.problems import Problem
 
@@ -30,7 +29,7 @@ class Task(NamedTuple):
 
     @property
     def in_z(self) -> InZ:
-        return InZ(self.system, self.seen, np.linalg.cholesky(self.covariance))
+        return InZ(self.system, self.seen, factors(self.covariance))
 
 
 Run = Callable[[], Array]

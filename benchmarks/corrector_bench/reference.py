@@ -16,7 +16,7 @@ from apo_bench.correction.equations import Equations
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
-from benchmarks.corrector_bench.draws import Draw
+from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.measures import lengths
 from benchmarks.corrector_bench.problems import Problem
 
@@ -42,7 +42,7 @@ def optimum(of: Problem, given: Draw, system: Equations | None = None) -> Optimu
 
 
 def _descended(of: Problem, given: Draw, system: Equations, z: Array) -> Optimum:
-    L, n, cap = np.linalg.cholesky(given.covariance), of.n, np.sqrt(6 * of.n)
+    L, n, cap = factors(given.covariance), of.n, np.sqrt(6 * of.n)
     for _ in range(TURNS):
         xi = (L @ z.reshape(n, 6, 1))[..., 0]
         goals = given.seen @ pose.exp(xi)

@@ -51,7 +51,8 @@ def run(
         arguments = [peer, problem, level, str(int(per_part)), seeds, str(out), ",".join(beside)]
         ended, seconds = process(["-m", "benchmarks.corrector_bench.worker", *arguments], limit_s)
         if not out.exists():
-            return Ran(np.zeros((0, 0, 4, 4)), *[np.zeros((0, 1 + len(beside)))] * 2, ended, seconds)
+            none = np.zeros((0, 1 + len(beside)))
+            return Ran(np.zeros((0, 0, 4, 4)), none, none, ended, seconds)
         with np.load(out) as left:
             return Ran(left["goals"], left["ms"], left["wall_ms"], ended, seconds)
 

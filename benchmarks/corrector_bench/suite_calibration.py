@@ -7,7 +7,7 @@ from scipy.special import chdtri
 
 from apo_bench.correction.posterior import inside
 from apo_bench.geometry.arrays import Array
-from benchmarks.corrector_bench.draws import Draw, draw
+from benchmarks.corrector_bench.draws import Draw, draw, factors
 from benchmarks.corrector_bench.measures import free_basis, lengths, spread
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import FIGURES, Problem, problem
@@ -53,7 +53,7 @@ def _rows(name: str, per_part: bool, draws: int) -> list[Row]:
 
 def _across_m(of: Problem, given: Draw, goals: Array) -> float:
     """Distance from the truth across the free directions, root mean square over parts: what curvature leaves."""
-    Q, L = free_basis(of, given, goals), np.linalg.cholesky(given.covariance)
+    Q, L = free_basis(of, given, goals), factors(given.covariance)
     off = lengths(given, given.truth) - lengths(given, goals)
     twist = L @ (off - Q @ (Q.T @ off)).reshape(-1, 6, 1)
     return float(np.sqrt(np.mean(np.sum(twist[:, :3, 0] ** 2, axis=1))))
