@@ -24,7 +24,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 
-CONTACT_M = 1e-5
+CONTACT_M = 1e-6
 """Stated standard deviation of a contact, as tuned for `least-squares`, which has the same cost."""
 TOLERANCE, TURNS = 1e-12, 100
 TURN_FIRST = np.array([3, 4, 5, 0, 1, 2])

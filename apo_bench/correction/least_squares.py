@@ -2,8 +2,8 @@
 
 The cost is  sum (e / CONTACT_M)^2 + sum |z_k|^2,  with e of every contact ever made and z_k = L_k^-1 xi_k, the twist
 of goal k in units of its stated covariance L_k L_k^t. It is minimised by `scipy.optimize.least_squares`: trust region
-reflective (Branch, Coleman and Li, 1999), analytic Jacobian, dense, begun at what was seen, until steps, cost and
-gradient change by less than 1e-12 relative. As contacts are soft they hold within about
+reflective (Branch, Coleman and Li, 1999), analytic Jacobian, dense, begun at what was seen, until steps, cost or
+gradient are below 1e-12, or after `EVALUATIONS`. As contacts are soft they hold within about
 CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of operations: matrices are dense.
 """
 
@@ -17,7 +17,7 @@ from apo_bench.correction.whitened import whitened
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 
-CONTACT_M = 1e-5
+CONTACT_M = 1e-6
 """Stated standard deviation of a contact, tuned by `python benchmarks/tune.py`."""
 TOLERANCE = 1e-12
 EVALUATIONS = 300

@@ -28,7 +28,7 @@ from apo_bench.program import Correction, Observation
 CONTACT_M = 1e-4
 """Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`."""
 STEPS = 600
-LENGTH = 0.1
+LENGTH = 0.2
 """Step of Adam at the beginning, in standard deviations, tuned likewise."""
 MEAN, SQUARE, TINY = 0.9, 0.999, 1e-8
 """Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
