@@ -84,7 +84,7 @@ def solve(
                 gap = worse(gap, abs(e[i]))
                 if not soft or soft_m[i] == 0.0:
                     gap2 += e[i] * e[i]
-            finite[o] = math.isfinite(mean + total)
+            finite[o] = abs(mean + total) < math.inf
             if finite[o]:
                 mean = max(mean, smallest)
                 mu = max(damp * min(min(gap2 / (m * mean), 1.0), fall**turn), floor) * mean

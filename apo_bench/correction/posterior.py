@@ -71,7 +71,7 @@ def rank(Jt: Any) -> int:
 
 def marginals(found: Nearest, free: Array) -> Array:
     """The posterior covariance of the body twist of each corrected goal, (n, 6, 6), [m, rad]."""
-    spread = found.B @ free.reshape(len(found.B), 6, -1)
+    spread = found.B @ free.reshape(len(found.B), 6, free.shape[1])
     return np.asarray(spread @ np.swapaxes(spread, 1, 2))
 
 
