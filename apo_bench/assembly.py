@@ -50,6 +50,12 @@ class Gap(NamedTuple):
     """Of `clearance`: the least distance, negative for overlap; None stands for all the play there is."""
     high_m: float | None = None
 
+    def __str__(self) -> str:
+        """`centred`, `clearance`, `clearance from -0.2 to 0.3 mm`."""
+        if self.low_m is None or self.high_m is None:
+            return self.kind
+        return f"{self.kind} from {1e3 * self.low_m:g} to {1e3 * self.high_m:g} mm"
+
     def interval(self, play_m: float) -> tuple[float, float]:
         """Least and greatest distance along the normal, [m], of parts with this play per side."""
         if self.kind == "centred":

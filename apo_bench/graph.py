@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly import ODL, Assembly, Contact, Relation, inverted, simplified, spelled
+from apo_bench.assembly import ODL, Assembly, Contact, Gap, Relation, inverted, simplified, spelled
 from apo_bench.correction.equations import equations, largest
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -52,14 +52,20 @@ class Arc:
     """The operation that made them, counted from 0."""
     lost: int | None
     """The operation at which they disappeared, or None while they stand."""
+    asked: tuple[Gap, ...] = ()
+    """How far apart the faces of each contact are asked to be; empty stands for `centred` throughout."""
 
     def __str__(self) -> str:
         return f"{self.name} {self.manipulated.part} -> {self.environment.part}"
 
     @property
     def pairs(self) -> tuple[str, ...]:
-        """The faces that touch, manipulated first: `nz-top`."""
-        return tuple(f"{contact.manipulated.face}-{contact.environment.face}" for contact in self.contacts)
+        """The faces that touch, manipulated first: `nz-top`; with what is asked of them, if that is not `centred`."""
+        asked = self.asked or (Gap(),) * len(self.contacts)
+        return tuple(
+            f"{contact.manipulated.face}-{contact.environment.face}{'' if gap == Gap() else f' ({gap})'}"
+            for contact, gap in zip(self.contacts, asked, strict=True)
+        )
 
     @property
     def operations(self) -> frozenset[int]:
@@ -144,7 +150,9 @@ def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]
     for i, ((made, a, b), relations) in enumerate(together.items(), start=1):
         lost = relations[0].lost
         nodes = history[-1 if lost is None else made + 1]
-        arcs.append(Arc(f"R{i}", nodes[a], nodes[b], tuple(r.contact for r in relations), made, lost))
+        contacts = tuple(r.contact for r in relations)
+        asked = tuple(assembly.gaps.get(contact, Gap()) for contact in contacts)
+        arcs.append(Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, asked))
     return tuple(arcs)
 
 

@@ -119,7 +119,7 @@ def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Po
     now, origin = plan.start, dict[int, Array]()
     for (k, undo), target in zip(plan.schedule, plan.targets, strict=True):
         operation, before = plan.assembly.operations[k], now
-        alone = Assembly(plan.assembly.solids, (operation,), plan.assembly.fixed)
+        alone = replace(plan.assembly, operations=(operation,))
         if undo:
             (now,) = placed(alone, before, origin[k][None])
             continue

@@ -9,7 +9,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Operation, PartFace
+from apo_bench.assembly import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -17,6 +17,7 @@ from apo_bench.geometry.solid import Solid
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.mjcf import NAME
 from apo_bench.scenario import Attach, Grasp, Shift
+from apo_bench.scenario_contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
 from apo_bench.strict_json import Node
 
@@ -46,6 +47,7 @@ class Entry(NamedTuple):
     """One entry of [[operations]]."""
 
     operation: Operation
+    asked: Asked
     goal: Array
     """(4, 4), frame of the assembly, [m]."""
     attach: Attach
@@ -107,6 +109,7 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
     for k, each in enumerate(nodes):
         entry = _entry(each, k, parts, poses, there)
         entries.append(entry)
+        check_kinds(each.child(None, "contacts"), [earlier.asked for earlier in entries])
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
@@ -125,9 +128,13 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
         if name not in there:
             refuse(keys["carries"], f"'{name}' is carried before any operation has moved it; move it first")
     goal = read_pose(keys["goal"])
-    contacts = _contacts(keys["contacts"], main, carries, parts, there)
+    solids = {name: part.solid for name, part in parts.items()}
+    asked = read_contacts(_items(keys["contacts"], "contact"), main, carries, solids, there)
+    if not asked:
+        refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
     return Entry(
-        Operation(main, contacts, carries),
+        Operation(main, tuple(asked), carries),
+        asked,
         goal,
         _attach(keys.get("attach"), goal),
         _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
@@ -147,45 +154,6 @@ def _movable(node: Node, parts: Mapping[str, Part]) -> str:
     if parts[name].fixed:
         refuse(node, f"'{name}' is fixed and cannot be moved; move another part, or take fixed = true away")
     return name
-
-
-def _contacts(
-    node: Node, main: str, carries: tuple[str, ...], parts: Mapping[str, Part], there: set[str]
-) -> tuple[Contact, ...]:
-    found: list[Contact] = []
-    for pair in _items(node, "contact"):
-        if not isinstance(pair.value, list) or len(pair.value) != 2:
-            pair.fail('a pair is needed, such as ["bottom", "table.top"]')
-        above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
-        contact = Contact(_face(above, main, parts), _face(below, None, parts))
-        if contact.manipulated.part not in (main, *carries):
-            refuse(above, f"'{contact.manipulated.part}' does not move here; name a face of '{main}' or a carried part")
-        if contact.environment.part in (main, *carries):
-            refuse(below, f"'{contact.environment.part}' moves in this operation; name a face of a part that rests")
-        if contact.environment.part not in there:
-            refuse(
-                below, f"'{contact.environment.part}' is not there yet; name a fixed part or one that was moved before"
-            )
-        if contact in found:
-            refuse(pair, f"'{contact}' stands here twice; keep one")
-        found.append(contact)
-    if not found:
-        refuse(node, 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
-    return tuple(found)
-
-
-def _face(node: Node, main: str | None, parts: Mapping[str, Part]) -> PartFace:
-    """`part.face`, or a face of the main part."""
-    text = node.text()
-    name, dot, face = text.rpartition(".")
-    if not dot and main is None:
-        node.fail("a face as 'part.face' is needed")
-    part = name if dot or main is None else main
-    if part not in parts:
-        refuse_name(node, "part", part, parts)
-    if face not in parts[part].solid.faces:
-        refuse_name(node, f"face of part '{part}'", face, parts[part].solid.faces)
-    return PartFace(part, face)
 
 
 def _attach(node: Node | None, goal: Array) -> Attach:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import InputError, unknown
 from apo_bench.resources import folder
 from apo_bench.scenario import Carelessness, Scenario, Site
@@ -112,6 +112,7 @@ def _scenario(root: Node, path: Path) -> Scenario:
         {name: part.solid for name, part in parts.items()},
         tuple(entry.operation for entry in entries),
         frozenset(name for name, part in parts.items() if part.fixed),
+        {contact: gap for entry in entries for contact, gap in entry.asked.items() if gap != Gap()},
     )
     for name in parts:
         if name not in assembly.fixed and not any(name in operation.moves for operation in assembly.operations):

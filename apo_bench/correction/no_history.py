@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,7 +62,7 @@ def _end(assembly: Assembly, parts: tuple[str, ...]) -> Assembly:
     """Every moved part put where it stands by an operation of its own; the last one finds all contacts that stand."""
     standing = tuple(relation.contact for relation in assembly.relations() if relation.lost is None)
     operations = tuple(Operation(part, standing if part == parts[-1] else ()) for part in parts)
-    return Assembly(assembly.solids, operations, assembly.fixed)
+    return replace(assembly, operations=operations)
 
 
 def _main(assembly: Assembly, last: Mapping[str, int], free: tuple[int, ...]) -> dict[int, int]:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, PartFace
+from apo_bench.assembly import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -158,7 +158,8 @@ class Shifted:
         instead = Contact(contact.manipulated, PartFace(part, new.name))
         solids = {**assembly.solids, part: replace(solid, faces={**solid.faces, new.name: new})}
         contacts = tuple(instead if c == contact else c for c in assembly.operations[k].contacts)
-        return _with(replace(assembly, solids=solids), k, contacts)
+        gaps = {**assembly.gaps, instead: assembly.gaps.get(contact, Gap())}
+        return _with(replace(assembly, solids=solids, gaps=gaps), k, contacts)
 
 
 class _Pair(NamedTuple):
