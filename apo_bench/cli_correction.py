@@ -10,8 +10,11 @@ import typer
 
 from apo_bench.arguments import check_writable
 from apo_bench.errors import InputError
+from apo_bench.program import Correction, Observation, Plan
 
 NO_RESULT = 1
+EXACT_M = 1e-9
+"""Contacts that hold this well are a solution, at which a rank can be read off."""
 DOUBTS = ("apply", "warn", "refuse", "drop")
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
@@ -102,10 +105,9 @@ def correct(
             lines.append(("noise", f"{_stated(deviation_mm, deviation_deg)}, assumed where the file states none"))
         width = max(len(name) for name, _ in lines)
         typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in lines))
-        doubted = made.test is not None and made.test.suspects
-        _print_tables(
-            [*([pose_table(seen, made)] if made.ok else []), *([suspect_table(made.test)] if doubted else [])]
-        )
+        _print_tables([pose_table(seen, made)] if made.ok else [])
+        if made.test is not None and made.test.suspects:
+            _print_tables([suspect_table(made.test)])
     if not made.ok:
         if out is not None:
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
@@ -116,11 +118,7 @@ def correct(
             typer.echo(f"Wrote {out}")
 
 
-EXACT_M = 1e-9
-"""Contacts that hold this well are a solution, at which a rank can be read off."""
-
-
-def _explained(seen: Any, made: Any) -> Any:
+def _explained(seen: Observation, made: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
     from apo_bench.correction.explain import explain as explained
     from apo_bench.correction.posterior import LARGE
@@ -143,10 +141,9 @@ def _corrector(method: str, doubt: str | None) -> Any:
     return method
 
 
-def _write(out: Path, scenario: str, name: str, seen: Any, made: Any) -> None:
+def _write(out: Path, scenario: str, name: str, seen: Observation, made: Correction) -> None:
     from apo_bench.csv_observation import table
     from apo_bench.files import plan_form, write_form
-    from apo_bench.program import Plan
 
     targets = {} if made.targets is None else {"targets": made.targets}
     plan = Plan(seen.assembly, seen.start, made.goals, made.schedule, **targets)

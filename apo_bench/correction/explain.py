@@ -11,18 +11,17 @@ as it was seen, or less where several parts that must move together were seen.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
 from apo_bench.assembly import ODL, Assembly, Operation
-from apo_bench.correction.compact import compact
-from apo_bench.correction.problem import scales
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.equations import equations
 from apo_bench.correction.holding import Hold, by_relation, holds
+from apo_bench.correction.manifold import nearest
 from apo_bench.correction.posterior import LARGE, Freedom, freedom
+from apo_bench.correction.problem import problem
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -113,7 +112,7 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
 
     Args:
         goals: (n, 4, 4), consistent with every contact, such as corrected goals, world frame, [m].
-        dropped: Relations, R1, R2, .., that are left out.
+        dropped: Relations, R1, R2, .., that are left out; so are walls, which leave a part free between them.
 
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
@@ -121,12 +120,11 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
     n, assembly = len(goals), seen.assembly
     if 6 * n > LARGE:
         raise InputError(f"{n} operations were given; up to {LARGE // 6} can be explained, so take fewer of them.")
-    system = compact(equations(assembly, seen.start, goals), n)
-    B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ scales(seen.covariance)
-    Jt = system.gathered(system.blocks(goals, B)[1])
-    every = holds(assembly)
-    without = {i for i, hold in enumerate(every) if hold.relation in dropped}
-    relations = by_relation(assembly, system, Jt, without)
+    asked = problem(replace(seen, goals=goals), nearest)
+    kept = asked.exact & asked.without(tuple(dropped))
+    B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ asked.L
+    Jt = asked.compact.gathered(asked.compact.blocks(goals, B)[1])
+    every, relations = holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
     known = freedom(relations.Jt)
     assert known is not None
     spread = (B @ known.free.reshape(n, 6, known.free.shape[1])).reshape(known.free.shape)
@@ -155,7 +153,7 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
         parts=_standing(assembly, seen.start, goals, B, known.free),
         rank=known.rank,
         freedom=known.free.shape[1],
-        redundant=known.redundant - 3 * sum(len(relations.arcs[i]) for i in without),
+        redundant=known.redundant - 3 * int(np.count_nonzero(~kept)),
         spectral_gap=known.spectral_gap,
     )
 
@@ -211,7 +209,7 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Ar
 def _rooted(assembly: Assembly) -> dict[str, ODL]:
     """The ODL of every part at the end, in which one operation per part that puts it at its start comes first."""
     starts = map(Operation, assembly.solids)
-    return dict(Assembly(assembly.solids, (*starts, *assembly.operations), assembly.fixed).odls()[-1])
+    return dict(replace(assembly, operations=(*starts, *assembly.operations)).odls()[-1])
 
 
 def _reach(word: ODL, stack: Array, constants: int, B: Array) -> Array:

@@ -7,11 +7,12 @@ irreducible: without any one of them the part would be freer.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly import ODL, Assembly, inverted, simplified
 from apo_bench.correction.compact import Compact
@@ -98,13 +99,13 @@ class Relations:
         return self.Jt[[6 * j + i for j in operations for i in range(6)]]
 
 
-def by_relation(assembly: Assembly, system: Compact, Jt: Array, dropped: Collection[int] = ()) -> Relations:
-    """Group the equations of all contacts, in the order of `assembly.relations()`; those `dropped` say nothing."""
-    kept = np.ones(len(system), dtype=np.bool_)
+def by_relation(assembly: Assembly, system: Compact, Jt: Array, kept: NDArray[np.bool_]) -> Relations:
+    """Group the equations of all contacts, in the order of `assembly.relations()`; those not `kept`, (c,), are void."""
     arcs = assembly.arcs()
-    operations = [frozenset(int(j) for j in system.columns[list(arc)].ravel() if j < system.n) for arc in arcs]
-    for i in dropped:
-        kept[list(arcs[i])], operations[i] = False, frozenset()
+    operations = []
+    for arc in arcs:
+        said = [i for i in arc if kept[i]]
+        operations.append(frozenset(int(j) for j in system.columns[said].ravel() if j < system.n))
     return Relations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, tuple(operations))
 
 

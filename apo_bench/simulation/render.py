@@ -6,7 +6,7 @@ import importlib
 import os
 import sys
 import weakref
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +32,15 @@ def picture(
     width: int = 640,
     height: int = 480,
     camera: Camera = "overview",
+    more: Callable[[Any], None] | None = None,
 ) -> Image:
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
 
     Args:
         camera: `overview`, `close`, `top`, or a `view`.
+        more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
-    return _drawn(scene.shown, _at(scene.shown, scene, poses), width, height, camera)
+    return _drawn(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
 
 
 def picture_with_arm(
@@ -167,9 +169,13 @@ class Viewer:
             self._window = None
 
 
-def _drawn(world: World, data: Any, width: int, height: int, camera: Camera) -> Image:
+def _drawn(
+    world: World, data: Any, width: int, height: int, camera: Camera, more: Callable[[Any], None] | None = None
+) -> Image:
     with _renderer(world.model, width, height) as renderer:
         renderer.update_scene(data, camera=camera)
+        if more is not None:
+            more(renderer.scene)
         return np.array(renderer.render())
 
 
