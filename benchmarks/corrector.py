@@ -24,7 +24,15 @@ from benchmarks.corrector_bench.part import part
 from benchmarks.corrector_bench.rows import Row, printed, written
 
 OUT = Path(__file__).resolve().parent / "results" / "corrector.json"
-APART = {"freedom": 300.0, "walls": 600.0, "batches": 300.0, "scale": 300.0, "wrong": 600.0, "calibration": 900.0}
+APART = {
+    "freedom": 300.0,
+    "edges": 300.0,
+    "walls": 600.0,
+    "batches": 300.0,
+    "scale": 300.0,
+    "wrong": 600.0,
+    "calibration": 900.0,
+}
 """Suites that run in one process each, and their limits in seconds."""
 SUITES = ("quality", "speed", *APART)
 PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam")

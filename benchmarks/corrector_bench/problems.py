@@ -107,20 +107,22 @@ def fig6() -> Problem:
 
 def chain(castles: int) -> Problem:
     """A line of castles, a stick between each two neighbours (28 K - 24 rows, n = 6 (2 K - 1), rank 10 K - 7)."""
+    assembly, goals = lined_up(castles)
+    n = len(assembly)
+    slides = _slides(n, [{k: X} for k in range(1, n)])
+    return Problem(f"chain{castles}", assembly, _start(assembly), goals, tuple(range(n)), slides)
+
+
+def lined_up(castles: int) -> tuple[Assembly, Array]:
+    """The assembly of a chain and its goals, (2 K - 1, 4, 4): first all castles, then all sticks."""
     castle, stick, table = load_part("castle"), load_part("stick"), load_part("table")
-    operations, goals = list[Operation](), list[Array]()
-    for k in range(castles):
-        operations.append(_standing(f"castle{k}"))
-        goals.append(pose.at([k * PITCH_M, 0, 0]))
-    for k in range(castles - 1):
-        operations.append(_lying(f"stick{k}", [f"castle{k}", f"castle{k + 1}"]))
-        goals.append(pose.at([(k + 0.5) * PITCH_M, 0, 0.04]))
+    operations = [_standing(f"castle{k}") for k in range(castles)]
+    operations += [_lying(f"stick{k}", [f"castle{k}", f"castle{k + 1}"]) for k in range(castles - 1)]
+    goals = [pose.at([k * PITCH_M, 0, 0]) for k in range(castles)]
+    goals += [pose.at([(k + 0.5) * PITCH_M, 0, 0.04]) for k in range(castles - 1)]
     solids = {"table": table}
     solids |= {op.main: castle if op.main.startswith("castle") else stick for op in operations}
-    assembly = Assembly(solids, tuple(operations), frozenset({"table"}))
-    n = len(operations)
-    slides = _slides(n, [{k: X} for k in range(1, n)])
-    return Problem(f"chain{castles}", assembly, _start(assembly), np.array(goals), tuple(range(n)), slides)
+    return Assembly(solids, tuple(operations), frozenset({"table"})), np.array(goals)
 
 
 def grid(side: int) -> Problem:

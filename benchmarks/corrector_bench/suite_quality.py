@@ -59,7 +59,7 @@ def _rows(name: str, level: str, found: Judged, small: bool) -> list[Row]:
     where = f"{name} {level}"
     residual = np.array([each.residual_mm for each in q])
     drift = np.array([each.drift for each in q])
-    known = found.excess[np.isfinite(found.excess)]
+    known = found.excess[~np.isnan(found.excess)]
     bound = 1e-9 if name in FIGURES else 1e-6
     bad = np.array([each.overlong or not each.residual_mm <= bound for each in q])
     worst = {"draws": len(q), "ended": found.ran.ended}
