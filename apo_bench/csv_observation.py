@@ -4,7 +4,8 @@
 
 The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad`. The order of the columns is free,
 that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
-about each axis of the part (then those that are assumed), and whether the operation was seen (then it was).
+about each axis of the part (then those that are assumed), and whether the operation was seen (then it was). One more
+column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ _LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
 COLUMNS: Mapping[str, tuple[str, float]] = {
     **{name: (name, 1.0) for name in ("operation", "part", *QUATERNION, "seen")},
     **{f"{name}_{unit}": (name, size) for name in POSITION for unit, size in _LENGTHS.items()},
-    **{f"deviation_{unit}": ("deviation", size) for unit, size in _LENGTHS.items()},
+    **{f"{name}_{unit}": (name, size) for name in ("deviation", "play") for unit, size in _LENGTHS.items()},
     **{f"deviation_{unit}": ("turn deviation", size) for unit, size in _ANGLES.items()},
 }
 """What a column stands for, and its unit in m or rad."""
@@ -95,7 +96,7 @@ def read_table(
 ) -> tuple[Observation, bool]:
     """An observation from a CSV file, and whether a standard deviation had to be assumed.
 
-    Parts start where those of the scenario do, and have its clearance.
+    Parts start where those of the scenario do.
 
     Raises:
         InputError: Anything in the file that is not as described, naming line and column.
@@ -125,7 +126,7 @@ def read_table(
         ),
         seen=np.array([_flag(row) for row in ordered], dtype=np.bool_),
         gap_m=scenario.gap_mm * 1e-3,
-        play_m=scenario.clearance_mm * 1e-3,
+        play_m=_play(ordered, scenario.clearance_mm * 1e-3),
     )
     return seen, not stated
 
@@ -230,6 +231,17 @@ def _pose(row: _Row) -> Array:
             f"one of length {np.linalg.norm(q):.4g} was given; divide it by its length."
         )
     return pose.unpack(np.array([*position, *q]))
+
+
+def _play(rows: Sequence[_Row], assumed: float) -> float:
+    """The play of parts that fit, [m], which is one number for all rows."""
+    stated = [(row, row.number("play", LARGEST_M)) for row in rows if row.text("play")]
+    for row, x in stated:
+        if x < 0.0:
+            row.fail("play", "a length from 0 is needed")
+        if x != stated[0][1]:
+            row.fail("play", f"one length for all rows is needed, line {stated[0][0].line} says another")
+    return stated[0][1] if stated else assumed
 
 
 def _flag(row: _Row) -> bool:

@@ -55,6 +55,7 @@ def observation_form(seen: Observation, scenario: str) -> Form:
     return {
         **_head(OBSERVATION, scenario, seen.start),
         "gap_mm": seen.gap_m * 1e3,
+        "play_mm": seen.play_m * 1e3,
         "operations": _operations_form(seen.assembly, seen.goals, extra),
     }
 
@@ -99,9 +100,9 @@ def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> De
 def read_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
     """An observation from its file, measured or written by `write_form`.
 
-    `start` (default: the scenario's), `gap_mm` (default: the scenario's) and `seen` (default: true) may be left
-    out. Instead of `covariance_mm_deg`, `deviation_mm` and `deviation_deg` state one standard deviation for the
-    three directions and one for the three turns.
+    `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`) and `seen`
+    (default: true) may be left out. Instead of `covariance_mm_deg`, `deviation_mm` and `deviation_deg` state one
+    standard deviation for the three directions and one for the three turns.
 
     Args:
         scenario: The scenario the file must be of; by default the one it names, where a relative path to a
@@ -110,7 +111,7 @@ def read_observation(path: str | Path, scenario: Scenario | None = None) -> Obse
     Raises:
         InputError: Anything in the file that is not as described, naming file and key.
     """
-    root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm"))
+    root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm", "play_mm"))
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], found.assembly, (), stated)
@@ -121,6 +122,7 @@ def read_observation(path: str | Path, scenario: Scenario | None = None) -> Obse
         covariance=np.array([_stated(entry) for entry in entries]),
         seen=np.array([entry["seen"].flag() if "seen" in entry else True for entry in entries]),
         gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else found.gap_mm * 1e-3,
+        play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import radians
 from pathlib import Path
 from typing import NamedTuple
@@ -59,8 +58,7 @@ def observed(
     check_deviations(deviation_mm, deviation_deg)
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
-        seen = files.read_observation(path, known)
-        return Observed(replace(seen, play_m=known.clearance_mm * 1e-3), known, False)
+        return Observed(files.read_observation(path, known), known, False)
     seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
     return Observed(seen, known, assumed)
 

@@ -36,6 +36,7 @@ def observation(seed: int = 0) -> Observation:
         covariance=A @ np.swapaxes(A, 1, 2) + 1e-8 * np.eye(6),
         seen=rng.random(N) < 0.7,
         gap_m=float(rng.uniform(1e-5, 1e-3)),
+        play_m=float(rng.uniform(0.0, 1e-3)),
     )
 
 
@@ -58,6 +59,7 @@ def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
     np.testing.assert_allclose(back.covariance, seen.covariance, rtol=1e-12, atol=0)
     assert back.seen.tolist() == seen.seen.tolist()
     assert back.gap_m == pytest.approx(seen.gap_m, rel=1e-12)
+    assert back.play_m == pytest.approx(seen.play_m, rel=1e-12)
     assert set(back.start) == set(seen.start)
     for part, T in seen.start.items():
         np.testing.assert_allclose(back.start[part], T, rtol=0, atol=1e-13)
@@ -244,6 +246,7 @@ BROKEN = {
     "a part without start": (_drop("start", "stick"), "'stick' is missing"),
     "start is a list": (_set("start", to=[]), "start"),
     "no gap": (_set("gap_mm", to=0), "gap_mm: a finite number above 0"),
+    "negative play": (_set("play_mm", to=-0.1), "play_mm: a finite number from 0"),
 }
 
 
