@@ -38,10 +38,13 @@ LARGEST_M = 1e4
 POSITION, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
 COLUMNS: Mapping[str, tuple[str, float]] = {
-    **{name: (name, 1.0) for name in ("operation", "part", *QUATERNION, "seen")},
+    **{name: (name, 1.0) for name in ("operation", "part")},
     **{f"{name}_{unit}": (name, size) for name in POSITION for unit, size in _LENGTHS.items()},
-    **{f"{name}_{unit}": (name, size) for name in ("deviation", "play") for unit, size in _LENGTHS.items()},
+    **{name: (name, 1.0) for name in QUATERNION},
+    **{f"deviation_{unit}": ("deviation", size) for unit, size in _LENGTHS.items()},
     **{f"deviation_{unit}": ("turn deviation", size) for unit, size in _ANGLES.items()},
+    "seen": ("seen", 1.0),
+    **{f"play_{unit}": ("play", size) for unit, size in _LENGTHS.items()},
 }
 """What a column stands for, and its unit in m or rad."""
 REQUIRED = ("operation", "part", *POSITION, *QUATERNION)
@@ -188,7 +191,8 @@ def _header(file: str, names: Sequence[str]) -> list[str]:
     taken = dict[str, str]()
     for column in found:
         if column not in COLUMNS:
-            near = get_close_matches(column, COLUMNS, n=1, cutoff=0.3)
+            longer = [name for name in COLUMNS if column and name.startswith(f"{column}_")]
+            near = longer or get_close_matches(column, COLUMNS, n=1, cutoff=0.3)
             hint = f"did you mean '{near[0]}'? Allowed are" if near else "allowed are"
             raise InputError(f"{file}, line 1: unknown column '{column[:40]}'; {hint} {_shown()}.")
         meaning = COLUMNS[column][0]
