@@ -1,0 +1,105 @@
+"""The exponential as a matrix polynomial and its derivative: against the closed form, differences and the series."""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import GENERATORS, exp_and_jacobian, right_jacobian
+
+SEEDS = st.integers(0, 10**6)
+ANGLES = st.one_of(st.floats(0.0, 6.0), st.floats(-12, -1).map(lambda power: 10.0**power), st.just(np.pi))
+
+
+def twist(seed: int, angle: float) -> Array:
+    """A twist of this angle, any axis, half a metre long at most."""
+    rng = np.random.default_rng(seed)
+    axis = rng.standard_normal(3)
+    return np.concatenate([rng.uniform(-0.3, 0.3, 3), angle * axis / np.linalg.norm(axis)])
+
+
+def ad(xi: Array) -> Array:
+    """The matrix of [xi, .], written down from the Lie bracket."""
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = pose.hat(xi[3:])
+    out[:3, 3:] = pose.hat(xi[:3])
+    return out
+
+
+def adjoint(T: Array) -> Array:
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = T[:3, :3]
+    out[:3, 3:] = pose.hat(T[:3, 3]) @ T[:3, :3]
+    return out
+
+
+@given(SEEDS, ANGLES)
+@settings(max_examples=100, deadline=None)
+def test_the_exponential_is_that_of_poses(seed: int, angle: float) -> None:
+    xi = twist(seed, angle)
+    assert_allclose(exp_and_jacobian(xi)[0], pose.exp(xi), rtol=0, atol=1e-13)
+
+
+@given(SEEDS, ANGLES)
+@settings(max_examples=50, deadline=None)
+def test_the_jacobian_is_its_power_series(seed: int, angle: float) -> None:
+    xi = twist(seed, angle)
+    minus, power, series = -ad(xi), np.eye(6), np.zeros((6, 6))
+    for k in range(60):
+        series, power = series + power / factorial(k + 1), power @ minus
+    assert_allclose(right_jacobian(xi), series, rtol=0, atol=1e-12)
+
+
+@given(SEEDS, st.floats(0.0, 2.5))
+@settings(max_examples=50, deadline=None)
+def test_the_jacobian_is_the_difference_of_exponentials(seed: int, angle: float) -> None:
+    xi, by = twist(seed, angle), 1e-6
+    back = pose.inverse(pose.exp(xi))
+    sides = [pose.log(back @ pose.exp(xi + sign * by * np.eye(6))) for sign in (1.0, -1.0)]
+    assert_allclose(right_jacobian(xi), (sides[0] - sides[1]).T / (2 * by), rtol=0, atol=1e-8)
+
+
+@given(SEEDS, ANGLES)
+@settings(max_examples=50, deadline=None)
+def test_left_and_right_differ_by_the_adjoint(seed: int, angle: float) -> None:
+    xi = twist(seed, angle)
+    T, right = exp_and_jacobian(xi)
+    assert_allclose(right_jacobian(-xi), adjoint(T) @ right, rtol=0, atol=1e-12)
+
+
+def test_no_twist_is_exactly_nothing() -> None:
+    T, J = exp_and_jacobian(np.zeros((3, 6)))
+    assert_array_equal(T, np.tile(np.eye(4), (3, 1, 1)))
+    assert_array_equal(J, np.tile(np.eye(6), (3, 1, 1)))
+
+
+def test_a_shift_is_exactly_a_shift() -> None:
+    T, J = exp_and_jacobian(np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.0]))
+    assert_array_equal(T[:3, :3], np.eye(3))
+    assert_array_equal(T[:3, 3], [0.1, -0.2, 0.3])
+    assert_array_equal(J[:3, :3], np.eye(3))
+    assert_allclose(J[:3, 3:], -pose.hat(np.array([0.1, -0.2, 0.3])) / 2, rtol=0, atol=1e-17)
+
+
+@pytest.mark.parametrize("lead", [(), (1,), (4,), (2, 3), (3, 1, 2, 1), (0,)])
+def test_leading_axes_are_single_calls(lead: tuple[int, ...]) -> None:
+    xi = np.random.default_rng(0).standard_normal((*lead, 6))
+    T, J = exp_and_jacobian(xi)
+    assert (T.shape, J.shape) == ((*lead, 4, 4), (*lead, 6, 6))
+    for at in np.ndindex(lead):
+        one = exp_and_jacobian(xi[at])
+        assert_allclose(T[at], one[0], rtol=0, atol=1e-14)
+        assert_allclose(J[at], one[1], rtol=0, atol=1e-14)
+
+
+def test_generators_are_the_derivatives_of_the_exponential() -> None:
+    by = 1e-6
+    numeric = [(pose.exp(by * unit) - pose.exp(-by * unit)) / (2 * by) for unit in np.eye(6)]
+    assert_allclose(GENERATORS, numeric, rtol=0, atol=1e-9)
