@@ -1,4 +1,4 @@
-"""Success over level: a panel per scenario, clearance, noise, relations and carelessness, a line per method."""
+"""Success over level: panels by scenario, clearance and noise, and by relations and carelessness; a line per method."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ MANY = 3
 
 
 class Row(NamedTuple):
-    """What the panels of one row of the figure have in common."""
+    """What the panels of one scenario have in common, whatever the carelessness."""
 
     scenario: str
-    clearance_mm: float
+    clearance_mm: float | None
+    """None stands for every one."""
     noise: str
     relations: str
 
     def holds(self, c: Cell) -> bool:
         """Whether a cell is drawn here: the oracle meets no noise, and it and `none` are not told any relations."""
-        where = (c.scenario, c.clearance_mm) == (self.scenario, self.clearance_mm)
+        where = c.scenario == self.scenario and self.clearance_mm in (None, c.clearance_mm)
         noise = c.method == "oracle" or c.noise == self.noise
         return where and noise and (c.method in ("oracle", "none") or c.relations == self.relations)
 
@@ -34,7 +35,8 @@ class Row(NamedTuple):
         human = "careful human" if careless == 0 else f"carelessness {careless:g}"
         unusual = [f"{self.noise} noise"] * (self.noise != "isotropic")
         unusual += [f"relations {self.relations}"] * (self.relations != "given")
-        first = f"{self.scenario}, {human}, {self.clearance_mm:g} mm clearance"
+        clearance = "" if self.clearance_mm is None else f", {self.clearance_mm:g} mm clearance"
+        first = f"{self.scenario}, {human}{clearance}"
         return "\n".join([first, ", ".join(unusual)]) if unusual else first
 
 
@@ -71,17 +73,22 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
     swept = [cell for cell in cells if cell.method != "oracle"]
     rows = rows_of(cells)
     careless = sorted({c.careless for c in swept}) or [0.0]
-    columns, lines = len(careless), len(rows)
-    figure = Figure(figsize=(0.9 + 4.3 * columns, 1.0 + 3.1 * lines), layout="constrained")
+    lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
+    columns = [(relations, f) for relations in dict.fromkeys(row.relations for row in rows) for f in careless]
+    figure = Figure(figsize=(0.9 + 4.3 * len(columns), 1.0 + 3.1 * len(lines)), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(lines, columns, squeeze=False, sharey=True)
-    for i, row in enumerate(rows):
-        for j, f in enumerate(careless):
+    axes = figure.subplots(len(lines), len(columns), squeeze=False, sharey=True)
+    for i, line in enumerate(lines):
+        for j, (relations, f) in enumerate(columns):
+            row = line._replace(relations=relations)
+            if row not in rows:
+                axes[i][j].set_axis_off()
+                continue
             axes[i][j].set_title(row.title(f), fontsize=10)
             _panel(axes[i][j], [c for c in cells if row.holds(c)], f)
         axes[i][0].set_ylabel("strict success")
     figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
-    legend(figure, axes, columns)
+    legend(figure, axes, len(columns))
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
 
@@ -93,7 +100,7 @@ def legend(figure: Any, axes: Any, columns: int) -> None:
 
 
 def rows_of(cells: Sequence[Cell]) -> list[Row]:
-    """The rows of panels, in the order of the cells; the cells of methods that meet everything decide."""
+    """What panels show, in the order of the cells; the cells of methods that meet everything decide."""
     keen = [c for c in cells if c.method not in ("oracle", "none")]
     fewer = keen or [c for c in cells if c.method == "none"] or list(cells)
     return list(dict.fromkeys(Row(c.scenario, c.clearance_mm, c.noise, c.relations) for c in fewer))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.figure import Row, legend, rows_of, styles
+from apo_bench.benchmark.figure import legend, rows_of, styles
 from apo_bench.benchmark.statistics import Cell
 
 DODGE = 1.03
@@ -20,30 +20,30 @@ def varies(cells: Sequence[Cell]) -> bool:
 
 
 def draw_tightness(cells: Sequence[Cell], path: Path) -> None:
-    """Write the figure as PNG: a panel per scenario, noise, relations and carelessness; a line per method and level."""
+    """Write the figure as PNG: panels as in the figure over level; a line per method and level."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     seen = [c for c in cells if c.method != "oracle" and c.tightness and c.rate is not None]
-    rows = {(row.scenario, row.noise, row.relations): row for row in rows_of(cells)}
+    rows = list(dict.fromkeys(row._replace(clearance_mm=None) for row in rows_of(cells)))
+    lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
     careless = sorted({c.careless for c in seen})
-    columns = max(1, len(careless))
-    figure = Figure(figsize=(0.9 + 4.3 * columns, 1.0 + 3.1 * len(rows)), layout="constrained")
+    columns = [(relations, f) for relations in dict.fromkeys(row.relations for row in rows) for f in careless]
+    figure = Figure(figsize=(0.9 + 4.3 * len(columns), 1.0 + 3.1 * len(lines)), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(rows), columns, squeeze=False, sharey=True)
-    for i, row in enumerate(rows.values()):
-        for j, f in enumerate(careless):
-            axes[i][j].set_title(row.title(f).replace(f", {row.clearance_mm:g} mm clearance", ""), fontsize=10)
-            _panel(axes[i][j], [c for c in seen if c.careless == f and _here(row, c)])
+    axes = figure.subplots(len(lines), len(columns), squeeze=False, sharey=True)
+    for i, line in enumerate(lines):
+        for j, (relations, f) in enumerate(columns):
+            row = line._replace(relations=relations)
+            if row not in rows:
+                axes[i][j].set_axis_off()
+                continue
+            axes[i][j].set_title(row.title(f), fontsize=10)
+            _panel(axes[i][j], [c for c in seen if c.careless == f and row.holds(c)])
         axes[i][0].set_ylabel("strict success")
     figure.supxlabel("tightness: clearance per side over level [mm per mm]", fontsize=10)
-    legend(figure, axes, columns)
+    legend(figure, axes, len(columns))
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
-
-
-def _here(row: Row, c: Cell) -> bool:
-    """Whether a cell belongs into the panels of a row, at whatever clearance."""
-    return row._replace(clearance_mm=c.clearance_mm).holds(c)
 
 
 def _panel(axis: Any, cells: Sequence[Cell]) -> None:
