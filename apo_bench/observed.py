@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.csv_observation import DEVIATION_DEG, DEVIATION_MM, read_table
+from apo_bench.csv_observation import DEVIATION_DEG, DEVIATION_MM, LARGEST_M, read_table
 from apo_bench.errors import InputError
 from apo_bench.layout import layout_at
 from apo_bench.program import Observation
@@ -58,7 +58,9 @@ def observed(
     check_deviations(deviation_mm, deviation_deg)
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
-        return Observed(files.read_observation(path, known), known, False)
+        seen = files.read_observation(path, known)
+        _check_near(path, seen)
+        return Observed(seen, known, False)
     seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
     return Observed(seen, known, assumed)
 
@@ -87,3 +89,13 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
     for name, given, largest in (("deviation_mm", deviation_mm, 1e6), ("deviation_deg", deviation_deg, 360.0)):
         if not 0.0 < given <= largest:
             raise InputError(f"{name} {given:g} was given; a number above 0 and at most {largest:g} is allowed.")
+
+
+def _check_near(path: str | Path, seen: Observation) -> None:
+    """Refuse poses so far away that nothing can be computed with them; a CSV file is checked cell by cell."""
+    for k, T in enumerate(seen.goals):
+        if np.abs(T[:3, 3]).max() > LARGEST_M:
+            raise InputError(
+                f"{path}, operation {k + 1}, position_mm: numbers of at most {LARGEST_M * 1e3:g} are needed, "
+                f"{np.abs(T[:3, 3]).max() * 1e3:g} was given."
+            )

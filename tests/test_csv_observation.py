@@ -80,6 +80,26 @@ def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
     assert all(again.start[part] == pytest.approx(T, abs=1e-15) for part, T in seen.start.items())
 
 
+def test_json_far_beyond_everything_is_refused(tmp_path: Path) -> None:
+    form = files.observation_form(observed(written(tmp_path, *ROWS), "stick_in_tower").observation, "stick_in_tower")
+    form["operations"][1]["position_mm"][2] = 1e200
+    path = tmp_path / "far.json"
+    files.write_form(form, path)
+    with pytest.raises(
+        InputError, match=r"operation 2, position_mm: numbers of at most 1e\+07 are needed, 1e\+200 was"
+    ):
+        apo_bench.read_observation(path, SCENARIO)
+
+
+@pytest.mark.parametrize("play", ["0.4", "0"])
+def test_play_is_one_number(tmp_path: Path, play: str) -> None:
+    stated = [f"{HEADER},play_mm", *(f"{row},{play if i else ''}" for i, row in enumerate(ROWS[1:]))]
+    assert read_table(written(tmp_path, *stated), SCENARIO)[0].play_m == pytest.approx(float(play) * 1e-3)
+    two = [f"{HEADER},play_mm", *(f"{row},0.{i}" for i, row in enumerate(ROWS[1:]))]
+    with pytest.raises(InputError, match="line 3, column play_mm: one length for all rows is needed, line 2 says"):
+        read_table(written(tmp_path, *two), SCENARIO)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

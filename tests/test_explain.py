@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly import Assembly, Gap
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.equations import equations
 from apo_bench.correction.explain import Explanation, explain
 from apo_bench.correction.newton import solve
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Observation
@@ -125,6 +126,35 @@ def test_without_contacts_everything_is_as_it_was_seen() -> None:
     for o in found.operations:
         assert [str(f.direction) for f in o.free] == ["x", "y", "z", "roll", "pitch", "yaw"]
         assert [f.deviation for f in o.free] == pytest.approx([2e-3] * 3 + [np.radians(2.0)] * 3)
+
+
+def test_walls_leave_a_part_free_between_them() -> None:
+    """With play at the sides of both slots, only floors and ceilings are left: the tower's z, roll and pitch."""
+    scenario = load_scenario("stick_in_tower")
+    sides = [c for c in scenario.assembly.operations[2].contacts if c.manipulated.face in ("py", "ny")]
+    gaps = {contact: Gap("clearance", -2e-4, 2e-4) for contact in sides}
+    loose = replace(scenario, assembly=replace(scenario.assembly, gaps=gaps))
+    found = explain(nominal(loose), loose.goals)
+    assert [o.fixed for o in found.operations] == [("z", "roll", "pitch")] * 3
+    assert (found.rank, found.freedom) == (9, 9)
+    assert found.rank + found.redundant == 3 * (len(scenario.assembly.relations()) - len(sides))
+
+
+def test_dropped_relations_hold_nothing() -> None:
+    seen, _ = explained("stick_in_tower")
+    found = explain(seen, seen.goals, ("R4",))
+    assert [o.fixed for o in found.operations][1] == ("z", "roll", "pitch")
+    assert "R4" not in {hold.relation for o in found.operations for hold in (*o.through, *o.agreeing)}
+    assert (found.rank, found.rank + found.redundant) == (11, 3 * (9 - 3))
+
+
+def test_too_many_operations_are_refused() -> None:
+    scenario = load_scenario("block_on_block")
+    n = 101
+    many = Assembly(scenario.assembly.solids, scenario.assembly.operations[:1] * n, scenario.assembly.fixed)
+    goals, covariance = np.tile(scenario.goals[0], (n, 1, 1)), np.tile(np.eye(6), (n, 1, 1))
+    with pytest.raises(InputError, match="101 operations were given; up to 100 can be explained"):
+        explain(Observation(many, scenario.start, goals, covariance, np.ones(n, bool)), goals)
 
 
 def test_no_operations_are_explained_too() -> None:
