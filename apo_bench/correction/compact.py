@@ -1,9 +1,9 @@
 """The contact equations in their smallest form: three per contact, whatever the number of vertices.
 
 The vertices of a face lie in a plane, so e, which is linear in them, is known everywhere once it is known at their
-centre, and how fast it grows along the two principal axes. Scaled by the square root of the number of vertices and by
-the singular values of the centred vertices, these three have the same sum of squares as e of all vertices. Nothing is
-lost, and the matrices are smaller by a quarter.
+centre, and how fast it grows along two directions. Scaled by the square root of the number of vertices, and with
+directions that have the same second moments as the centred vertices, these three have the same sum of squares as e of
+all vertices. Nothing is lost, and the matrices are smaller by a quarter.
 
 Every array may have leading axes: many observations of one assembly are linearised at once.
 """
@@ -23,6 +23,8 @@ from apo_bench.geometry.twist import GENERATORS
 
 _GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
 _ONE = np.eye(4)
+ROUNDING, SMALLEST = 1e-15, 1e-300
+"""Pivots of vertices on a line, as part of the mean square of their ways, and of vertices that coincide."""
 
 
 @final
@@ -65,7 +67,7 @@ class Compact:
     def residual(self, T: Array) -> Array:
         """e of every equation, (*, 3 c), at the goals T, (*, n, 4, 4), [m]."""
         e = self._behind(self._factors(T))[..., 0, :, :, :] @ self.plane[:, :, None]
-        return np.asarray(e.reshape(*e.shape[:-3], -1))
+        return np.asarray(e.reshape(*e.shape[:-3], 3 * len(self)))
 
     def blocks(self, T: Array, B: Array) -> tuple[Array, Array]:
         """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's goal, (*, c, w, 6, 3) (Eq. 14).
@@ -90,7 +92,7 @@ class Compact:
         padded = np.zeros((*B.shape[:-3], self.n + 1, 6, 6))
         padded[..., : self.n, :, :] = np.swapaxes(B, -1, -2)
         scaled = padded[..., self.columns, :, :] * np.where(self.inverse, -1.0, 1.0)[..., None, None]
-        return e.reshape(*e.shape[:-3], -1), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
+        return e.reshape(*e.shape[:-3], 3 * c), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
 
     def words(self, T: Array) -> Array:
         """D_a^-1 D_b of every contact, (*, c, 4, 4)."""
@@ -147,20 +149,31 @@ def moments(outlines: Sequence[Array]) -> Array:
 
 
 def _points(system: Equations) -> Array:
-    """Centre and principal axes of the vertices of each contact, (c, 3, 4), with the same moments."""
+    """The centre of the vertices of each contact and two directions, (c, 3, 4), with the same moments."""
     return _moments(system.vertex[:, :3], system.contact, len(system.letters))
 
 
 def _moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
-    """Of vertices (m, 3), those of one contact next to each other."""
-    count = np.bincount(contact, minlength=c)
-    center = np.column_stack([np.bincount(contact, vertex[:, i], c) for i in range(3)]) / np.maximum(count, 1)[:, None]
-    padded = np.zeros((c, max(3, int(count.max(initial=0))), 3))
-    number = np.arange(len(vertex)) - (np.cumsum(count) - count)[contact]
-    padded[contact, number] = vertex - center[contact]
-    _, size, axes = np.linalg.svd(padded, full_matrices=False)
+    """Of vertices (m, 3), those of one contact next to each other, each contact with some.
+
+    They lie in a plane, so the sum S of off off^t, over their ways off the centre, is a a^t + b b^t: two steps of a
+    Cholesky factorisation that takes the largest pivot first.
+    """
     points = np.zeros((c, 3, 4))
+    if not c:
+        return points
+    count = np.bincount(contact, minlength=c)
+    begin = np.cumsum(count) - count
+    center = np.add.reduceat(vertex, begin) / count[:, None]
+    off = vertex - center[contact]
+    S = np.add.reduceat(off[:, :, None] * off[:, None, :], begin)
     points[:, 0, :3], points[:, 0, 3] = center, 1.0
     points[:, 0] *= np.sqrt(count)[:, None]
-    points[:, 1:, :3] = axes[:, :2] * size[:, :2, None]
+    at, least = np.arange(c), ROUNDING * S.reshape(c, 9)[:, ::4].sum(axis=1) + SMALLEST
+    for k in (1, 2):
+        pivot = S.reshape(c, 9)[:, ::4].argmax(axis=1)
+        a = S[at, pivot]
+        a /= np.sqrt(np.maximum(a[at, pivot], least))[:, None]
+        points[:, k, :3] = a
+        S -= a[:, :, None] * a[:, None, :]
     return points
