@@ -7,12 +7,14 @@ has the equations in compact form and the factors of the covariance beforehand, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
+from apo_bench.correction.compact import Compact
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 from benchmarks.corrector_bench.draws import Draw, factors
@@ -68,12 +70,14 @@ def _alone(task: Task, nearest: Callable[..., Any]) -> Run:
 
 
 def dense(task: Task) -> Run:
-    """Plain numpy on dense matrices, whatever the size."""
-    from apo_bench.correction.compact import compact
-    from apo_bench.correction.manifold import nearest
+    """Plain numpy, whole, on dense matrices whatever the size."""
+    from apo_bench.correction.manifold import Nearest, nearest
 
-    L = factors(task.covariance)
-    return lambda: nearest(compact(task.system, len(task.seen)), task.seen[None], L[None]).goals[0]
+    def one_of_one(system: Compact, seen: Array, L: Array) -> Nearest:
+        found = nearest(system, seen[None], L[None])
+        return replace(found, goals=found.goals[0], Jt=found.Jt[0])
+
+    return _whole(task, one_of_one)
 
 
 COMPILED = "contact compiled"
