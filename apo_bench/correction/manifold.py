@@ -114,9 +114,9 @@ def _many(system: Compact, seen: Array, L: Array, soft_m: Array | None) -> Neare
         rest = finite & settles(size, now.size)
         over = ~finite | rest if turn + 1 < TURNS else np.ones(b, dtype=np.bool_)[now.which]
         z = now.z + (step if rest.all() else shortened(step, now.L))
-        D, Jr = exp_and_jacobian((now.L @ z.reshape(-1, n, 6, 1))[..., 0])
+        D, Jr = exp_and_jacobian((now.L @ z.reshape(len(z), n, 6, 1))[..., 0])
         now = now._replace(z=z, T=now.seen @ D, B=Jr @ now.L, size=size)
-        if over.any():
+        if over.any() or not b:
             done.append((now.which[over], tuple(x[over] for x in (now.T, z, Jt, now.B, rest, finite))))
             if over.all():
                 break
@@ -168,7 +168,7 @@ def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> t
         return -z, np.ones(b, dtype=np.bool_)
     J = np.swapaxes(Jt, 1, 2)
     A = J @ Jt
-    diagonal = A.reshape(b, -1)[:, :: m + 1]
+    diagonal = A.reshape(b, m * m)[:, :: m + 1]
     size = diagonal.sum(axis=1) / m
     finite = np.isfinite(size + e.sum(axis=1))
     if not finite.all():
