@@ -27,7 +27,8 @@ from apo_bench.correction.correct import CORRECTORS
 from apo_bench.errors import InputError
 from apo_bench.scenario_file import load_scenario
 
-SPEC = SweepSpec(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), trials=3, seed=10)
+METHODS = ("oracle", "none", "paper")
+SPEC = SweepSpec(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)
 ROWS = 3 * (1 + 2 * 2)
 LOAD = functools.cache(load_scenario)
 
@@ -61,7 +62,8 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
 
 def test_the_grid_is_every_combination_once() -> None:
-    spec = SweepSpec(("stick_in_tower", "stick_on_castles"), (0, 1, 1), (0, 1), clearances_mm=(0.25, 0.5), trials=2)
+    two = ("stick_in_tower", "stick_on_castles")
+    spec = SweepSpec(two, (0, 1, 1), (0, 1), METHODS, clearances_mm=(0.25, 0.5), trials=2)
     loaded = load_all(spec)
     keys = [trial_key(t, loaded[t.scenario].name) for unit in units(spec, loaded) for t in unit.trials]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
@@ -81,8 +83,8 @@ def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None
     assert len(met["paper"]) == 6
 
 
-def test_by_default_the_ceiling_the_raw_and_the_papers_way_are_compared() -> None:
-    assert SPEC.methods == ("oracle", "none", "paper")
+def test_by_default_the_ceiling_the_raw_the_papers_way_and_contact_are_compared() -> None:
+    assert SweepSpec(("stick_in_tower",)).methods == ("oracle", "none", "paper", "contact")
     for method in CORRECTORS:
         assert replace(SPEC, methods=(method,)).methods == (method,)
 
