@@ -19,6 +19,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.program import Observation
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario, scenario_names
+from benchmarks.corrector_bench import problems
 
 STEP = 1e-3
 """Of a shift, [m], and of a turn, [rad]: large enough to see curvature."""
@@ -146,6 +147,18 @@ def test_dropped_relations_hold_nothing() -> None:
     assert [o.fixed for o in found.operations][1] == ("z", "roll", "pitch")
     assert "R4" not in {hold.relation for o in found.operations for hold in (*o.through, *o.agreeing)}
     assert (found.rank, found.rank + found.redundant) == (11, 3 * (9 - 3))
+
+
+def test_a_row_of_castles_is_held_by_its_neighbours() -> None:
+    """Of K castles and the sticks between them 10 K - 7 directions are fixed, each by relations near by."""
+    chain = problems.chain(6)
+    n = len(chain.assembly)
+    covariance = np.tile(np.diag([1e-6] * 3 + [1e-4] * 3), (n, 1, 1))
+    found = explain(Observation(chain.assembly, chain.start, chain.goals, covariance, np.ones(n, bool)), chain.goals)
+    assert (found.rank, found.freedom) == (53, 6 * n - 53)
+    for o in found.operations[1:6]:
+        assert [str(free.direction) for free in o.free] == ["x"]
+        assert {hold.parts[0] for hold in o.through} == {f"stick{o.operation - 1}"}
 
 
 def test_too_many_operations_are_refused() -> None:
