@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import final
 
 import numpy as np
@@ -86,12 +87,13 @@ class Compact:
         for j in range(w):
             np.matmul(forms[..., j, :, :, :], F[..., j, :, :], out=forms[..., j + 1, :, :, :])
         e = behind[..., 0, :, :, :] @ self.plane[:, :, None]
-        number, side = np.arange(c)[:, None], np.arange(w) + ~self.inverse
+        side, number = self._sides
         fG = forms[..., side, number, 0, :] @ _GENERATORS
         p = behind[..., side, number, :, :]
-        padded = np.zeros((*B.shape[:-3], self.n + 1, 6, 6))
-        padded[..., : self.n, :, :] = np.swapaxes(B, -1, -2)
-        scaled = padded[..., self.columns, :, :] * np.where(self.inverse, -1.0, 1.0)[..., None, None]
+        signed = np.zeros((*B.shape[:-3], 2, self.n + 1, 6, 6))
+        signed[..., 0, : self.n, :, :] = np.swapaxes(B, -1, -2)
+        np.negative(signed[..., 0, :, :, :], out=signed[..., 1, :, :, :])
+        scaled = signed[..., self._signs, self.columns, :, :]
         return e.reshape(*e.shape[:-3], 3 * c), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
 
     def words(self, T: Array) -> Array:
@@ -106,10 +108,34 @@ class Compact:
         """The transposed Jacobian (*, 6 n, 3 c) out of its blocks (*, c, w, 6, 3)."""
         lead, c = blocks.shape[:-4], len(self)
         J = np.zeros((*lead, self.n + 1, c, 6, 3))
-        at = np.arange(c)
-        for j in range(self.letters.shape[1]):
-            J[..., self.columns[:, j], at, :, :] += blocks[..., j, :, :]
+        if self._once:
+            J[..., self.columns, np.arange(c)[:, None], :, :] = blocks
+        else:
+            for j in range(self.letters.shape[1]):
+                J[..., self.columns[:, j], np.arange(c), :, :] += blocks[..., j, :, :]
         return np.swapaxes(J[..., : self.n, :, :, :], -3, -2).reshape(*lead, 6 * self.n, 3 * c)
+
+    @cached_property
+    def _once(self) -> bool:
+        """Whether no motion parameter occurs twice in a word."""
+        ordered = np.sort(self.columns, axis=1)
+        return not bool(((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] < self.n)).any())
+
+    @cached_property
+    def _sides(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Up to where each letter is counted to the plane, (c, w), and the number of each contact, (c, 1)."""
+        c, w = self.letters.shape
+        return np.arange(w) + ~self.inverse, np.arange(c)[:, None]
+
+    @cached_property
+    def _signs(self) -> NDArray[np.intp]:
+        """(c, w): 1 where the sign changes."""
+        return self.inverse.astype(np.intp)
+
+    @cached_property
+    def _rows(self) -> NDArray[np.intp]:
+        """(c, w): where each letter stands among all matrices and then their inverses."""
+        return self.letters + self._signs * (len(self.start) + self.n + 1)
 
     def _behind(self, F: Array) -> Array:
         """(everything from letter j on) v, (*, w + 1, c, 3, 4)."""
@@ -129,7 +155,7 @@ class Compact:
         back[..., :3, :3] = np.swapaxes(there[..., :3, :3], -1, -2)
         back[..., :3, 3:] = -back[..., :3, :3] @ there[..., :3, 3:]
         back[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
-        return stack[..., self.letters + self.inverse * (p + n + 1), :, :]
+        return stack[..., self._rows, :, :]
 
 
 def compact(system: Equations, n: int) -> Compact:

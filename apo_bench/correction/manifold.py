@@ -117,9 +117,11 @@ def _many(system: Compact, seen: Array, L: Array, soft_m: Array | None) -> Neare
         D, Jr = exp_and_jacobian((now.L @ z.reshape(len(z), n, 6, 1))[..., 0])
         now = now._replace(z=z, T=now.seen @ D, B=Jr @ now.L, size=size)
         if over.any() or not b:
-            done.append((now.which[over], tuple(x[over] for x in (now.T, z, Jt, now.B, rest, finite))))
+            ended = (now.T, z, Jt, now.B, rest, finite)
             if over.all():
+                done.append((now.which, ended))
                 break
+            done.append((now.which[over], tuple(x[over] for x in ended)))
             now = now.only(~over)
     return _sorted(system, seen, done, tuple(trace))
 
@@ -170,12 +172,13 @@ def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> t
     A = J @ Jt
     diagonal = A.reshape(b, m * m)[:, :: m + 1]
     size = diagonal.sum(axis=1) / m
-    finite = np.isfinite(size + e.sum(axis=1))
+    demanded = e if soft_m is None else e * (soft_m == 0.0)
+    gap2 = (demanded * demanded).sum(axis=1) / m
+    finite = np.isfinite(size + gap2)
     if not finite.all():
         A[~finite], size[~finite] = 0.0, 1.0
     size = np.maximum(size, SMALLEST)
-    demanded = e if soft_m is None else e * (soft_m == 0.0)
-    diagonal += (damping((demanded * demanded).sum(axis=1) / (m * size), turn) * size)[:, None]
+    diagonal += (damping(gap2 / size, turn) * size)[:, None]
     if soft_m is not None:
         diagonal += soft_m * soft_m
     wanted = J @ z[..., None] - e[..., None]

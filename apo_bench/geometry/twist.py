@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array
 
-TERMS = 24
-"""Of the series in the square of the angle: up to two whole turns, what is left out is rounding."""
+TERMS, SHORT = 24, 9
+"""Of the series in the square of the angle: up to two whole turns, and up to one radian, the rest is rounding."""
 
 
 def _generators() -> Array:
@@ -54,8 +54,7 @@ GENERATORS = _generators()
 _TO_MATRIX = GENERATORS.reshape(6, 16)
 _TO_ADJOINT = _adjoints().reshape(6, 36)
 SERIES = _series()
-_POWERS = np.arange(TERMS)
-_ONE4, _ONE6 = np.eye(4), np.eye(6)
+_ONE4, _ONE6, _SUM = np.eye(4), np.eye(6), np.ones(3)
 
 
 def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
@@ -67,8 +66,10 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     """
     xi = np.asarray(twist, dtype=np.float64)
     lead = xi.shape[:-1]
-    q = (xi[..., 3:] * xi[..., 3:]).sum(axis=-1)
-    B, C, a, b, c, d = np.moveaxis((q[..., None] ** _POWERS) @ SERIES, -1, 0)[..., None, None]
+    q = (xi[..., 3:] * xi[..., 3:]) @ _SUM
+    series = SERIES[: SHORT if (q < 1.0).all() else TERMS]
+    f = ((q[..., None] ** np.arange(len(series))) @ series)[..., None, None]
+    B, C, a, b, c, d = (f[..., i, :, :] for i in range(6))
     X = (xi @ _TO_MATRIX).reshape(*lead, 4, 4)
     ad = (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
     X2, ad2 = X @ X, ad @ ad
