@@ -13,11 +13,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from difflib import get_close_matches
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn, final
 
 import numpy as np
 
@@ -28,7 +25,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.layout import layout_at
 from apo_bench.program import Observation
 from apo_bench.scenario import Scenario
-from apo_bench.strict_json import LARGEST_BYTES
+from apo_bench.strict_csv import Columns, Row, read_csv
 
 DEVIATION_MM, DEVIATION_DEG = 1.0, 1.0
 """What is assumed where a file states no standard deviations."""
@@ -37,7 +34,7 @@ LARGEST_M = 1e4
 
 POSITION, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
-COLUMNS: Mapping[str, tuple[str, float]] = {
+COLUMNS: Columns = {
     **{name: (name, 1.0) for name in ("operation", "part")},
     **{f"{name}_{unit}": (name, size) for name in POSITION for unit, size in _LENGTHS.items()},
     **{name: (name, 1.0) for name in QUATERNION},
@@ -49,45 +46,6 @@ COLUMNS: Mapping[str, tuple[str, float]] = {
 """What a column stands for, and its unit in m or rad."""
 REQUIRED = ("operation", "part", *POSITION, *QUATERNION)
 _FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
-
-
-@final
-@dataclass(frozen=True)
-class _Row:
-    """One row, its cells by what they stand for."""
-
-    file: str
-    line: int
-    cells: Mapping[str, tuple[str, str, float]]
-    """Of each meaning: the column, the text, the unit."""
-
-    def fail(self, meaning: str, wanted: str) -> NoReturn:
-        column, text, _ = self.cells[meaning]
-        given = f"'{text[:40]}' was given" if text else "nothing was given"
-        raise InputError(f"{self.file}, line {self.line}, column {column}: {wanted}, {given}.")
-
-    def text(self, meaning: str) -> str:
-        return self.cells[meaning][1] if meaning in self.cells else ""
-
-    def number(self, meaning: str, largest: float) -> float:
-        """In m, rad or one."""
-        _, text, unit = self.cells[meaning]
-        try:
-            x = float(text) * unit
-        except ValueError:
-            x = math.nan
-        if not abs(x) <= largest:
-            self.fail(meaning, f"a number of at most {largest / unit:g} is needed")
-        return x
-
-    def deviation(self, meaning: str, assumed: float, largest: float) -> float:
-        """A standard deviation; the assumed one if the cell is empty."""
-        if not self.text(meaning):
-            return assumed
-        x = self.number(meaning, largest)
-        if x <= 0.0:
-            self.fail(meaning, "a standard deviation above 0 is needed")
-        return x
 
 
 def read_table(
@@ -104,8 +62,8 @@ def read_table(
     Raises:
         InputError: Anything in the file that is not as described, naming line and column.
     """
-    assembly, rows = scenario.assembly, dict[int, _Row]()
-    for row in _rows(path):
+    assembly, rows = scenario.assembly, dict[int, Row]()
+    for row in read_csv(path, COLUMNS, REQUIRED):
         k = _operation(row, assembly)
         if k in rows:
             row.fail("operation", f"every operation stands once, this one is in line {rows[k].line} already")
@@ -117,8 +75,8 @@ def read_table(
                 f"give one row for each of the {len(assembly)} operations."
             )
     ordered = [rows[k] for k in range(len(assembly))]
-    shift = [row.deviation("deviation", deviation_mm * 1e-3, LARGEST_M) for row in ordered]
-    turn = [row.deviation("turn deviation", math.radians(deviation_deg), math.tau) for row in ordered]
+    shift = [_deviation(row, "deviation", deviation_mm * 1e-3, LARGEST_M) for row in ordered]
+    turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), math.tau) for row in ordered]
     stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
     seen = Observation(
         assembly=assembly,
@@ -145,77 +103,7 @@ def table(assembly: Assembly, goals: Array) -> str:
     return text.getvalue()
 
 
-def _rows(path: str | Path) -> Iterator[_Row]:
-    """Every row that is not empty."""
-    reader = csv.reader(io.StringIO(_text(Path(path)), newline=""), strict=True, skipinitialspace=True)
-    columns: list[str] = []
-    try:
-        for cells in reader:
-            texts = [cell.strip() for cell in cells]
-            if not any(texts):
-                continue
-            if not columns:
-                columns = _header(str(path), texts)
-                continue
-            if len(texts) != len(columns):
-                raise InputError(
-                    f"{path}, line {reader.line_num}: {len(columns)} cells are needed, one for each column, "
-                    f"{len(texts)} were given."
-                )
-            named = {COLUMNS[c][0]: (c, text, COLUMNS[c][1]) for c, text in zip(columns, texts, strict=True)}
-            yield _Row(str(path), reader.line_num, named)
-    except csv.Error as error:
-        raise InputError(f"{path}, line {reader.line_num}: this is not a CSV file ({error}).") from error
-    if not columns:
-        raise InputError(f"{path}: the file is empty; its first line names the columns: {_shown()}.")
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: a CSV file is needed, a folder was given.")
-        if path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give one row per operation."
-            )
-        return path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a CSV file.") from error
-
-
-def _header(file: str, names: Sequence[str]) -> list[str]:
-    """The columns, each known, none twice and none missing."""
-    found = [name.lower() for name in names]
-    taken = dict[str, str]()
-    for column in found:
-        if column not in COLUMNS:
-            longer = [name for name in COLUMNS if column and name.startswith(f"{column}_")]
-            near = longer or get_close_matches(column, COLUMNS, n=1, cutoff=0.3)
-            hint = f"did you mean '{near[0]}'? Allowed are" if near else "allowed are"
-            raise InputError(f"{file}, line 1: unknown column '{column[:40]}'; {hint} {_shown()}.")
-        meaning = COLUMNS[column][0]
-        if meaning in taken:
-            raise InputError(f"{file}, line 1: the columns '{taken[meaning]}' and '{column}' say the same; keep one.")
-        taken[meaning] = column
-    for meaning in REQUIRED:
-        if meaning not in taken:
-            column = next(name for name, (m, _) in COLUMNS.items() if m == meaning)
-            raise InputError(f"{file}, line 1: the column '{column}' is missing; needed are {_shown(REQUIRED)}.")
-    return found
-
-
-def _shown(meanings: Sequence[str] = ()) -> str:
-    """The columns in mm and degrees."""
-    return ", ".join(
-        name
-        for name, (m, _) in COLUMNS.items()
-        if not name.endswith(("_m", "_rad")) and (not meanings or m in meanings)
-    )
-
-
-def _operation(row: _Row, assembly: Assembly) -> int:
+def _operation(row: Row, assembly: Assembly) -> int:
     """Which operation a row is of, counted from 0."""
     text = row.text("operation")
     if not text.isdecimal() or len(text) > 9 or not 1 <= int(text) <= len(assembly):
@@ -226,7 +114,7 @@ def _operation(row: _Row, assembly: Assembly) -> int:
     return k
 
 
-def _pose(row: _Row) -> Array:
+def _pose(row: Row) -> Array:
     position = [row.number(name, LARGEST_M) for name in POSITION]
     q = np.array([row.number(name, 2.0) for name in QUATERNION])
     if abs(np.linalg.norm(q) - 1.0) > 1e-3:
@@ -237,7 +125,17 @@ def _pose(row: _Row) -> Array:
     return pose.unpack(np.array([*position, *q]))
 
 
-def _play(rows: Sequence[_Row], assumed: float) -> float:
+def _deviation(row: Row, meaning: str, assumed: float, largest: float) -> float:
+    """A standard deviation; the assumed one if the cell is empty."""
+    if not row.text(meaning):
+        return assumed
+    x = row.number(meaning, largest)
+    if x <= 0.0:
+        row.fail(meaning, "a standard deviation above 0 is needed")
+    return x
+
+
+def _play(rows: Sequence[Row], assumed: float) -> float:
     """The play of parts that fit, [m], which is one number for all rows."""
     stated = [(row, row.number("play", LARGEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
@@ -248,7 +146,7 @@ def _play(rows: Sequence[_Row], assumed: float) -> float:
     return stated[0][1] if stated else assumed
 
 
-def _flag(row: _Row) -> bool:
+def _flag(row: Row) -> bool:
     text = row.text("seen").lower()
     if text not in _FLAGS:
         row.fail("seen", "true or false is needed")
