@@ -119,14 +119,15 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
     """
     n, assembly = len(goals), seen.assembly
     if 6 * n > LARGE:
-        raise InputError(f"{n} operations were given; up to {LARGE // 6} can be explained, so take fewer of them.")
+        raise _too_many(n)
     asked = problem(replace(seen, goals=goals), nearest)
     kept = asked.exact & asked.without(tuple(dropped))
     B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ asked.L
     Jt = asked.compact.gathered(asked.compact.blocks(goals, B)[1])
     every, relations = holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
     known = freedom(relations.Jt)
-    assert known is not None
+    if known is None:
+        raise _too_many(n)
     spread = (B @ known.free.reshape(n, 6, known.free.shape[1])).reshape(known.free.shape)
     found = []
     for k, own in enumerate(_own(known, n)):
@@ -162,6 +163,10 @@ def deviation(C: Array, direction: Direction) -> float:
     """The standard deviation along a direction, given the covariance of the body twist, (6, 6): [m] or [rad]."""
     half = slice(3, 6) if direction.turns else slice(0, 3)
     return float(np.sqrt(direction.axis @ C[half, half] @ direction.axis))
+
+
+def _too_many(n: int) -> InputError:
+    return InputError(f"{n} operations were given; up to {LARGE // 6} can be explained, so take fewer of them.")
 
 
 def _own(known: Freedom, n: int) -> Iterator[Array]:
