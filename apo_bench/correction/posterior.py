@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.correction import sparse
 from apo_bench.correction.compact import compact
@@ -91,6 +92,7 @@ def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.9
     L = np.linalg.cholesky(seen.covariance)
     xi = pose.log(pose.inverse(seen.goals) @ made.goals)
     system = compact(equations(seen.assembly, seen.start, seen.goals), len(made.goals))
+    system = system.among(_equal(seen, made.dropped))
     _, blocks = system.blocks(made.goals, right_jacobian(xi) @ L)
     known = freedom(system.gathered(blocks))
     if known is None or not known.free.shape[1]:
@@ -99,3 +101,13 @@ def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.9
     true = pose.log(pose.inverse(seen.goals) @ truth)
     off = free.T @ np.linalg.solve(L, (true - xi)[..., None]).ravel()
     return bool(off @ off <= chdtri(free.shape[1], 1.0 - level))
+
+
+def _equal(seen: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
+    """The contacts that were equations, (c,): neither walls nor left out."""
+    intervals = [seen.assembly.interval(relation.contact, seen.play_m) for relation in seen.assembly.relations()]
+    equal = np.array([low == high for low, high in intervals], dtype=np.bool_)
+    for i, arc in enumerate(seen.assembly.arcs(), start=1):
+        if f"R{i}" in dropped:
+            equal[list(arc)] = False
+    return equal
