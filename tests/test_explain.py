@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly import Assembly, Gap
+from apo_bench.correction.contact import contact
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.equations import equations
 from apo_bench.correction.explain import Explanation, explain
@@ -16,6 +17,7 @@ from apo_bench.correction.newton import solve
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.placement import placed
 from apo_bench.program import Observation
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario, scenario_names
@@ -170,6 +172,20 @@ def test_too_many_operations_are_refused() -> None:
         explain(Observation(many, scenario.start, goals, covariance, np.ones(n, bool)), goals)
 
 
+def test_what_is_free_alone_is_kept_as_seen() -> None:
+    """Along a shift that takes nothing with it, a correction of millimetres leaves a part where it was."""
+    rng, seen = np.random.default_rng(5), nominal(load_scenario("stick_in_tower"), 2.0)
+    xi = rng.standard_normal((3, 6)) * [*[2e-3] * 3, *[np.radians(2.0)] * 3]
+    noisy = replace(seen, goals=seen.goals @ pose.exp(xi))
+    made = contact(noisy)
+    for o in explain(noisy, made.goals).operations:
+        back = pose.inverse(made.goals[o.operation]) @ noisy.goals[o.operation]
+        alone = [free.direction.axis for free in o.free if not free.along]
+        assert len(alone) == 1
+        assert np.linalg.norm(back[:3, 3]) > 1e-3
+        assert abs(alone[0] @ back[:3, 3]) < 1e-6
+
+
 def test_no_operations_are_explained_too() -> None:
     scenario = load_scenario("stick_in_tower")
     empty = Assembly(scenario.assembly.solids, (), scenario.assembly.fixed)
@@ -196,9 +212,6 @@ def test_the_posterior_of_parts_is_that_of_draws() -> None:
     scenario = load_scenario("pocket_table")
     seen = nominal(scenario, 1e-3)
     found = explain(seen, seen.goals)
-    from apo_bench.correction.contact import contact
-    from apo_bench.placement import placed
-
     rng, drawn = np.random.default_rng(0), []
     for _ in range(200):
         xi = 1e-6 * rng.standard_normal((len(seen.goals), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
