@@ -86,6 +86,19 @@ def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> N
     alike(manifold.nearest(system, goals, L), compiled.nearest(system, goals, L), 1e-11)
 
 
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_compact_equations_are_the_same(name: str) -> None:
+    given = load_scenario(name)
+    goals = given.goals @ pose.exp(np.random.default_rng(0).normal(scale=0.01, size=(len(given.assembly), 6)))
+    system = equations(given.assembly, given.start, goals)
+    for some in (system, system.among(np.zeros(len(system.letters), dtype=np.bool_))):
+        expected, actual = compact(some, len(goals)), compiled.compact(some, len(goals))
+        for field in ("start", "letters", "columns", "inverse", "plane"):
+            assert np.array_equal(getattr(expected, field), getattr(actual, field))
+        v, w = (np.swapaxes(K.points, 1, 2) @ K.points for K in (expected, actual))
+        np.testing.assert_allclose(w, v, rtol=0, atol=1e-15)
+
+
 def test_what_is_not_finite_is_said_and_left_alone() -> None:
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     three = np.array([goals, goals, goals])
@@ -148,7 +161,7 @@ def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_every_loop_is_handed_to_the_compiler() -> None:
     written = {f for f in vars(loops).values() if getattr(f, "__module__", "") == loops.__name__ and callable(f)}
-    assert written == {loops.solve, *compiled.HELPERS}
+    assert written == {loops.solve, loops.summarised, *compiled.HELPERS}
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 0.999, 1.001, 3.0])

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction import loops, manifold
-from apo_bench.correction.compact import Compact
+from apo_bench.correction.compact import ROUNDING, SMALLEST, Compact
+from apo_bench.correction.equations import Equations
 from apo_bench.correction.manifold import Nearest, Turn
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -59,7 +60,7 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
     Raises:
         InputError: Numba is not installed.
     """
-    solve, lead, n, m = _compiled(), goals.shape[:-3], system.n, 3 * len(system)
+    (solve, _), lead, n, m = _compiled(), goals.shape[:-3], system.n, 3 * len(system)
     if not lead and 6 * n > manifold.LARGE:
         return manifold.nearest(system, goals, L, soft_m)
     b = math.prod(lead)
@@ -84,8 +85,34 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
     return Nearest(T, z, e, Jt, B, at_rest, ended, tuple(Turn(gap, step) for gap, step in trace[:turns].tolist()))
 
 
+def compact(system: Equations, n: int) -> Compact:
+    """As `compact.compact`.
+
+    Raises:
+        InputError: Numba is not installed.
+    """
+    _, summarised = _compiled()
+    (c, w), p = system.letters.shape, len(system.start)
+    columns, plane, points = np.empty((c, w), np.intp), np.zeros((c, 4)), np.zeros((c, 3, 4))
+    summarised(
+        _own(system.contact, np.intp),
+        _own(system.vertex),
+        _own(system.plane),
+        _own(system.letters, np.intp),
+        p,
+        n,
+        ROUNDING,
+        SMALLEST,
+        columns,
+        plane,
+        points,
+    )
+    return Compact(system.start, system.letters, columns, system.inverse, plane, points, n)
+
+
 @cache
-def _compiled() -> Callable[..., int]:
+def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
+    """`solve` and `summarised` of `loops`."""
     try:
         from numba import njit
         from numba.extending import register_jitable
@@ -96,8 +123,8 @@ def _compiled() -> Callable[..., int]:
         ) from error
     for function in HELPERS:
         register_jitable(fastmath=set(SAFE))(function)
-    compiled: Callable[..., int] = njit(cache=True, fastmath=set(SAFE), error_model="numpy")(loops.solve)
-    return compiled
+    compiler = njit(cache=True, fastmath=set(SAFE), error_model="numpy")
+    return compiler(loops.solve), compiler(loops.summarised)
 
 
 def _own(x: Any, dtype: Any = np.float64) -> NDArray[Any]:

@@ -119,6 +119,55 @@ def solve(
     return longest
 
 
+def summarised(
+    contact: Index,
+    vertex: Array,
+    plane: Array,
+    letters: Index,
+    p: int,
+    n: int,
+    rounding: float,
+    smallest: float,
+    columns: Index,
+    planes: Array,
+    points: Array,
+) -> None:
+    """What `compact.compact` makes of equations: columns (c, w), planes (c, 4), points (c, 3, 4), zeros before."""
+    c, w = letters.shape
+    count, S, a = np.zeros(c), np.zeros((c, 3, 3)), np.zeros(3)
+    for i in range(c):
+        for j in range(w):
+            columns[i, j] = letters[i, j] - p if p <= letters[i, j] < p + n else n
+    for r in range(len(contact)):
+        i = contact[r]
+        count[i] += 1.0
+        for d in range(4):
+            planes[i, d] = plane[r, d]
+            points[i, 0, d] += vertex[r, d]
+    for r in range(len(contact)):
+        i = contact[r]
+        for d in range(3):
+            a[d] = vertex[r, d] - points[i, 0, d] / count[i]
+        for d in range(3):
+            for s in range(3):
+                S[i, d, s] += a[d] * a[s]
+    for i in range(c):
+        for d in range(4):
+            points[i, 0, d] /= math.sqrt(count[i])
+        least = rounding * (S[i, 0, 0] + S[i, 1, 1] + S[i, 2, 2]) + smallest
+        for k in range(1, 3):
+            pivot = 0
+            for d in range(1, 3):
+                if S[i, d, d] > S[i, pivot, pivot]:
+                    pivot = d
+            root = math.sqrt(max(S[i, pivot, pivot], least))
+            for d in range(3):
+                points[i, k, d] = S[i, pivot, d] / root
+            for d in range(3):
+                for s in range(3):
+                    S[i, d, s] -= points[i, k, d] * points[i, k, s]
+
+
 def worse(a: float, b: float) -> float:
     """The larger one; what is not a number is larger than any."""
     return b if b > a or math.isnan(b) else a
