@@ -141,7 +141,7 @@ def test_products_are_those_of_the_matrix(name: str) -> None:
     where = sparse.incidence(system)
     _, every = system.blocks(seen, L)
     chosen, J, rng = every[where.contact, where.letter], system.gathered(every).T, np.random.default_rng(3)
-    z, y = rng.standard_normal(J.shape[1]), rng.standard_normal(len(J))
+    z, y = rng.standard_normal((1, J.shape[1]))[0], rng.standard_normal((1, len(J)))[0]
     assert_allclose(where.matrix(chosen).toarray(), J, rtol=0, atol=1e-15)
     assert_allclose(where.times(chosen, z), J @ z, rtol=0, atol=1e-14)
     assert_allclose(where.transposed_times(chosen, y), J.T @ y, rtol=0, atol=1e-14)
