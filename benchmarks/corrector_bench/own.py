@@ -24,9 +24,10 @@ from benchmarks.corrector_bench.problems import Problem
 
 def contact(task: Task) -> Run:
     """Plain numpy, whole."""
+    from apo_bench.correction.compact import compact
     from apo_bench.correction.manifold import nearest
 
-    return _whole(task, nearest)
+    return _whole(task, compact, nearest)
 
 
 def contact_alone(task: Task) -> Run:
@@ -38,9 +39,9 @@ def contact_alone(task: Task) -> Run:
 
 def compiled(task: Task) -> Run:
     """The optional compiled kernel, whole."""
-    from apo_bench.correction.compiled import nearest
+    from apo_bench.correction.compiled import compact, nearest
 
-    return _whole(task, nearest)
+    return _whole(task, compact, nearest)
 
 
 def compiled_alone(task: Task) -> Run:
@@ -50,8 +51,7 @@ def compiled_alone(task: Task) -> Run:
     return _alone(task, nearest)
 
 
-def _whole(task: Task, nearest: Callable[..., Any]) -> Run:
-    from apo_bench.correction.compact import compact
+def _whole(task: Task, compact: Callable[..., Compact], nearest: Callable[..., Any]) -> Run:
     from apo_bench.correction.posterior import rank
 
     def run() -> Array:
@@ -71,13 +71,14 @@ def _alone(task: Task, nearest: Callable[..., Any]) -> Run:
 
 def dense(task: Task) -> Run:
     """Plain numpy, whole, on dense matrices whatever the size."""
+    from apo_bench.correction.compact import compact
     from apo_bench.correction.manifold import Nearest, nearest
 
     def one_of_one(system: Compact, seen: Array, L: Array) -> Nearest:
         found = nearest(system, seen[None], L[None])
         return replace(found, goals=found.goals[0], Jt=found.Jt[0])
 
-    return _whole(task, one_of_one)
+    return _whole(task, compact, one_of_one)
 
 
 COMPILED = "contact compiled"
