@@ -1,4 +1,4 @@
-"""The corrector against its targets and against other solvers: `python benchmarks/corrector.py` (a quarter of an hour).
+"""The corrector against its targets and against other solvers: `python benchmarks/corrector.py` (ten minutes).
 
 Prints a table of targets, what was measured and whether it was met, and writes every number as JSON. Draws are
 synthetic and Gaussian around an exactly consistent truth; each peer runs in a process of its own with a time limit.
