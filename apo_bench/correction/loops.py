@@ -295,14 +295,33 @@ def towards(blocks: Array, columns: Index, slot: Index, z: Array, e: Array, y: A
 
 
 def factored(A: Array, first: Index, mu: float) -> None:
-    """A becomes its Cholesky factor, with the inverse of each pivot's root on the diagonal."""
-    for r in range(len(A)):
-        begin = 3 * first[r // 3]
-        for s in range(begin, r + 1):
-            t = A[r, s]
-            for q in range(max(begin, 3 * first[s // 3]), s):
-                t -= A[r, q] * A[s, q]
-            A[r, s] = t * A[s, s] if s < r else 1.0 / math.sqrt(max(t, mu))
+    """A becomes its Cholesky factor, one over each pivot's root on the diagonal; by blocks of 3 x 3, a .. i by rows."""
+    for row in range(len(first)):
+        r = 3 * row
+        for column in range(first[row], row + 1):
+            s = 3 * column
+            a, b, c = A[r, s], A[r, s + 1], A[r, s + 2]
+            d, e, f = A[r + 1, s], A[r + 1, s + 1], A[r + 1, s + 2]
+            g, h, i = A[r + 2, s], A[r + 2, s + 1], A[r + 2, s + 2]
+            for q in range(3 * max(first[row], first[column]), s):
+                x, y, z, u, v, w = A[r, q], A[r + 1, q], A[r + 2, q], A[s, q], A[s + 1, q], A[s + 2, q]
+                a, b, c = a - x * u, b - x * v, c - x * w
+                d, e, f = d - y * u, e - y * v, f - y * w
+                g, h, i = g - z * u, h - z * v, i - z * w
+            if column == row:
+                a = 1.0 / math.sqrt(max(a, mu))
+                d, g = d * a, g * a
+                e = 1.0 / math.sqrt(max(e - d * d, mu))
+                h = (h - g * d) * e
+                i = 1.0 / math.sqrt(max(i - g * g - h * h, mu))
+            else:
+                a, d, g = a * A[s, s], d * A[s, s], g * A[s, s]
+                l, m, n = A[s + 1, s], A[s + 2, s], A[s + 2, s + 1]
+                b, e, h = (b - a * l) * A[s + 1, s + 1], (e - d * l) * A[s + 1, s + 1], (h - g * l) * A[s + 1, s + 1]
+                c, f = (c - a * m - b * n) * A[s + 2, s + 2], (f - d * m - e * n) * A[s + 2, s + 2]
+                i = (i - g * m - h * n) * A[s + 2, s + 2]
+                A[r, s + 1], A[r, s + 2], A[r + 1, s + 2] = b, c, f
+            A[r, s], A[r + 1, s], A[r + 1, s + 1], A[r + 2, s], A[r + 2, s + 1], A[r + 2, s + 2] = a, d, e, g, h, i
 
 
 def substituted(A: Array, first: Index, y: Array) -> None:
