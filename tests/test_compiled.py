@@ -15,6 +15,7 @@ from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correct import correct
 from apo_bench.correction.equations import equations
 from apo_bench.correction.manifold import Nearest
+from apo_bench.correction.many import correct_many
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -151,6 +152,23 @@ def test_the_corrector_by_name_is_contact_with_another_solver() -> None:
     assert (plain.status, plain.sentence, plain.rank) == (fast.status, fast.sentence, fast.rank)
     np.testing.assert_allclose(fast.goals, plain.goals, rtol=0, atol=1e-12)
     assert np.array_equal(ContactCorrector(solver=compiled.nearest)(seen).goals, fast.goals)
+
+
+def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> None:
+    built, rng = scenes.ALL["bridge"](), np.random.default_rng(0)
+    drawn_ones = [scenes.noisy(built.goals, rng, 1.0, 1.0) for _ in range(3)]
+    first = scenes.seen(built, drawn_ones[0])
+    seen = [replace(first, goals=goals) for goals in drawn_ones]
+    calls = list[int]()
+
+    def counting(system: Compact, goals: Array, L: Array) -> Nearest:
+        calls.append(len(goals))
+        return compiled.nearest(system, goals, L)
+
+    for one, other in zip(correct_many(seen), correct_many(seen, ContactCorrector(solver=counting)), strict=True):
+        assert (one.status, one.rank) == (other.status, other.rank)
+        np.testing.assert_allclose(other.goals, one.goals, rtol=0, atol=1e-12)
+    assert calls == [3]
 
 
 def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

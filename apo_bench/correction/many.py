@@ -11,7 +11,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.correction.compact import Compact, compact, moments
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.equations import Equations, equations, lies_on
-from apo_bench.correction.manifold import Nearest, nearest
+from apo_bench.correction.manifold import Nearest
 from apo_bench.correction.problem import scales
 from apo_bench.correction.walls import asked
 from apo_bench.errors import InputError
@@ -47,7 +47,7 @@ def _chunk(seen: Sequence[Observation], corrector: ContactCorrector) -> list[Cor
     goals, L = np.array([one.goals for one in seen]), np.array([scales(one.covariance) for one in seen])
     plain = equations(seen[0].assembly, seen[0].start, seen[0].goals)
     pattern, exact, _ = asked(plain, seen[0].assembly, seen[0].play_m)
-    found = nearest(compact_many(seen[0].assembly, pattern, goals).among(exact), goals, L)
+    found = corrector.solver(compact_many(seen[0].assembly, pattern, goals).among(exact), goals, L)
     return [corrector.given(one, _one(found, i)) for i, one in enumerate(seen)]
 
 
