@@ -84,7 +84,7 @@ def solve(
                 gap = worse(gap, abs(e[i]))
                 if not soft or soft_m[i] == 0.0:
                     gap2 += e[i] * e[i]
-            finite[o] = abs(mean + total) < math.inf
+            finite[o] = abs(mean + total) < math.inf  # `isfinite` is x - x == x - x, which reordering makes true
             if finite[o]:
                 mean = max(mean, smallest)
                 mu = max(damp * min(min(gap2 / (m * mean), 1.0), fall**turn), floor) * mean
