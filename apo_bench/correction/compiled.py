@@ -123,8 +123,14 @@ def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
         ) from error
     for function in HELPERS:
         register_jitable(fastmath=set(SAFE))(function)
-    compiler = njit(cache=True, fastmath=set(SAFE), error_model="numpy")
-    return compiler(loops.solve), compiler(loops.summarised)
+
+    def compiled(function: Any) -> Any:
+        try:
+            return njit(cache=True, fastmath=set(SAFE), error_model="numpy")(function)
+        except RuntimeError:  # nowhere to keep it: it is compiled anew in every process
+            return njit(fastmath=set(SAFE), error_model="numpy")(function)
+
+    return compiled(loops.solve), compiled(loops.summarised)
 
 
 def _own(x: Any, dtype: Any = np.float64) -> NDArray[Any]:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.compact import Compact, compact
-from apo_bench.correction.consistency import consistency, slack, suspects
+from apo_bench.correction.consistency import SOFT_M, consistency, slack, suspects
 from apo_bench.correction.equations import Equations, equations, largest
-from apo_bench.correction.manifold import Nearest
+from apo_bench.correction.manifold import Nearest, nearest
 from apo_bench.correction.walls import Walls, asked, between
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -44,6 +44,8 @@ class Problem:
     def solve(self, kept: NDArray[np.bool_], found: Nearest | None = None) -> tuple[Nearest, Consistency]:
         """The nearest goals by the contacts that are `kept`, (c,), and the test of the equations among them.
 
+        Contacts that contradict each other have no nearest goals; those that share the contradiction out are returned.
+
         Args:
             found: The nearest goals without walls, if they are known already.
         """
@@ -53,7 +55,11 @@ class Problem:
         found = self.solver(part, self.seen.goals, self.L) if found is None else found
         tested = consistency(part, self.seen.goals, self.L, found, slack_m)
         walls = self.walls.among(kept[~self.exact])
-        if len(walls) and bool(found.finite):
+        if not found.finite:
+            return found, tested
+        if largest(self.system.gaps(found.goals)[chosen]) > self.seen.gap_m:
+            found = nearest(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
+        elif len(walls):
             found = between(part, walls, self.seen.goals, self.L, found)
         return found, tested
 
