@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly
 from apo_bench.correction.compact import Compact
 from apo_bench.correction.equations import Equations
-from apo_bench.correction.manifold import TURNS, Nearest, Turn, project, settles, shortened
+from apo_bench.correction.manifold import Nearest, Turn, project, settles, shortened
 from apo_bench.correction.posterior import LARGE, rank
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -27,6 +27,13 @@ BLIND = 1e-7
 """Part of the largest row below which a wall does not depend on the free directions."""
 EXACT = 1e-10
 """How far the program may overstep a wall, in standard deviations."""
+TURNS = 200
+SETTLED = 60
+"""The turn as which the equations are damped: they hold already."""
+SLOWEST, GROWS = 1.0 / 32.0, 1.1
+"""The least part of a step that is made, and how much larger that part may be than the one before."""
+HARD, SOFT = 0, 8
+"""What DAQP calls a wall, and one that may be overstepped."""
 
 
 @final
@@ -84,42 +91,62 @@ def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest
             f"walls with {system.n} operations were given, up to {LARGE // 6} are allowed; "
             'ask for "centred" contacts instead.'
         )
-    known, before, trace = rank(start.Jt), np.inf, list(start.trace)
-    z, T, B, rest, Jt = start.z, start.goals, start.B, False, start.Jt
+    known, before, trace, pace = rank(start.Jt), np.inf, list(start.trace), 1.0
+    z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
     for _ in range(TURNS):
         e, blocks = system.blocks(T, B)
         Jt = system.gathered(blocks)
-        shortest = z + project(e[None], Jt[None], z[None], None, TURNS)[0][0]
+        shortest = z + project(e[None], Jt[None], z[None], None, SETTLED)[0][0]
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = walls.system.linearised(T)
         J_wall = (J_wall.reshape(len(walls), -1, 1, 6) @ B).reshape(len(walls), -1)
         ahead = e_wall + J_wall @ (shortest - z)
-        u = _program(J_wall @ free, walls.low - ahead, walls.high - ahead)
-        if u is None:
-            break
+        u, room = _program(J_wall, free, walls.low - ahead, walls.high - ahead)
         step = shortest + free @ u - z
         length = float(np.abs(step).max(initial=0.0))
         trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))
-        rest = bool(settles(np.array(length), np.array(before)))
-        z = z + (step if rest else shortened(step[None], L[None])[0])
+        over = bool(settles(np.array(length), np.array(before)))
+        rest = over and room
+        pace = paced(pace, step, last)
+        last = step if rest else shortened(step[None], L[None])[0]
+        z = z + (step if rest else pace * last)
         D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
         T, B, before = seen @ D, Jr @ L, length
-        if rest:
+        if over:
             break
     return Nearest(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
 
 
-def _program(A: Array, low: Array, high: Array) -> Array | None:
-    """The shortest u with low <= A u <= high; None if there is none (DAQP: Arnstrom, Bemporad and Axehill, 2022)."""
+def paced(pace: float, step: Array, last: Array) -> float:
+    """The part of a step to make: all of it, but less where walls in turn make steps go to and fro.
+
+    If making the part p of the step before left r of it, making p / (1 - r) would have left nothing (secant rule).
+    """
+    size = float(last @ last)
+    if size == 0.0:
+        return 1.0
+    wanted = pace / max(1.0 - float(step @ last) / size, 1.0 / GROWS)
+    return min(max(wanted, SLOWEST), 1.0)
+
+
+def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, bool]:
+    """The shortest u with low <= J free u <= high, and whether there is one (DAQP: Arnstrom, Bemporad, Axehill, 2022).
+
+    Far from a solution linearised walls can leave no room where the walls themselves do; then the walls are overstepped
+    by as little as can be.
+    """
     import daqp
 
+    A = J @ free
     size = np.sqrt((A * A).sum(axis=1))
-    seeing = size > BLIND * size.max(initial=0.0)
+    seeing = size > BLIND * np.sqrt((J * J).sum(axis=1))
     A, low, high = A[seeing] / size[seeing, None], low[seeing] / size[seeing], high[seeing] / size[seeing]
     k = A.shape[1]
     if not len(A) or not k:
-        return np.zeros(k)
-    sense = np.zeros(len(A), dtype=np.intc)
-    A = np.ascontiguousarray(A)
-    u, _, flag, _ = daqp.solve(np.eye(k), np.zeros(k), A, high, low, sense, primal_tol=EXACT)
-    return np.asarray(u) if flag > 0 else None
+        return np.zeros(k), True
+    problem = np.eye(k), np.zeros(k), np.ascontiguousarray(A), high, low
+    u, _, flag, _ = daqp.solve(*problem, np.full(len(A), HARD, dtype=np.intc), primal_tol=EXACT)
+    if flag > 0:
+        return np.asarray(u), True
+    u, _, _, _ = daqp.solve(*problem, np.full(len(A), SOFT, dtype=np.intc), primal_tol=EXACT)
+    return np.asarray(u), False
