@@ -30,7 +30,7 @@ EXACT = 1e-10
 TURNS = 200
 SETTLED = 60
 """The turn as which the equations are damped: they hold already."""
-SLOWEST, GROWS = 1.0 / 32.0, 1.1
+SLOWEST, GROWS = 1.0 / 64.0, 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
 HARD, SOFT = 0, 8
 """What DAQP calls a wall, and one that may be overstepped."""
