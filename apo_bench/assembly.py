@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -173,6 +174,19 @@ class Assembly:
         for i, (contact, made, _) in enumerate(self.relations()):
             together.setdefault((made, contact.manipulated.part, contact.environment.part), []).append(i)
         return tuple(map(tuple, together.values()))
+
+    def without(self, left_out: Collection[str]) -> NDArray[np.bool_]:
+        """Which contacts are left, (c,) in the order of `relations()`, without some.
+
+        Args:
+            left_out: Whole relations, such as `R3`, or single contacts of one, such as `R3: stick.py on castle1.spy`.
+        """
+        relations = self.relations()
+        kept = np.ones(len(relations), dtype=np.bool_)
+        for i, arc in enumerate(self.arcs(), start=1):
+            for j in arc:
+                kept[j] = not {f"R{i}", f"R{i}: {relations[j].contact}"}.intersection(left_out)
+        return kept
 
 
 def _lost(moved: Mapping[str, Sequence[int]], contact: Contact, made: int) -> int | None:

@@ -19,8 +19,8 @@ CODES = MappingProxyType(
         # observe
         "not_seen": "operation {operation} was not seen",
         # correct
-        "inconsistent": "the contacts cannot all hold: the solver came to rest with a gap above the threshold",
-        "doubtful": "the correction is larger than the stated noise explains: a relation is probably wrong",
+        "inconsistent": "the contacts cannot all hold near what was seen: a gap above the threshold is left",
+        "doubtful": "a relation is probably wrong",
         "not_converged": "the solver did not come to rest within its iterations",
         "not_finite": "the correction holds a number that is not finite",
         # plan

@@ -158,7 +158,7 @@ class Suspect(NamedTuple):
     """A relation, and how well everything else fits without it."""
 
     relation: str
-    """R1, R2, ... as in the relation graph: all contacts of one operation between one pair of parts."""
+    """R1, R2, ... as in the relation graph: all contacts of one operation between one pair of parts; or one of them."""
     contacts: tuple[Contact, ...]
     made: int
     """The operation that made it, counted from 0."""
@@ -217,10 +217,12 @@ class Correction:
     """(steps, 4, 4) as in `Plan`; None stands for `goals` throughout."""
     test: Consistency | None = None
     """Whether the stated noise explains the correction; None of correctors that do not ask."""
+    test_after: Consistency | None = None
+    """The same without what was left out; None if nothing was."""
     covariance: Array | None = None
     """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown."""
     dropped: tuple[str, ...] = ()
-    """Relations that were left out, since the test named them."""
+    """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))

@@ -95,6 +95,11 @@ def test_chi_square_is_the_squared_length_of_the_correction() -> None:
         assert consistency_of(made).p_value == pytest.approx(p_value(length, 13))
 
 
+def off(contact: str) -> str:
+    """What the shifted contact is called."""
+    return contact.replace("spy", "spy_off").replace("top", "top_off")
+
+
 @pytest.mark.parametrize("kind", ALONG)
 def test_a_relation_that_is_wrong_by_far_is_named(kind: str) -> None:
     relation, contact = ALONG[kind]
@@ -114,7 +119,7 @@ def test_a_relation_that_is_wrong_by_far_is_named(kind: str) -> None:
             else:
                 assert made.ok
             named = next(suspect for suspect in test.suspects if suspect.relation == relation)
-            assert contact.replace("spy", "spy_off").replace("top", "top_off") in map(str, named.contacts)
+            assert off(contact) in map(str, named.contacts)
             assert named.made == (2 if kind == "redundant" else 0)
 
 
@@ -136,11 +141,13 @@ def test_what_to_do_if_the_test_fails(kind: str) -> None:
     wrong = "inconsistent" if kind == "redundant" else "converged"
     assert (apply.status, warn.status) == (wrong, wrong)
     assert refuse.status == ("inconsistent" if kind == "redundant" else "doubtful")
-    assert (drop.status, drop.dropped) == ("converged", (relation,))
+    assert (drop.status, drop.dropped) == ("converged", (f"{relation}: {off(contact)}",))
     assert not consistency_of(apply).suspects
     assert "suspected" not in apply.sentence
     assert f"suspected: {relation}" in warn.sentence
     assert f"left out: {relation}" in drop.sentence
+    assert drop.test_after is not None
+    assert drop.test_after.passes
     assert apply.dropped == warn.dropped == refuse.dropped == ()
     assert_allclose(warn.goals, apply.goals, rtol=0, atol=0)
     assert not consistency_of(drop).passes
@@ -149,10 +156,14 @@ def test_what_to_do_if_the_test_fails(kind: str) -> None:
 
 
 def test_what_is_left_out_no_longer_counts() -> None:
-    """The goals are those of the assembly without it."""
-    seen = look(scenes.stick_on_castles(), 3, {ALONG["redundant"][1]: 10.0})
+    """The goals are those of the assembly without the one contact of the relation that is wrong."""
+    contact = ALONG["redundant"][1]
+    seen = look(scenes.stick_on_castles(), 3, {contact: 10.0})
     made = ContactCorrector("drop")(seen)
-    right = correct(replace(seen, assembly=without(seen.assembly, "R3")), "contact")
+    kept = (
+        replace(o, contacts=tuple(c for c in o.contacts if str(c) != off(contact))) for o in seen.assembly.operations
+    )
+    right = correct(replace(seen, assembly=replace(seen.assembly, operations=tuple(kept))), "contact")
     assert_allclose(made.goals, right.goals, rtol=0, atol=1e-9)
     assert made.rank == right.rank
     assert made.gap_after_m > 5e-3
@@ -163,7 +174,10 @@ def test_two_wrong_relations_are_left_out_one_after_the_other() -> None:
     for seed in range(5):
         made = ContactCorrector("drop")(look(scenes.stick_on_castles(), seed, both))
         assert made.ok
-        assert set(made.dropped) == {"R3", "R4"}
+        first, second = both
+        whole, single = made.dropped
+        assert {whole, single.partition(":")[0]} == {"R3", "R4"}
+        assert single == {"R3": f"R3: {off(first)}", "R4": f"R4: {off(second)}"}[single[:2]]
 
 
 def test_four_wrong_relations_are_too_many_to_leave_out() -> None:

@@ -9,6 +9,7 @@ nothing that was seen tells them apart.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from math import sqrt
 
 import numpy as np
@@ -25,65 +26,48 @@ LEVEL = 0.01
 """False alarms that are accepted."""
 MOST = 64
 """Relations that are left out in turn; of more, those that pull hardest."""
+Measure = Callable[[NDArray[np.bool_]], Consistency]
+"""The test of a correction by some of the contacts, (c,)."""
 SOFT_M = 0.05e-3
 """Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured."""
 
 
-def consistency(
-    system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Array, level: float = LEVEL
-) -> Consistency:
-    """Test a solution, without looking for suspects.
+def suspects(
+    assembly: Assembly, among: NDArray[np.bool_], measure: Measure, pull: Callable[[], Array]
+) -> tuple[Suspect, ...]:
+    """Every relation that has contacts `among`, (c,), those considered, left out in turn; the most suspect first.
 
     Args:
-        seen: (n, 4, 4), the goals that were seen.
-        L: (n, 6, 6), their covariance is L L^t.
-        slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
+        pull: How hard each contact pulls, (c,): of more relations than `MOST`, only those that pull hardest are tried.
     """
-    chi_square, freedom = _measured(system, seen, L, found, slack_m)
-    return Consistency(chi_square, freedom, p_value(chi_square, freedom), level)
-
-
-def suspects(
-    assembly: Assembly, system: Compact, seen: Array, L: Array, slack_m: Array, among: NDArray[np.bool_]
-) -> tuple[Suspect, ...]:
-    """Every relation whose contacts are `among`, (c,), those considered, left out in turn; the most suspect first.
-
-    Of more than `MOST`, only the likeliest are tried.
-    """
-    relations, ranked = assembly.relations(), list[tuple[tuple[float, float], Suspect]]()
     every = assembly.arcs()
     considered = [i for i, arc in enumerate(every) if among[list(arc)].any()]
-    for i in _likely(assembly, considered, system, seen, L, slack_m, among):
+    if len(considered) > MOST:
+        size = pull()
+        considered = sorted(sorted(considered, key=lambda i: -size[list(every[i])].sum())[:MOST])
+    return _ranked(assembly, among, measure, [(f"R{i + 1}", every[i]) for i in considered])
+
+
+def narrowed(assembly: Assembly, among: NDArray[np.bool_], measure: Measure, relation: str) -> tuple[Suspect, ...]:
+    """The same for every contact of one relation, such as `R3`; each is called `R3: stick.py on castle1.spy`."""
+    arc = assembly.arcs()[int(relation.removeprefix("R")) - 1]
+    contacts = assembly.relations()
+    return _ranked(assembly, among, measure, [(f"{relation}: {contacts[j].contact}", (j,)) for j in arc if among[j]])
+
+
+def _ranked(
+    assembly: Assembly, among: NDArray[np.bool_], measure: Measure, groups: Sequence[tuple[str, tuple[int, ...]]]
+) -> tuple[Suspect, ...]:
+    """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
+    relations, found = assembly.relations(), list[Suspect]()
+    for name, group in groups:
         kept = among.copy()
-        kept[list(every[i])] = False
-        slack = slack_m[np.repeat(kept, 3)]
-        part = system.among(kept)
-        chi_square, freedom = _measured(part, seen, L, nearest(part, seen, L), slack)
-        p = p_value(chi_square, freedom)
-        contacts = tuple(relations[j].contact for j in every[i])
-        suspect = Suspect(f"R{i + 1}", contacts, relations[every[i][0]].made, chi_square, freedom, p)
-        ranked.append(((-p, (chi_square - freedom) / sqrt(2 * freedom + 1)), suspect))
-    return tuple(suspect for _, suspect in sorted(ranked, key=lambda one: one[0]))
-
-
-def _likely(
-    assembly: Assembly,
-    considered: list[int],
-    system: Compact,
-    seen: Array,
-    L: Array,
-    slack_m: Array,
-    among: NDArray[np.bool_],
-) -> list[int]:
-    """At most `MOST` of the arcs: those that pull hardest, by the weighted multipliers of their equations."""
-    if len(considered) <= MOST:
-        return considered
-    soft = np.hypot(slack_m, SOFT_M)[np.repeat(among, 3)]
-    pull = np.zeros((len(system), 3))
-    pull[among] = (nearest(system.among(among), seen, L, soft).e / soft).reshape(-1, 3)
-    size = (pull * pull).sum(axis=1)
-    arcs = assembly.arcs()
-    return sorted(sorted(considered, key=lambda i: -size[list(arcs[i])].sum())[:MOST])
+        kept[list(group)] = False
+        tested = measure(kept)
+        contacts = tuple(relations[j].contact for j in group)
+        numbers = tested.chi_square, tested.freedom, tested.p_value
+        found.append(Suspect(name, contacts, relations[group[0]].made, *numbers))
+    return tuple(sorted(found, key=lambda s: (-s.p_value, (s.chi_square - s.freedom) / sqrt(2 * s.freedom + 1))))
 
 
 def slack(fits: NDArray[np.bool_], system: Compact, play_m: float) -> Array:
@@ -105,8 +89,14 @@ def p_value(chi_square: float, freedom: int) -> float:
     return float(chdtrc(freedom, chi_square)) if freedom else 1.0
 
 
-def _measured(system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Array) -> tuple[float, int]:
-    """The squared length and its degrees of freedom; of contradictory contacts, with what is left of them."""
+def measured(system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Array) -> tuple[float, int]:
+    """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
+
+    Args:
+        seen: (n, 4, 4), the goals that were seen.
+        L: (n, 6, 6), their covariance is L L^t.
+        slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
+    """
     freedom = rank(found.Jt)
     if not found.finite:
         return np.inf, freedom

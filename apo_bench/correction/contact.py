@@ -18,7 +18,7 @@ from apo_bench.correction.manifold import Nearest, nearest
 from apo_bench.correction.posterior import freedom, marginals, rank
 from apo_bench.correction.problem import Problem, Solver, problem
 from apo_bench.errors import InputError
-from apo_bench.program import Consistency, Correction, Iterate, Observation
+from apo_bench.program import Consistency, Correction, Iterate, Observation, Suspect
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
 DROPS = 3
@@ -32,7 +32,8 @@ class ContactCorrector:
 
     doubt: Doubt = "warn"
     """`apply` says nothing, `warn` names the suspects and goes on, `refuse` does not go on (status `doubtful`), and
-    `drop` leaves the most suspect relation out, up to three in turn, until the test passes."""
+    `drop` leaves the most suspect relation out, or one contact of it if that is enough, up to three in turn, until the
+    test passes."""
     level: float = LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
     solver: Solver = nearest
@@ -65,18 +66,24 @@ class ContactCorrector:
         every = asked.without(())
         found, first = asked.solve(every, found)
         first = replace(first, level=self.level)
-        if not first.passes and self.doubt != "apply" and found.finite:
+        lost = not found.at_rest and asked.gap(found.goals, every) <= seen.gap_m
+        if not first.passes and self.doubt != "apply" and found.finite and not lost:
             first = replace(first, suspects=asked.suspects(every))
         kept, dropped, tested = every, tuple[str, ...](), first
         while self.doubt == "drop" and not tested.passes and found.finite and len(dropped) < DROPS:
-            worst = (asked.suspects(kept) if dropped else first.suspects)[:1]
-            dropped += tuple(suspect.relation for suspect in worst)
+            worst = asked.suspects(kept) if dropped else first.suspects
             if not worst:
                 break
+            dropped += (self._narrowed(asked, kept, worst[0]),)
             kept = asked.without(dropped)
             found, tested = asked.solve(kept)
             tested = replace(tested, level=self.level)
         return self._report(asked, found, kept, tested, first, dropped)
+
+    def _narrowed(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
+        """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
+        single = asked.narrowed(kept, worst.relation)[0]
+        return single.relation if single.p_value >= self.level else worst.relation
 
     def _report(
         self,
@@ -105,6 +112,7 @@ class ContactCorrector:
             rank=directions,
             trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),
             test=first,
+            test_after=tested if dropped else None,
             covariance=marginals(found, known.free) if known is not None and status == "converged" else None,
             dropped=dropped,
         )

@@ -106,8 +106,4 @@ def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.9
 def _equal(seen: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
     """The contacts that were equations, (c,): neither walls nor left out."""
     intervals = [seen.assembly.interval(relation.contact, seen.play_m) for relation in seen.assembly.relations()]
-    equal = np.array([low == high for low, high in intervals], dtype=np.bool_)
-    for i, arc in enumerate(seen.assembly.arcs(), start=1):
-        if f"R{i}" in dropped:
-            equal[list(arc)] = False
-    return equal
+    return np.array([low == high for low, high in intervals], dtype=np.bool_) & seen.assembly.without(dropped)

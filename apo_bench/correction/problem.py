@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.compact import Compact, compact
-from apo_bench.correction.consistency import SOFT_M, consistency, slack, suspects
+from apo_bench.correction.consistency import LEVEL, SOFT_M, measured, narrowed, p_value, slack, suspects
 from apo_bench.correction.equations import Equations, equations, largest
 from apo_bench.correction.manifold import Nearest, nearest
-from apo_bench.correction.walls import Walls, asked, between
+from apo_bench.correction.walls import Walls, asked, between, touching
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Consistency, Observation, Suspect
@@ -42,7 +42,11 @@ class Problem:
     solver: Solver
 
     def solve(self, kept: NDArray[np.bool_], found: Nearest | None = None) -> tuple[Nearest, Consistency]:
-        """The nearest goals by the contacts that are `kept`, (c,), and the test of the equations among them.
+        """The nearest goals by the contacts that are `kept`, (c,), and the test of their correction.
+
+        Of walls, those that are touched count like equations: given which they are, the squared length is chi-square
+        distributed with that many degrees of freedom more (Shapiro, "Towards a unified theory of inequality constrained
+        testing", 1988), if the truth touches them too, and shorter otherwise.
 
         Contacts that contradict each other have no nearest goals; those that share the contradiction out are returned.
 
@@ -50,30 +54,42 @@ class Problem:
             found: The nearest goals without walls, if they are known already.
         """
         chosen = kept & self.exact
-        part = self.compact.among(chosen)
-        slack_m = self.slack_m[np.repeat(chosen, 3)]
+        part, slack_m = self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
         found = self.solver(part, self.seen.goals, self.L) if found is None else found
-        tested = consistency(part, self.seen.goals, self.L, found, slack_m)
-        walls = self.walls.among(kept[~self.exact])
-        if not found.finite:
-            return found, tested
-        if largest(self.system.gaps(found.goals)[chosen]) > self.seen.gap_m:
+        chi_square, freedom = measured(part, self.seen.goals, self.L, found, slack_m)
+        if found.finite and largest(self.system.gaps(found.goals)[chosen]) > self.seen.gap_m:
             found = nearest(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
-        elif len(walls):
-            found = between(part, walls, self.seen.goals, self.L, found)
-        return found, tested
+        elif found.finite and kept[~self.exact].any():
+            walls = self.walls.among(kept[~self.exact])
+            held = between(part, walls, self.seen.goals, self.L, found)
+            touched = touching(found.Jt, walls, held)
+            chi_square += float(held.z @ held.z - found.z @ found.z)
+            found, freedom = held, freedom + touched
+        return found, Consistency(chi_square, freedom, p_value(chi_square, freedom), LEVEL)
 
     def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
         """Relations whose contacts are `kept`, the most suspect first."""
-        among = kept & self.exact
-        return suspects(self.seen.assembly, self.compact, self.seen.goals, self.L, self.slack_m, among)
+        return suspects(self.seen.assembly, kept, self._test, lambda: self._pull(kept))
+
+    def narrowed(self, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
+        """The contacts of one relation that are `kept`, the most suspect first."""
+        return narrowed(self.seen.assembly, kept, self._test, relation)
+
+    def _test(self, kept: NDArray[np.bool_]) -> Consistency:
+        return self.solve(kept)[1]
+
+    def _pull(self, kept: NDArray[np.bool_]) -> Array:
+        """How hard each contact pulls at the goals, (c,), by the multipliers of its equations."""
+        chosen = kept & self.exact
+        soft = np.hypot(self.slack_m, SOFT_M)[np.repeat(chosen, 3)]
+        pull = np.zeros((len(self.compact), 3))
+        relaxed = nearest(self.compact.among(chosen), self.seen.goals, self.L, soft)
+        pull[chosen] = (relaxed.e / soft).reshape(-1, 3)
+        return np.asarray((pull * pull).sum(axis=1))
 
     def without(self, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
-        """The contacts that are left without these relations, (c,)."""
-        kept = np.ones(len(self.compact), dtype=np.bool_)
-        for i, arc in enumerate(self.seen.assembly.arcs()):
-            kept[list(arc)] = f"R{i + 1}" not in dropped
-        return kept
+        """The contacts that are left without these relations or single contacts, (c,)."""
+        return self.seen.assembly.without(dropped)
 
     def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
         """The largest |e| of what is kept, [m]; of walls, by how much they are overstepped."""

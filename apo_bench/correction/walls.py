@@ -32,6 +32,8 @@ SETTLED = 60
 """The turn as which the equations are damped: they hold already."""
 SLOWEST, GROWS = 1.0 / 64.0, 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
+TOUCH_M = 1e-9
+"""A vertex nearer to its wall touches it."""
 HARD, SOFT = 0, 8
 """What DAQP calls a wall, and one that may be overstepped."""
 
@@ -115,6 +117,18 @@ def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest
         if over:
             break
     return Nearest(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
+
+
+def touching(Jt: Array, walls: Walls, found: Nearest) -> int:
+    """How many directions the walls that are touched fix beyond the equations.
+
+    Args:
+        Jt: (6 n, 3 c), the transposed Jacobian of the equations.
+    """
+    e, J = walls.system.linearised(found.goals)
+    at = (e <= walls.low + TOUCH_M) | (e >= walls.high - TOUCH_M)
+    J = (J[at].reshape(int(at.sum()), len(found.B), 1, 6) @ found.B).reshape(int(at.sum()), len(found.z))
+    return rank(np.concatenate([Jt, J.T], axis=1)) - rank(Jt) if at.any() else 0
 
 
 def paced(pace: float, step: Array, last: Array) -> float:
