@@ -77,6 +77,7 @@ def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) ->
         covariance=np.tile(covariance, (n, 1, 1)),
         seen=np.ones(n, dtype=np.bool_),
         gap_m=scenario.gap_mm * 1e-3,
+        play_m=scenario.clearance_mm * 1e-3,
     )
 
 

@@ -220,7 +220,8 @@ class Correction:
     test_after: Consistency | None = None
     """The same without what was left out; None if nothing was."""
     covariance: Array | None = None
-    """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown."""
+    """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown.
+    Contacts that are walls are not counted, so with walls it is an upper bound."""
     dropped: tuple[str, ...] = ()
     """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
 

@@ -42,7 +42,7 @@ class ContactCorrector:
     def __post_init__(self) -> None:
         if self.doubt not in ("apply", "warn", "refuse", "drop"):
             raise InputError(f"doubt={self.doubt!r} was given; apply, warn, refuse or drop is allowed.")
-        if not 0.0 < self.level < 1.0:
+        if not isinstance(self.level, float | int) or not 0.0 < self.level < 1.0:
             raise InputError(f"a test level of {self.level!r} was given; a number between 0 and 1 is allowed.")
 
     def __call__(self, seen: Observation) -> Correction:
