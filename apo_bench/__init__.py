@@ -1,7 +1,7 @@
 """Does a robot's replay of an observed assembly fit, with and without correction by face contacts?
 
 Importing the package registers `APOReplay-v0` with Gymnasium and does nothing else; what needs MuJoCo is imported
-by `gymnasium.make`. Without a simulator: `read_observation`, `correct` and `explain`.
+by `gymnasium.make`. Without a simulator: `read_observation`, `correct`, `correct_many` and `explain`.
 """
 
 from __future__ import annotations
@@ -13,14 +13,25 @@ from typing import Any
 import gymnasium
 
 __version__ = "0.1.0"
-__all__ = ["Corrected", "__version__", "correct", "explain", "load_scenario", "read_observation"]
+__all__ = [
+    "ContactCorrector",
+    "Corrected",
+    "__version__",
+    "correct",
+    "correct_many",
+    "explain",
+    "load_scenario",
+    "read_observation",
+]
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.env:APOReplay")
 
 _LATER = MappingProxyType(
     {
+        "ContactCorrector": "apo_bench.correction.contact",
         "Corrected": "apo_bench.corrected",
         "correct": "apo_bench.correction.correct",
+        "correct_many": "apo_bench.correction.many",
         "explain": "apo_bench.correction.explain",
         "load_scenario": "apo_bench.scenario_file",
         "read_observation": "apo_bench.observed",

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from apo_bench.correction.measured import measured
-from apo_bench.correction.returned import RIGID, checked
+from apo_bench.correction.admitted import check_observations
+from apo_bench.correction.measured import gap_of, measured
+from apo_bench.correction.returned import RIGID, check_near, checked
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
@@ -50,8 +53,10 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
             bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
 
     Raises:
-        InputError: There is no such corrector, or it returned something else, or a schedule that makes no sense.
+        InputError: There is no such corrector, the observation makes no sense, or the corrector returned something
+            else, or a schedule that makes no sense.
     """
+    check_observations((seen,))
     chosen = resolve(corrector, CORRECTORS, "corrector")
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     if not callable(chosen) or isinstance(chosen, type):
@@ -72,7 +77,19 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
             f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
         )
     goals = _bare(found.goals, len(seen.goals), name)
-    return checked(found, len(goals), name)
+    found = checked(found, seen.assembly, name)
+    if found.ok and not _ours(chosen):
+        before, after = gap_of(seen, seen.goals), gap_of(seen, goals)
+        found = replace(found, gap_before_m=before, gap_after_m=after)
+    return found
+
+
+def _ours(corrector: Any) -> bool:
+    """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead."""
+    while isinstance(corrector, partial):
+        corrector = corrector.func
+    module = getattr(corrector, "__module__", "")
+    return str(module).startswith("apo_bench.")
 
 
 def _bare(found: Any, n: int, name: str) -> Array:
@@ -88,6 +105,7 @@ def _bare(found: Any, n: int, name: str) -> Array:
         raise InputError(
             f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; {RIGID}."
         )
+    check_near(goals, name, "a goal for operation")
     return goals
 
 

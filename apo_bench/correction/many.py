@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly import Assembly
+from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.compact import Compact, compact, moments
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.equations import Equations, equations, lies_on
@@ -30,10 +31,17 @@ def correct_many(seen: Sequence[Observation], corrector: ContactCorrector = cont
         seen: Observations of one and the same assembly with the same start poses and play.
 
     Raises:
-        InputError: They are not, or a covariance is not positive definite.
+        InputError: They are not, one makes no sense, or a covariance is not positive definite.
     """
+    if isinstance(seen, Observation) or not isinstance(seen, Sequence):
+        raise InputError("correct_many needs a list of observations; ask `correct` for one, or make a list of them.")
+    if not isinstance(corrector, ContactCorrector):
+        raise InputError(
+            f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop')."
+        )
     if not seen:
         return ()
+    check_observations(seen)
     for i, other in enumerate(seen, start=1):
         if other.assembly is not seen[0].assembly or not _alike(other, seen[0]):
             raise InputError(

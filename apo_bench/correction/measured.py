@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from apo_bench import outcomes
 from apo_bench.correction.ending import refused, sentence
 from apo_bench.correction.equations import equations, gap, largest
 from apo_bench.correction.newton import CUT_OFF, LENGTH_M, least_step
+from apo_bench.correction.walls import asked
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 
@@ -35,6 +36,18 @@ def measured(seen: Observation, goals: Array, said: str) -> Correction:
     after = largest(e)
     said = sentence("converged", seen.gap_m) if after <= seen.gap_m else said
     return Correction(goals, "converged", said, freed, before, after, rank)
+
+
+def gap_of(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> float:
+    """The largest |e| at goals (n, 4, 4) of what is asked of the contacts, [m]; of walls, how far one is overstepped.
+
+    Args:
+        dropped: Relations, or single contacts, that do not count.
+    """
+    plain = equations(seen.assembly, seen.start, seen.goals)
+    system, exact, walls = asked(plain, seen.assembly, seen.play_m)
+    kept = seen.assembly.without(dropped)
+    return max(largest(system.gaps(goals)[kept & exact]), walls.among(kept[~exact]).overstepped(goals))
 
 
 def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:

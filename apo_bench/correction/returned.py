@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.assembly import Assembly
 from apo_bench.errors import InputError
-from apo_bench.geometry.rigid import rigid
-from apo_bench.program import Correction, Step, Try
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.rigid import FARTHEST_M, rigid
+from apo_bench.program import Consistency, Correction, Step, Try
 from apo_bench.schedule import REMEDY, fault
 
 RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
@@ -18,16 +20,30 @@ SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
 
 
-def checked(found: Correction, n: int, name: str) -> Correction:
-    """The correction of n operations by the corrector called `name`, its schedule made of steps.
+def checked(found: Correction, assembly: Assembly, name: str) -> Correction:
+    """The correction by the corrector called `name`, its schedule made of steps.
 
     Raises:
         InputError: The first thing that is wrong.
     """
     found = replace(found, schedule=_steps(found.schedule, name))
-    _check_numbers(found, n, name)
+    _check_numbers(found, len(assembly), name)
+    _check_words(found, assembly, name)
     _check_schedule(found, name)
     return found
+
+
+def check_near(T: Array, name: str, what: str) -> None:
+    """Refuse poses, (k, 4, 4), so far away that nothing can be computed with them.
+
+    Args:
+        what: What they are, before a number from 1: `a goal for operation`.
+    """
+    for k in np.flatnonzero((np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1)):
+        raise InputError(
+            f"the corrector '{name}' returned {what} {k + 1} with a position of {np.abs(T[k, :3, 3]).max():g} m; "
+            f"return numbers of at most {FARTHEST_M:g}, in metres."
+        )
 
 
 def _steps(schedule: Any, name: str) -> tuple[Step, ...]:
@@ -65,6 +81,21 @@ def _check_numbers(found: Correction, n: int, name: str) -> None:
             raise InputError(f"the corrector '{name}' returned {gap_m!r} as {field}; return a length in metres.")
 
 
+def _check_words(found: Correction, assembly: Assembly, name: str) -> None:
+    """What a person reads: a sentence, tests, relations that there are."""
+    said = found.sentence
+    if not isinstance(said, str) or not said.strip() or "\n" in said:
+        raise InputError(f"the corrector '{name}' returned {said!r} as its sentence; return one line of text.")
+    for field, test in (("test", found.test), ("test_after", found.test_after)):
+        if test is not None and not isinstance(test, Consistency):
+            raise InputError(f"the corrector '{name}' returned {test!r} as `{field}`; return a Consistency or None.")
+    for one in found.dropped if isinstance(found.dropped, tuple) else (found.dropped,):
+        if not isinstance(one, str) or assembly.without((one,)).all():
+            raise InputError(
+                f"the corrector '{name}' returned {one!r} in `dropped`; return a tuple of relations, such as 'R1'."
+            )
+
+
 def _listed(value: Any) -> Sequence[Any]:
     return value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)
 
@@ -87,6 +118,7 @@ def _check_schedule(found: Correction, name: str) -> None:
             f"the corrector '{name}' returned a target for step {j + 1} of its schedule that is not a rigid pose; "
             f"{RIGID}."
         )
+    check_near(found.targets, name, "a target for step")
     ends = {step.operation: i for i, step in enumerate(found.schedule) if not step.undo}
     for k, i in ends.items():
         if np.abs(found.targets[i] - found.goals[k]).max() > SAME:

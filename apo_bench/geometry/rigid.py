@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 TOLERANCE = 1e-6
 """How far R R^t may be from the identity."""
+FARTHEST_M = 1e4
+"""Nothing is farther from the origin: beyond it, rounding is no longer small."""
 
 
 def rigid(T: ArrayLike) -> NDArray[np.bool_]:

@@ -1,0 +1,83 @@
+"""What a corrector may be given: observations whose poses and numbers make sense, whoever made them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.rigid import FARTHEST_M, rigid
+from apo_bench.program import Observation
+
+ASYMMETRY = 1e-9
+"""Of its largest entry, how far a covariance may be from symmetric."""
+
+
+def check_observations(seen: Sequence[Any]) -> None:
+    """Refuse what no corrector can make sense of, before any is asked, so that the blame falls where it belongs.
+
+    Args:
+        seen: One, or several of one assembly with the same start poses.
+
+    Raises:
+        InputError: One is no `Observation`, a pose is not rigid or absurdly far away, a part has no start, a covariance
+            is not symmetric, or a length makes no sense.
+    """
+    for i, one in enumerate(seen):
+        if not isinstance(one, Observation):
+            raise InputError(f"an Observation is needed, {_kind(one)} was given; make one, or read it from a file.")
+        _check_lengths(one, _name(seen, i))
+    if not seen:
+        return
+    first = seen[0]
+    for part in first.assembly.solids:
+        if part not in first.start:
+            raise InputError(f"{_name(seen, 0)} has no start of the part '{part}'; state where every part starts.")
+    starts = np.array([first.start[part] for part in first.assembly.solids]).reshape(-1, 4, 4)
+    _check_poses(starts, lambda j: f"the start of '{list(first.assembly.solids)[j]}' in {_name(seen, 0)}")
+    _check_poses(np.concatenate([one.goals for one in seen]), lambda j: f"the goal of {_operation(seen, j)}")
+    C = np.concatenate([one.covariance for one in seen])
+    off, size = (np.abs(M).max(axis=(1, 2), initial=0.0) for M in (C - np.swapaxes(C, 1, 2), C))
+    for j in map(int, np.flatnonzero(off > ASYMMETRY * size)):
+        raise InputError(
+            f"the covariance of {_operation(seen, j)} is not symmetric; entry (i, j) must equal entry (j, i)."
+        )
+
+
+def _check_lengths(one: Observation, name: str) -> None:
+    for field, x, low in (("gap_m", one.gap_m, "above"), ("play_m", one.play_m, "from")):
+        number = isinstance(x, float | int | np.floating | np.integer) and not isinstance(x, bool)
+        if not number or not np.isfinite(x) or x < 0.0 or (low == "above" and x == 0.0):
+            raise InputError(f"{name} states {field}={x!r}; a finite length {low} 0 is needed, in metres.")
+
+
+def _check_poses(T: Array, name: Callable[[int], str]) -> None:
+    """Poses (p, 4, 4); `name` says which one is number j."""
+    for j in map(int, np.flatnonzero(~rigid(T))):
+        raise InputError(
+            f"{name(j)} is not a rigid pose; give a rotation matrix, a position [m] and the last row (0, 0, 0, 1)."
+        )
+    for j in map(int, np.flatnonzero((np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1))):
+        raise InputError(
+            f"{name(j)} has a position of {np.abs(T[j, :3, 3]).max():g} m; numbers of at most {FARTHEST_M:g} are "
+            "allowed, so check the unit."
+        )
+
+
+def _operation(seen: Sequence[Observation], j: int) -> str:
+    """Row j of all operations of all observations: `operation 2 in observation 3`."""
+    i, k = [(i, k) for i, one in enumerate(seen) for k in range(len(one.goals))][j]
+    return f"operation {k + 1} in {_name(seen, i)}"
+
+
+def _name(seen: Sequence[Any], i: int) -> str:
+    return f"observation {i + 1}" if len(seen) > 1 else "the observation"
+
+
+def _kind(value: Any) -> str:
+    """`None`, `a list`."""
+    name = type(value).__name__
+    return "None" if value is None else f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
