@@ -11,6 +11,8 @@ from apo_bench.benchmark.statistics import Cell
 CEILING = "#444444"
 DODGE = 0.07
 """Methods stand this far from each other at one level, so that equal rates do not hide each other."""
+BESIDE = 3
+"""Panels in a line, if there is but one per scenario, clearance and noise."""
 MANY = 3
 """With more methods than this in a panel, the numbers of trials are left to the table."""
 
@@ -75,20 +77,25 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
     careless = sorted({c.careless for c in swept}) or [0.0]
     lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
     columns = [(relations, f) for relations in dict.fromkeys(row.relations for row in rows) for f in careless]
-    figure = Figure(figsize=(0.9 + 4.3 * len(columns), 1.0 + 3.1 * len(lines)), layout="constrained")
+    panels = [[(line._replace(relations=relations), f) for relations, f in columns] for line in lines]
+    if len(columns) == 1:
+        alone = [panel for line in panels for panel in line]
+        panels = [alone[i : i + BESIDE] for i in range(0, len(alone), BESIDE)]
+    width = max(map(len, panels))
+    figure = Figure(figsize=(0.9 + 4.3 * width, 1.0 + 3.1 * len(panels)), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(lines), len(columns), squeeze=False, sharey=True)
-    for i, line in enumerate(lines):
-        for j, (relations, f) in enumerate(columns):
-            row = line._replace(relations=relations)
+    axes = figure.subplots(len(panels), width, squeeze=False, sharey=True)
+    for i, across in enumerate(axes):
+        for j, axis in enumerate(across):
+            row, f = panels[i][j] if j < len(panels[i]) else (None, 0.0)
             if row not in rows:
-                axes[i][j].set_axis_off()
+                axis.set_axis_off()
                 continue
-            axes[i][j].set_title(row.title(f), fontsize=10)
-            _panel(axes[i][j], [c for c in cells if row.holds(c)], f)
-        axes[i][0].set_ylabel("strict success")
+            axis.set_title(row.title(f), fontsize=10)
+            _panel(axis, [c for c in cells if row.holds(c)], f)
+        across[0].set_ylabel("strict success")
     figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
-    legend(figure, axes, len(columns))
+    legend(figure, axes, width)
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
 
