@@ -28,6 +28,15 @@ def words(text: str, option: str) -> tuple[str, ...]:
     return found
 
 
+def path_given(text: str) -> Path:
+    """A path that names something: the empty text would stand for the current folder."""
+    import typer
+
+    if not text.strip():
+        raise typer.BadParameter("an empty path was given; name a folder.")
+    return Path(text)
+
+
 def check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
     """Refuse, before any work is done, a file that has another ending or cannot be written."""
     allowed = " or ".join(endings)

@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from apo_bench import __version__
-from apo_bench.arguments import check_writable, cores, numbers, words
+from apo_bench.arguments import check_writable, cores, numbers, path_given, words
 from apo_bench.cli_correction import register
 from apo_bench.errors import InputError
 
@@ -111,8 +111,8 @@ def graph(
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
     from apo_bench.benchmark.graph_picture import draw_graph
     from apo_bench.benchmark.graph_text import graph_form, graph_lines, graph_title
-    from apo_bench.files import read_observation
     from apo_bench.graph import relation_graph, seen_residuals
+    from apo_bench.observed import read_observation
     from apo_bench.scenario_file import load_scenario
 
     if out is not None:
@@ -169,7 +169,7 @@ def replay(
     level_mm: Annotated[float | None, typer.Option(help="Only the mm; default: the level.")] = None,
     level_deg: Annotated[float | None, typer.Option(help="Only the degrees; default: the level.")] = None,
     careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
-    seed: Annotated[int, typer.Option(help="Number of the trial.")] = 0,
+    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
     method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "none",
     clearance: Clearance = None,
     grasp: GraspOption = "friction",
@@ -225,7 +225,12 @@ def replay(
 @app.command()
 def sweep(
     scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Names, or scenario files.")],
-    out: Annotated[Path, typer.Option(help="Folder of the rows; one that was interrupted is continued.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            parser=path_given, metavar="<path>", help="Folder of the rows; one that was interrupted is continued."
+        ),
+    ],
     levels: Annotated[str, typer.Option(help="Noise levels, mm and degrees.")] = "0,0.1,0.25,0.5,1,2,4",
     careless: Annotated[str, typer.Option(help="Carelessness of the human.")] = "0,1",
     methods: Annotated[str, typer.Option(help="oracle, none and correctors.")] = "oracle,none,paper,contact",

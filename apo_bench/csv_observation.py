@@ -19,18 +19,15 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import Assembly
+from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, within
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.rigid import FARTHEST_M
 from apo_bench.layout import layout_at
 from apo_bench.program import Observation
 from apo_bench.scenario import Scenario
 from apo_bench.strict_csv import Columns, Row, read_csv
-
-DEVIATION_MM, DEVIATION_DEG = 1.0, 1.0
-"""What is assumed where a file states no standard deviations."""
-LARGEST_M = 1e4
-"""Nothing is farther from the origin."""
 
 POSITION, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
@@ -75,8 +72,8 @@ def read_table(
                 f"give one row for each of the {len(assembly)} operations."
             )
     ordered = [rows[k] for k in range(len(assembly))]
-    shift = [_deviation(row, "deviation", deviation_mm * 1e-3, LARGEST_M) for row in ordered]
-    turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), math.tau) for row in ordered]
+    shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
+    turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
     stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
     seen = Observation(
         assembly=assembly,
@@ -115,7 +112,14 @@ def _operation(row: Row, assembly: Assembly) -> int:
 
 
 def _pose(row: Row) -> Array:
-    position = [row.number(name, LARGEST_M) for name in POSITION]
+    position = [row.number(name, FARTHEST_M) for name in POSITION]
+    x, *others = (row.cells[name] for name in POSITION)
+    for other in others:
+        if other[2] != x[2]:
+            raise InputError(
+                f"{row.file}: the columns '{x[0]}' and '{other[0]}' are of different units; "
+                "give all three positions in mm, or all in m."
+            )
     q = np.array([row.number(name, 2.0) for name in QUATERNION])
     if abs(np.linalg.norm(q) - 1.0) > 1e-3:
         raise InputError(
@@ -125,19 +129,20 @@ def _pose(row: Row) -> Array:
     return pose.unpack(np.array([*position, *q]))
 
 
-def _deviation(row: Row, meaning: str, assumed: float, largest: float) -> float:
+def _deviation(row: Row, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
     """A standard deviation; the assumed one if the cell is empty."""
     if not row.text(meaning):
         return assumed
-    x = row.number(meaning, largest)
-    if x <= 0.0:
-        row.fail(meaning, "a standard deviation above 0 is needed")
+    x, unit = row.number(meaning, math.inf), row.cells[meaning][2]
+    if not within(x, limits):
+        low, high = (limit / unit for limit in limits)
+        row.fail(meaning, f"a standard deviation from {low:g} to {high:g} is needed")
     return x
 
 
 def _play(rows: Sequence[Row], assumed: float) -> float:
     """The play of parts that fit, [m], which is one number for all rows."""
-    stated = [(row, row.number("play", LARGEST_M)) for row in rows if row.text("play")]
+    stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
         if x < 0.0:
             row.fail("play", "a length from 0 is needed")

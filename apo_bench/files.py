@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Assembly
+from apo_bench.deviations import ALLOWED, SHIFT_M, TURN_RAD, sensible, within
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -28,6 +29,7 @@ DEMONSTRATION = "apo-bench/demonstration/1"
 OBSERVATION = "apo-bench/observation/1"
 PLAN = "apo-bench/plan/2"
 
+_DEVIATIONS = ("deviation_mm", "deviation_deg")
 _POSE = ("position_mm", "quaternion_wxyz")
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 
@@ -111,19 +113,32 @@ def read_observation(path: str | Path, scenario: Scenario | None = None) -> Obse
     Raises:
         InputError: Anything in the file that is not as described, naming file and key.
     """
+    return read_observed(path, scenario, None)[0]
+
+
+def read_observed(
+    path: str | Path, scenario: Scenario | None, assumed: tuple[float, float] | None
+) -> tuple[Observation, bool]:
+    """The same, and whether a standard deviation had to be assumed.
+
+    Args:
+        assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.
+    """
     root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm", "play_mm"))
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], found.assembly, (), stated)
-    return Observation(
+    seen = Observation(
         assembly=found.assembly,
         start=_poses(root["start"], found) if "start" in root else _own_start(found),
-        goals=np.array([_pose(entry) for entry in entries]),
-        covariance=np.array([_stated(entry) for entry in entries]),
+        goals=np.array([_pose(entry) for entry in entries]).reshape(-1, 4, 4),
+        covariance=np.array([_stated(entry, assumed) for entry in entries]).reshape(-1, 6, 6),
         seen=np.array([entry["seen"].flag() if "seen" in entry else True for entry in entries]),
         gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else found.gap_mm * 1e-3,
         play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
     )
+    complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
+    return seen, not complete
 
 
 def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
@@ -232,19 +247,32 @@ def _covariance(node: Node, *, definite: bool = True) -> Array:
     return (C + C.T) / 2 / np.outer(_TO_MM_DEG, _TO_MM_DEG)
 
 
-def _stated(entry: Mapping[str, Node]) -> Array:
-    """The covariance of an operation, (6, 6) [m, rad], out of either way to state it."""
-    by_deviation = [key for key in ("deviation_mm", "deviation_deg") if key in entry]
+def _stated(entry: Mapping[str, Node], assumed: tuple[float, float] | None) -> Array:
+    """The covariance of an operation, (6, 6) [m, rad], out of either way to state it, or of what is assumed."""
+    by_deviation = [key for key in _DEVIATIONS if key in entry]
     if "covariance_mm_deg" in entry and not by_deviation:
-        return _covariance(entry["covariance_mm_deg"])
-    if "covariance_mm_deg" in entry or len(by_deviation) != 2:
+        C = _covariance(entry["covariance_mm_deg"])
+        if not sensible(C):
+            node = entry["covariance_mm_deg"]
+            raise InputError(f"{node.file}, {node.key}: the square root of a variance is out of range; {ALLOWED}.")
+        return C
+    if "covariance_mm_deg" in entry or (assumed is None and len(by_deviation) != 2):
         node = entry["operation"]
         raise InputError(
             f"{node.file}, {node.key.removesuffix(', operation')}: state either 'covariance_mm_deg' or both "
             f"'deviation_mm' and 'deviation_deg', {_named(entry, by_deviation)} was given."
         )
-    mm, deg = (entry[key].number(0.0, above=True) for key in by_deviation)
+    mm, deg = assumed or (0.0, 0.0)
+    mm = _deviation(entry["deviation_mm"], SHIFT_M, 1e-3) if "deviation_mm" in entry else mm
+    deg = _deviation(entry["deviation_deg"], TURN_RAD, np.pi / 180.0) if "deviation_deg" in entry else deg
     return np.diag(np.array([mm] * 3 + [deg] * 3) / _TO_MM_DEG) ** 2
+
+
+def _deviation(node: Node, limits: tuple[float, float], unit: float) -> float:
+    x = node.number(0.0, above=True)
+    if not within(x * unit, limits):
+        node.fail(f"a standard deviation from {limits[0] / unit:g} to {limits[1] / unit:g} is needed")
+    return x
 
 
 def _named(entry: Mapping[str, Node], by_deviation: list[str]) -> str:

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.csv_observation import DEVIATION_DEG, DEVIATION_MM, LARGEST_M, read_table
+from apo_bench.csv_observation import read_table
+from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
 from apo_bench.errors import InputError
+from apo_bench.geometry.rigid import FARTHEST_M
 from apo_bench.layout import layout_at
 from apo_bench.program import Observation
 from apo_bench.scenario import Scenario
@@ -35,7 +37,7 @@ def read_observation(
 
     Args:
         scenario: The scenario it is of, its name, or its file.
-        deviation_mm: Standard deviation along each axis where a CSV file states none.
+        deviation_mm: Standard deviation along each axis where the file states none.
         deviation_deg: The same about each axis.
 
     Raises:
@@ -56,13 +58,35 @@ def observed(
     from apo_bench.scenario_file import load_scenario
 
     check_deviations(deviation_mm, deviation_deg)
+    if not isinstance(path, str | Path):
+        raise InputError(f"{path!r} was given as an observation; give the path of a .csv or .json file.")
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
-        seen = files.read_observation(path, known)
+        seen, assumed = files.read_observed(path, known, (deviation_mm, deviation_deg))
         _check_near(path, seen)
-        return Observed(seen, known, False)
-    seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
+    else:
+        seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
     return Observed(seen, known, assumed)
+
+
+def read_stated(path: str | Path, scenario: Scenario) -> Observation:
+    """An observation from a file that states every standard deviation itself.
+
+    Raises:
+        InputError: As `read_observation`, or one is missing.
+    """
+    if Path(path).suffix.lower() != ".csv":
+        from apo_bench import files
+
+        seen = files.read_observation(path, scenario)
+        _check_near(path, seen)
+        return seen
+    seen, _, assumed = observed(path, scenario)
+    if assumed:
+        raise InputError(
+            f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row."
+        )
+    return seen
 
 
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
@@ -81,22 +105,11 @@ def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) ->
     )
 
 
-def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
-    """Refuse standard deviations that make no sense.
-
-    Raises:
-        InputError: One is not above 0, or absurdly large.
-    """
-    for name, given, largest in (("deviation_mm", deviation_mm, 1e6), ("deviation_deg", deviation_deg, 360.0)):
-        if not 0.0 < given <= largest:
-            raise InputError(f"{name} {given:g} was given; a number above 0 and at most {largest:g} is allowed.")
-
-
 def _check_near(path: str | Path, seen: Observation) -> None:
     """Refuse poses so far away that nothing can be computed with them; a CSV file is checked cell by cell."""
     for k, T in enumerate(seen.goals):
-        if np.abs(T[:3, 3]).max() > LARGEST_M:
+        if np.abs(T[:3, 3]).max() > FARTHEST_M:
             raise InputError(
-                f"{path}, operation {k + 1}, position_mm: numbers of at most {LARGEST_M * 1e3:g} are needed, "
+                f"{path}, operation {k + 1}, position_mm: numbers of at most {FARTHEST_M * 1e3:g} are needed, "
                 f"{np.abs(T[:3, 3]).max() * 1e3:g} was given."
             )

@@ -44,7 +44,8 @@ class Row:
         except ValueError:
             x = math.nan
         if not abs(x) <= largest:
-            self.fail(meaning, f"a number of at most {largest / unit:g} is needed")
+            limit = f" of at most {largest / unit:g}" if math.isfinite(largest) else ""
+            self.fail(meaning, f"a number{limit} is needed")
         return x
 
 
@@ -84,7 +85,7 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
 def _text(path: Path) -> str:
     try:
         if path.is_dir():
-            raise InputError(f"{path}: a CSV file is needed, a folder was given.")
+            raise InputError(f"{path}: a file is needed, a folder was given.")
         if path.stat().st_size > LARGEST_BYTES:
             raise InputError(
                 f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give one row per operation."
@@ -102,6 +103,7 @@ def _header(place: str, names: Sequence[str], columns: Columns, required: Sequen
     taken = dict[str, str]()
     for column in found:
         if column not in columns:
+            _check_separator(place, names)
             longer = [name for name in columns if column and name.startswith(f"{column}_")]
             near = longer or get_close_matches(column, columns, n=1, cutoff=0.3)
             hint = f"did you mean '{near[0]}'? Allowed are" if near else "allowed are"
@@ -115,6 +117,15 @@ def _header(place: str, names: Sequence[str], columns: Columns, required: Sequen
             column = next(name for name, (m, _) in columns.items() if m == meaning)
             raise InputError(f"{place}: the column '{column}' is missing; needed are {_shown(columns, required)}.")
     return found
+
+
+def _check_separator(place: str, names: Sequence[str]) -> None:
+    """Refuse what spreadsheets of some countries put in place of commas."""
+    for separator, called in ((";", "';'"), ("\t", "tabs"), ("|", "'|'")):
+        if len(names) == 1 and separator in names[0]:
+            raise InputError(
+                f"{place}: columns are separated by commas; this file uses {called}, so save it with commas."
+            )
 
 
 def _shown(columns: Columns, meanings: Sequence[str] = ()) -> str:

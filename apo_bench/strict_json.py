@@ -45,9 +45,9 @@ class Node:
         for key in self.value:
             if key not in known:
                 near = get_close_matches(key, known, n=1, cutoff=0.5)
-                hint = f"; did you mean '{near[0]}'?" if near else ";"
+                hint = f"; did you mean '{near[0]}'? Allowed" if near else "; allowed"
                 place = f"{self.file}, {self.key}" if self.key else self.file
-                raise InputError(f"{place}: unknown key '{key}'{hint} Allowed: {', '.join(known)}.")
+                raise InputError(f"{place}: unknown key '{key}'{hint}: {', '.join(known)}.")
         for key in required:
             if key not in self.value:
                 place = f"{self.file}, {self.key}" if self.key else self.file
@@ -107,12 +107,12 @@ def read_json(path: str | Path) -> Node:
     path = Path(path)
     try:
         if path.is_dir():
-            raise InputError(f"{path}: a JSON file is needed, a folder was given.")
+            raise InputError(f"{path}: a file is needed, a folder was given.")
         if path.stat().st_size > LARGEST_BYTES:
             raise InputError(
                 f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give a single document."
             )
-        text = path.read_bytes().decode("utf-8")
+        text = path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
     except UnicodeDecodeError as error:

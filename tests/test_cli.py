@@ -18,6 +18,7 @@ from apo_bench.benchmark.spec import ROW
 from apo_bench.scenario_file import load_scenario, scenario_names
 
 TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld")
+MEASURED = ("replay", "stick_in_tower", "--grasp", "weld")
 HOPELESS = ("--level", "40")
 """Plans at this level are refused before the arm moves, so that a replay costs little."""
 
@@ -157,7 +158,7 @@ def test_levels_can_be_set_apart(capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "seen.json"
     _, drawn, _ = run(capsys, *TRIAL, *HOPELESS, "--json", "--save-observation", str(path))
-    code, measured, err = run(capsys, *TRIAL, "--observation", str(path), "--json")
+    code, measured, err = run(capsys, *MEASURED, "--observation", str(path), "--json")
     assert (code, err) == (0, "")
     before, after = json.loads(drawn), json.loads(measured)
     for key in ("success", "failure_stage", "failure_code", "failure_operation"):
@@ -165,8 +166,20 @@ def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str
     assert after["gap_before_mm"] == pytest.approx(before["gap_before_mm"], rel=1e-9)
     assert (after["level"], after["noise"]) == (None, "measured")
     assert after["spec_hash"] != before["spec_hash"]
-    _, out, _ = run(capsys, *TRIAL, "--observation", str(path))
+    _, out, _ = run(capsys, *MEASURED, "--observation", str(path))
     assert "measured observation" in out
+
+
+def test_a_table_is_replayed_like_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Of noise that is not stated nothing is assumed; the graph, which needs none, is printed all the same."""
+    seen = Path(__file__).parent.parent / "docs" / "seen.csv"
+    code, out, err = run(capsys, *MEASURED, "--observation", str(seen), "--method", "contact", "--json")
+    assert (code, err, json.loads(out)["success"]) == (0, "", True)
+    path = tmp_path / "bare.csv"
+    path.write_text("\n".join(",".join(line.split(",")[:9]) for line in seen.read_text().splitlines()))
+    _refused(run(capsys, *MEASURED, "--observation", str(path)), "standard deviations are missing; add columns")
+    code, out, err = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
+    assert (code, err, "mm" in out) == (0, "", True)
 
 
 def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -192,7 +205,7 @@ def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], t
     document = json.loads(seen.read_text())
     document["operations"][1]["seen"] = False
     seen.write_text(json.dumps(document))
-    code, out, err = run(capsys, *TRIAL, "--observation", str(seen), "--video", str(path))
+    code, out, err = run(capsys, *MEASURED, "--observation", str(seen), "--video", str(path))
     assert code == 0
     assert "failure at stage observe: not_seen, operation 2" in out
     assert err == f"apo-bench: nothing was replayed, so {path} was not written.\n"
@@ -252,6 +265,7 @@ WRONG = {
     "film folder": (("--video", "/no/such/folder/film.mp4"), "cannot be written"),
     "observation": (("--observation", "/no/such/file.json"), "cannot be read"),
     "both": (("--observation", "x.json", "--level", "1"), "--level was given together with --observation"),
+    "seed of a file": (("--observation", "x.json", "--seed", "0"), "--seed was given together with --observation"),
     "oracle of a file": (("--observation", "SEEN", "--method", "oracle"), "truth is not known"),
     "unknown option": (("--nois", "isotropic"), "--nois"),
 }
@@ -264,7 +278,8 @@ def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture
         path = tmp_path / "seen.json"
         run(capsys, *TRIAL, *HOPELESS, "--save-observation", str(path))
         arguments = tuple(str(path) if a == "SEEN" else a for a in arguments)
-    _refused(run(capsys, *TRIAL, *arguments), words)
+    trial = MEASURED if "--observation" in arguments else TRIAL
+    _refused(run(capsys, *trial, *arguments), words)
 
 
 @pytest.mark.parametrize(
@@ -279,6 +294,7 @@ def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture
         (("scene", "stick_in_tower", "--out", "a.xml", "--clearance", "-1"), "clearance of -1"),
         (("sweep", "stick_in_tower"), "out"),
         (("sweep", "stick_in_tower", "--out", "OUT", "--trials", "0"), "0 trials"),
+        (("sweep", "stick_in_tower", "--out", ""), "an empty path was given"),
         (("sweep", "stick_in_tower", "--out", "OUT", "--methods", "foo"), "unknown method 'foo'"),
         (("sweep", "stick_in_tower", "--out", "OUT", "--methods", "none,,paper"), "single commas"),
         (("sweep", "stick_in_tower", "--out", "OUT", "--levels", "0,abc"), "--levels 0,abc"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from apo_bench import files
 from apo_bench.csv_observation import read_table, table
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.observed import observed
+from apo_bench.observed import observed, read_stated
 from apo_bench.scenario_file import load_scenario
 
 SCENARIO = load_scenario("stick_in_tower")
@@ -33,17 +34,17 @@ def test_millimetres_and_wxyz(tmp_path: Path) -> None:
     assert np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2)) == pytest.approx(
         np.tile([2e-3] * 3 + [np.radians(0.5)] * 3, (3, 1))
     )
-    assert (assumed, seen.seen.all(), seen.gap_m, seen.play_m) == (True, True, 1e-4, 2.5e-4)
+    assert (assumed, bool(seen.seen.all()), seen.gap_m, seen.play_m) == (True, True, 1e-4, 2.5e-4)
 
 
 def test_columns_are_known_by_their_names(tmp_path: Path) -> None:
     """Metres, quaternions with w last, any order of columns and rows, and what spreadsheets add to a file."""
     other = tmp_path / "other.csv"
     other.write_bytes(
-        b"\xef\xbb\xbfpart, operation, qx, qy, qz, QW, z_m, y_m, x_mm, seen\r\n"
-        b"stick,3,0,0,0,1,0.04,0.0205,119,yes\r\n\r\n"
-        b'"castle1",1,0,0,0,1,0,0.02,120,\r\n'
-        b"castle2,2,1,0,0,0,0.08,0.02,121,false\r\n"
+        b"\xef\xbb\xbfpart, operation, qx, qy, qz, QW, z_m, y_m, x_m, seen\r\n"
+        b"stick,3,0,0,0,1,0.04,0.0205,0.119,yes\r\n\r\n"
+        b'"castle1",1,0,0,0,1,0,0.02,0.12,\r\n'
+        b"castle2,2,1,0,0,0,0.08,0.02,0.121,false\r\n"
     )
     seen, _ = read_table(other, SCENARIO)
     assert seen.goals == pytest.approx(read_table(written(tmp_path, *ROWS), SCENARIO)[0].goals, abs=1e-15)
@@ -108,7 +109,9 @@ def test_play_is_one_number(tmp_path: Path, play: str) -> None:
         ({0: HEADER.replace("qw", "w")}, "unknown column 'w'; did you mean 'qw'"),
         ({0: HEADER.replace(",z_mm", "")}, "line 1: the column 'z_mm' is missing"),
         ({0: HEADER.replace("y_mm", "x_m")}, "line 1: the columns 'x_mm' and 'x_m' say the same; keep one."),
-        ({0: HEADER.replace(",", ";")}, "unknown column 'operation;part"),
+        ({0: HEADER.replace(",", ";")}, "line 1: columns are separated by commas; this file uses ';', so save it with"),
+        ({0: HEADER.replace(",", "\t")}, "columns are separated by commas; this file uses tabs"),
+        ({0: HEADER.replace("y_mm", "y_m")}, "the columns 'x_mm' and 'y_m' are of different units; give all three"),
         ({2: "2,castle2,121,20,80,0,1,0"}, "line 3: 9 cells are needed, one for each column, 8 were given."),
         ({2: "2,castle2,121,20,80,0,1,0,0,9"}, "line 3: 9 cells are needed, one for each column, 10 were given."),
         ({2: "2,castle2,nan,20,80,0,1,0,0"}, "line 3, column x_mm: a number of at most 1e+07 is needed, 'nan'"),
@@ -141,9 +144,13 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path: Path, change: dict[int,
 @pytest.mark.parametrize(
     ("column", "cell", "message"),
     [
-        ("deviation_mm", "0", "column deviation_mm: a standard deviation above 0 is needed, '0' was given."),
-        ("deviation_mm", "-1", "column deviation_mm: a standard deviation above 0 is needed"),
-        ("deviation_deg", "361", "column deviation_deg: a number of at most 360 is needed"),
+        ("deviation_mm", "0", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed, '0' was"),
+        ("deviation_mm", "-1", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed"),
+        ("deviation_mm", "0.00009", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed"),
+        ("deviation_m", "11", "column deviation_m: a standard deviation from 1e-07 to 10 is needed, '11' was given."),
+        ("deviation_mm", "inf", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed"),
+        ("deviation_mm", "nan", "column deviation_mm: a number is needed, 'nan' was given."),
+        ("deviation_deg", "181", "column deviation_deg: a standard deviation from 0.0001 to 180 is needed"),
         ("seen", "maybe", "column seen: true or false is needed, 'maybe' was given."),
     ],
 )
@@ -169,10 +176,39 @@ def test_files_that_are_none(tmp_path: Path) -> None:
             read_table(path, SCENARIO)
 
 
-@pytest.mark.parametrize("given", [{"deviation_mm": 0.0}, {"deviation_deg": float("nan")}, {"deviation_mm": -1.0}])
-def test_assumed_deviations_are_checked(tmp_path: Path, given: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="a number above 0 and at most"):
+@pytest.mark.parametrize(
+    "given",
+    [
+        *({"deviation_mm": x} for x in (0.0, -1.0, 0.9e-4, 1.1e4, "1")),
+        *({"deviation_deg": x} for x in (float("nan"), 181.0, 0.9e-4)),
+    ],
+)
+def test_assumed_deviations_are_checked(tmp_path: Path, given: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"was given; a number from 0\.0001 to (10000|180) is allowed\."):
         apo_bench.read_observation(written(tmp_path, *ROWS), "stick_in_tower", **given)
+
+
+@pytest.mark.parametrize(("mm", "deg"), [(1e-4, 1e-4), (1e4, 180.0)])
+def test_the_limits_themselves_are_allowed(tmp_path: Path, mm: float, deg: float) -> None:
+    lines = [f"{HEADER},deviation_mm,deviation_deg", *(f"{row},{mm!r},{deg!r}" for row in ROWS[1:])]
+    for seen in (
+        read_table(written(tmp_path, *lines), SCENARIO)[0],
+        apo_bench.read_observation(written(tmp_path, *ROWS), SCENARIO, deviation_mm=mm, deviation_deg=deg),
+    ):
+        made = apo_bench.correct(seen)
+        assert (made.ok, made.rank, apo_bench.explain(seen, made.goals).rank) == (True, 13, 13)
+
+
+def test_a_path_is_needed() -> None:
+    with pytest.raises(InputError, match=r"None was given as an observation; give the path of a \.csv or \.json file"):
+        apo_bench.read_observation(None, SCENARIO)
+
+
+def test_only_files_that_state_their_noise_are_read_without_assuming(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="standard deviations are missing; add columns deviation_mm and deviation_deg"):
+        read_stated(written(tmp_path, *ROWS), SCENARIO)
+    full = [f"{HEADER},deviation_mm,deviation_deg", *(f"{row},2,1" for row in ROWS[1:])]
+    assert read_stated(written(tmp_path, *full), SCENARIO).goals.shape == (3, 4, 4)
 
 
 def test_three_lines_correct_a_table(tmp_path: Path) -> None:

@@ -240,6 +240,14 @@ BROKEN = {
     ),
     "small covariance": (_set("operations", 0, "covariance_mm_deg", to=[[1.0]]), "6 x 6 finite numbers"),
     "no covariance": (_drop("operations", 0, "covariance_mm_deg"), "operation 1: state either"),
+    "tiny covariance": (
+        _set("operations", 0, "covariance_mm_deg", to=(1e-9 * np.eye(6)).tolist()),
+        "covariance_mm_deg: the square root of a variance is out of range; standard deviations from 0.0001 to 10000 mm",
+    ),
+    "huge covariance": (
+        _set("operations", 0, "covariance_mm_deg", to=np.diag([1.0] * 5 + [181.0**2]).tolist()),
+        "covariance_mm_deg: the square root of a variance is out of range",
+    ),
     "both kinds": (_set("operations", 0, "deviation_mm", to=1.0), "operation 1: state either"),
     "seen is a number": (_set("operations", 0, "seen", to=1), "seen: true or false"),
     "unknown part at start": (_set("start", "castle3", to=None), "unknown part 'castle3'"),
@@ -279,6 +287,26 @@ def test_a_broken_observation_is_refused_in_one_sentence(case: str, tmp_path: Pa
 def test_text_that_is_no_document_is_refused(text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
         read(tmp_path, text)
+
+
+def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
+    document = form()
+    del document["operations"][0]["covariance_mm_deg"]
+    first, second = document["operations"][1], document["operations"][2]
+    del second["covariance_mm_deg"]
+    second["deviation_mm"] = 3.0
+    path = tmp_path / "some.json"
+    path.write_text(json.dumps(document), encoding="utf-8-sig")
+    seen, assumed = files.read_observed(path, SCENARIO, (2.0, 0.5))
+    assert assumed
+    found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
+    np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.5)]])
+    np.testing.assert_allclose(found[1, 0], 1e-3 * np.sqrt(first["covariance_mm_deg"][0][0]))
+    with pytest.raises(InputError, match="operation 1: state either"):
+        files.read_observation(path, SCENARIO)
+    second["deviation_deg"] = 200.0
+    with pytest.raises(InputError, match=r"a standard deviation from 0.0001 to 180 is needed"):
+        read(tmp_path, document | {"operations": [*form()["operations"][:2], second]})
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:

@@ -10,8 +10,9 @@ from apo_bench.benchmark.spec import TrialSpec, check_clearance
 from apo_bench.benchmark.stages import see, show
 from apo_bench.benchmark.trial import Row, run_measured, run_trial
 from apo_bench.errors import InputError
-from apo_bench.files import observation_form, read_observation, write_form
+from apo_bench.files import observation_form, write_form
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observed import read_stated
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
 
@@ -28,7 +29,7 @@ class Request:
     careless: float | None = None
     noise: str | None = None
     relations: str | None = None
-    seed: int = 0
+    seed: int | None = None
     method: str = "none"
     clearance_mm: float | None = None
     grasp: str = "friction"
@@ -74,7 +75,7 @@ def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
 
 
 def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
-    seen = read_observation(path, scene.scenario)
+    seen = read_stated(path, scene.scenario)
     return run_measured(spec, scene, seen, path.read_text(encoding="utf-8"), watch=film)
 
 
@@ -94,7 +95,7 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
         grasp=request.grasp,
         arm=request.arm,
         method=request.method,
-        seed=request.seed,
+        seed=0 if request.seed is None else request.seed,
         timestep_s=request.timestep_s,
         relations=request.relations or "given",
     )
@@ -102,7 +103,7 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
 
 def _refuse_contradictions(request: Request) -> None:
     """Nothing is drawn for an observation that comes from a file."""
-    for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "save_observation"):
+    for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "seed", "save_observation"):
         if getattr(request, name) is not None:
             option = "--" + name.replace("_", "-")
             raise InputError(
