@@ -92,6 +92,10 @@ def correct(
 
     if out is not None:
         check_writable(out, "--out", (".json", ".csv"))
+        if out.exists() and observation.exists() and out.samefile(observation):
+            raise InputError(
+                f"--out {out} is the file of the observation; name another, so that what was seen is kept."
+            )
     corrector = _corrector(method, if_doubtful)
     seen, loaded, assumed = observed(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
     made = corrected(seen, corrector)
@@ -121,9 +125,10 @@ def correct(
 def _explained(seen: Observation, made: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
     from apo_bench.correction.explain import explain as explained
+    from apo_bench.correction.measured import gap_of
     from apo_bench.correction.posterior import LARGE
 
-    if not made.ok or 6 * len(made.goals) > LARGE or (made.gap_after_m > EXACT_M and not made.dropped):
+    if not made.ok or 6 * len(made.goals) > LARGE or gap_of(seen, made.goals, made.dropped) > EXACT_M:
         return None
     return explained(seen, made.goals, made.dropped)
 

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from apo_bench import cli
+from apo_bench.benchmark.correct_text import correction_lines, shown_p
 from apo_bench.correction.equations import gap
 from apo_bench.files import observation_form, read_plan, write_form
 from apo_bench.geometry import pose
 from apo_bench.observed import read_observation
+from apo_bench.program import Consistency, Correction, Observation
 from apo_bench.scenario_file import load_scenario, scenario_names
 
 ROOT = Path(__file__).parent.parent
@@ -159,6 +161,7 @@ def test_what_happens_in_doubt(
     made = json.loads(said)
     assert (ended, made["status"], made["test"]["passes"]) == (code, status, False)
     assert made["dropped"] == (["R4"] if doubt == "drop" else [])
+    assert (made["test_after"] or {}).get("passes") == (True if doubt == "drop" else None)
     assert made["test"]["ambiguous"] == ([] if doubt == "apply" else ["R4"])
     assert out.exists() == (code == 0)
     assert bool(err) == (code != 0)
@@ -168,6 +171,8 @@ def test_what_happens_in_doubt(
         assert made["operations"] is None
     words = run(capsys, *asked(path, "--if-doubtful", doubt))[1]
     assert ("R4 may be wrong" in words) == (doubt != "apply")
+    without = [line for line in words.splitlines() if line.startswith("test without")]
+    assert [line.endswith("explained by the stated noise") for line in without] == [True] * (doubt == "drop")
 
 
 def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -196,7 +201,8 @@ def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path
         (("--if-doubtful", "drop", "--method", "paper"), "only contact can be told what to do"),
         (("--method", "contakt"), "did you mean 'contact'?"),
         (("--out", "plan.xml"), "a file name that ends in .json or .csv is allowed"),
-        (("--deviation-mm", "0"), "deviation_mm 0 was given"),
+        (("--deviation-mm", "0"), "deviation_mm 0 was given; a number from 0.0001 to 10000 is allowed"),
+        (("--deviation-mm", "1e-5"), "deviation_mm 1e-05 was given"),
         (("--deviation-deg", "nan"), "deviation_deg nan was given"),
     ],
 )
@@ -212,6 +218,62 @@ def test_a_file_of_another_scenario_is_refused(capsys: pytest.CaptureFixture[str
     code, out, err = run(capsys, "correct", "pocket_table", "--observation", str(SEEN))
     assert (code, out) == (2, "")
     assert "line 2, column part: 'cube1' is needed" in err
+
+
+def test_what_was_seen_is_not_written_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path, link = tmp_path / "seen.csv", tmp_path / "link.csv"
+    path.write_bytes(SEEN.read_bytes())
+    link.symlink_to(path)
+    for out in (path, link):
+        code, said, err = run(capsys, *asked(path, "--out", str(out)))
+        assert (code, said, "is the file of the observation; name another" in err) == (2, "", True)
+    assert path.read_bytes() == SEEN.read_bytes()
+
+
+def test_json_may_leave_deviations_to_be_assumed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    form = observation_form(read_observation(SEEN, "stick_in_tower"), "stick_in_tower")
+    for entry in form["operations"]:
+        del entry["covariance_mm_deg"]
+    path = tmp_path / "bare.json"
+    write_form(form, path)
+    for command in (asked(path, "--deviation-mm", "2.5"), ("explain", *asked(path, "--deviation-mm", "2.5")[1:])):
+        code, out, err = run(capsys, *command)
+        assert (code, err, "standard deviation of 2.5 mm and 1 deg" in out) == (0, "", True)
+    assert json.loads(run(capsys, *asked(path, "--json"))[1])["deviations_assumed"] is True
+
+
+def test_noise_that_is_stated_far_too_large_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "metres.csv"
+    lines = [line.split(",")[:9] for line in SEEN.read_text(encoding="utf-8").splitlines()]
+    path.write_text("\n".join(map(",".join, lines)), encoding="utf-8")
+    code, out, _ = run(capsys, *asked(path, "--deviation-mm", "1000", "--deviation-deg", "100"))
+    assert (code, "the stated noise is far larger than what was seen; are the units right?" in out) == (0, True)
+
+
+@pytest.mark.parametrize(("p", "said"), [(0.63, "0.63"), (0.00996, "0.00996"), (0.0100001, "0.01"), (0.01, "0.01")])
+def test_p_values_show_their_side_of_the_level(p: float, said: str) -> None:
+    assert shown_p(p, 0.01) == said
+
+
+@pytest.mark.parametrize(("p", "words"), [(0.5, "but the contacts contradict"), (1e-9, ": the contacts contradict")])
+def test_contradictory_contacts_are_not_explained(p: float, words: str) -> None:
+    seen = read_observation(SEEN, "stick_in_tower")
+    test = Consistency(chi_square=9.0, freedom=9, p_value=p, level=0.01)
+    made = Correction(seen.goals, "inconsistent", "no", (), 0.0, 0.0, 9, test=test)
+    said = dict(correction_lines(seen, made, None))["test"]
+    assert words in said
+    assert "explain" not in said
+
+
+def closed(seen: Observation) -> Correction:
+    """Claims what it did not do."""
+    return Correction(seen.goals, "converged", "every gap is closed", (), 0.0, 0.0, 0)
+
+
+def test_a_corrector_is_not_believed(capsys: pytest.CaptureFixture[str]) -> None:
+    made = json.loads(run(capsys, *asked(SEEN, "--method", "tests.test_correct_cli:closed", "--json"))[1])
+    assert made["gap_after_mm"] == made["gap_before_mm"] > 1.0
+    assert made["explanation"] is None
 
 
 def test_no_simulator_is_needed() -> None:

@@ -13,6 +13,10 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.program import Consistency, Correction, Observation
 
 CORRECTION = "apo-bench/correction/1"
+TOO_GOOD = 1e-6
+"""A p-value nearer to 1 happens to nobody whose noise is what was stated, ..."""
+TESTED = 3
+"""... if at least so many degrees of freedom are tested."""
 
 
 def correction_lines(seen: Observation, made: Correction, found: Explanation | None) -> list[tuple[str, str]]:
@@ -20,9 +24,11 @@ def correction_lines(seen: Observation, made: Correction, found: Explanation | N
     lines = [("ended", f"{'' if made.ok else f'{made.status}: '}{made.sentence}")]
     lines.append(("contact gap", _gaps(made)))
     if made.test is not None:
-        lines.append(("test", _test(made.test)))
+        lines.append(("test", _test(made.test, made.status == "inconsistent")))
     if made.dropped:
         lines.append(("left out", ", ".join(made.dropped)))
+    if made.test_after is not None:
+        lines.append(("test without", _test(made.test_after, made.status == "inconsistent")))
     if found is not None:
         lines.append(("contacts", total(found)))
         lines += [("" if i else "free", sentence) for i, sentence in enumerate(sentences(found))]
@@ -77,6 +83,7 @@ def correction_form(
         "deviations_assumed": assumed,
         "operations": _operations_form(seen, made) if made.ok else None,
         "test": None if made.test is None else _test_form(made.test),
+        "test_after": None if made.test_after is None else _test_form(made.test_after),
         "dropped": list(made.dropped),
         "explanation": None if found is None else explanation_form(scenario, found),
     }
@@ -91,13 +98,25 @@ def _gaps(made: Correction) -> str:
     return f"{said}, {made.gap_after_m * 1e3:.3f} mm corrected{of}"
 
 
-def _test(test: Consistency) -> str:
-    said = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {test.p_value:.2g}"
+def _test(test: Consistency, contradictory: bool) -> str:
+    said = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
+    if test.passes and contradictory:
+        return f"{said}, but the contacts contradict each other"
+    if test.passes and test.p_value > 1.0 - TOO_GOOD and test.freedom >= TESTED:
+        return f"{said}: the stated noise is far larger than what was seen; are the units right?"
     if test.passes:
         return f"{said}: explained by the stated noise"
     named = [suspect.relation for suspect in test.ambiguous]
     who = f"; {'one of ' * (len(named) > 1)}{', '.join(named)} may be wrong" if named else ""
+    if contradictory:
+        return f"{said}: the contacts contradict each other{who}"
     return f"{said}: longer than the stated noise explains{who}"
+
+
+def shown_p(p: float, level: float) -> str:
+    """Two digits, or as many as it takes to see on which side of the level it is."""
+    texts = (f"{p:.{digits}g}" for digits in range(2, 18))
+    return next(text for text in texts if (float(text) >= level) == (p >= level))
 
 
 def _moved(seen: Observation, made: Correction) -> Array:
