@@ -24,7 +24,7 @@ CROWDED = 2_000_000
 """Pairs of contacts that meet, above which they are not listed."""
 FEW = 100
 """Contacts that one operation may meet, on average, if J J^t is to be formed for the rank."""
-EIGENVALUE = 1e-12
+EIGENVALUE = 2e-15
 """Eigenvalues of J J^t below this part of the largest one are rounding, at a solution."""
 
 Solver = Callable[[Array, Array, Array], Array]
