@@ -13,11 +13,14 @@ from scipy.sparse import csr_array
 from apo_bench.assembly import Assembly, Operation
 from apo_bench.correction import posterior, sparse
 from apo_bench.correction.compact import Compact
+from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correct import correct
 from apo_bench.correction.large import nearest_large
 from apo_bench.correction.manifold import nearest
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
+from apo_bench.program import Observation
+from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes
 from tests.test_manifold import correction, crooked, scales, system_of, twisted
@@ -198,3 +201,24 @@ def test_numbers_that_are_not_finite() -> None:
     assert not found.at_rest
     assert_array_equal(found.goals, seen)
     assert_array_equal(found.z, np.zeros(6 * len(seen)))
+
+
+def test_rounding_does_not_stop_the_banded_solver() -> None:
+    """With nothing on the diagonal, redundant equations leave a matrix that is not positive definite."""
+    scene = of_problem("chain10")
+    system = system_of(scene, scene.goals)
+    where = sparse.incidence(system)
+    _, every = system.blocks(scene.goals, np.tile(np.eye(6), (len(scene.goals), 1, 1)))
+    found = every[where.contact, where.letter]
+    right = where.times(found, np.random.default_rng(0).standard_normal(6 * len(scene.goals)))
+    z = sparse.solver(where)(np.zeros(len(right)), found, right)
+    assert_allclose(where.times(found, z), right, rtol=0, atol=1e-6 * np.abs(right).max())
+
+
+def test_a_row_of_castles_seen_very_badly_ends_with_a_sentence() -> None:
+    given = problem("chain200")
+    of = draw(given, "10/8", 1, per_part=True)
+    seen = Observation(given.assembly, given.start, of.seen, of.covariance, np.ones(given.n, dtype=np.bool_))
+    made = correct(seen, ContactCorrector("apply"))
+    assert made.status in ("inconsistent", "not_converged")
+    assert made.sentence

@@ -22,6 +22,8 @@ WIDE = 240
 """Rows of a band above which it is no longer worth it."""
 CROWDED = 2_000_000
 """Pairs of contacts that meet, above which they are not listed."""
+RAISED = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
+"""What is added in turn to the diagonal, in parts of its mean, while rounding keeps it from being positive definite."""
 FEW = 100
 """Contacts that one operation may meet, on average, if J J^t is to be formed for the rank."""
 EIGENVALUE = 2e-15
@@ -149,6 +151,7 @@ def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp],
     wanted = below >= 0
     target = (below * m + column)[wanted]
     placed = (3 * place[:, None] + np.arange(3)).ravel()
+    together = _together(where)
 
     def solve(added: Array, blocks: Array, right: Array) -> Array:
         products = np.swapaxes(blocks, 1, 2)[first] @ blocks[second]
@@ -156,8 +159,15 @@ def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp],
         band[0, placed] += added
         ordered = np.empty(m)
         ordered[placed] = right
-        y = solveh_banded(band, ordered, overwrite_ab=True, overwrite_b=True, lower=True, check_finite=False)
-        return where.transposed_times(blocks, y[placed])
+        size = float(band[0].mean())
+        for more in RAISED:
+            band[0] += more * size
+            try:
+                y = solveh_banded(band, ordered, lower=True, check_finite=False)
+            except np.linalg.LinAlgError:
+                continue
+            return where.transposed_times(blocks, y[placed])
+        return together(added, blocks, right)
 
     return solve
 
