@@ -73,6 +73,15 @@ def test_pack_round_trip(shape: tuple[int, ...]) -> None:
     assert_allclose(pose.unpack(packed), T, atol=1e-12)
 
 
+@pytest.mark.parametrize("axis", [*np.eye(3).tolist(), [0.6, 0.8, 0.0], [0.0, -0.6, 0.8], [-0.6, 0.0, 0.8]])
+def test_pack_gives_half_turns_one_sign(axis: list[float]) -> None:
+    xi = np.concatenate([np.zeros(3), np.pi * np.array(axis)])
+    packed = [pose.pack(pose.exp(sign * xi * (1.0 + off))) for sign in (1, -1) for off in (-1e-12, 0.0, 1e-12)]
+    assert_allclose(packed, np.broadcast_to(packed[0], (6, 7)), atol=1e-9)
+    q = packed[0][3:]
+    assert q[np.abs(q) > 1e-9][0] > 0
+
+
 def test_pack_writes_w_first() -> None:
     assert_array_equal(pose.pack(pose.at((1.0, 2.0, 3.0))), [1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0])
 

@@ -14,6 +14,8 @@ from apo_bench.geometry.arrays import Array
 
 IDENTITY = np.eye(4)
 IDENTITY.flags.writeable = False
+ROUNDING = 1e-9
+"""A component of a quaternion that is nearer to zero has no sign."""
 
 
 def exp(twist: ArrayLike) -> Array:
@@ -76,11 +78,16 @@ def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
 
 
 def pack(T: ArrayLike) -> Array:
-    """`(x, y, z, qw, qx, qy, qz)` with qw >= 0, (*, 4, 4) -> (*, 7)."""
+    """`(x, y, z, qw, qx, qy, qz)`, (*, 4, 4) -> (*, 7): of q and -q, the one whose first component is above 0.
+
+    What is zero up to rounding does not count, so a half turn has one sign however it was computed.
+    """
     from scipy.spatial.transform import Rotation
 
     T = np.asarray(T, dtype=np.float64)
-    q = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    q = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    first = np.argmax(np.abs(q) > ROUNDING, axis=1)
+    q = q * np.where(q[np.arange(len(q)), first] < 0.0, -1.0, 1.0)[:, None] + 0.0
     return np.concatenate([T[..., :3, 3], q.reshape(*T.shape[:-2], 4)], axis=-1)
 
 
