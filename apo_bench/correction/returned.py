@@ -39,7 +39,7 @@ def check_near(T: Array, name: str, what: str) -> None:
     Args:
         what: What they are, before a number from 1: `a goal for operation`.
     """
-    for k in np.flatnonzero((np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1)):
+    for k in np.flatnonzero(np.isfinite(T).all(axis=(1, 2)) & (np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1)):
         raise InputError(
             f"the corrector '{name}' returned {what} {k + 1} with a position of {np.abs(T[k, :3, 3]).max():g} m; "
             f"return numbers of at most {FARTHEST_M:g}, in metres."
