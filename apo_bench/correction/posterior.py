@@ -25,6 +25,8 @@ from apo_bench.program import Correction, Observation
 
 LARGE = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
+UNCLEAR = (1e-14, 1e-9)
+"""Squares of singular values, in parts of the largest: with none between these, rounding is told from rank quickly."""
 CUT_OFF = 1e-7
 """Singular values below this part of the largest one are rounding, at a solution."""
 
@@ -66,6 +68,9 @@ def rank(Jt: Any) -> int:
         return sparse.rank(Jt)
     if not Jt.size:
         return 0
+    w = np.linalg.eigvalsh(Jt @ Jt.T if Jt.shape[0] <= Jt.shape[1] else Jt.T @ Jt)
+    if not ((w > UNCLEAR[0] * w[-1]) & (w < UNCLEAR[1] * w[-1])).any():
+        return int(np.count_nonzero(w > UNCLEAR[1] * w[-1]))
     w = np.linalg.svd(Jt, compute_uv=False)
     return int(np.count_nonzero(w > CUT_OFF * w[0]))
 
