@@ -132,6 +132,10 @@ class Assembly:
         """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play."""
         return self.gaps.get(contact, Gap()).interval(play_m if self.is_fit(contact) else 0.0)
 
+    def intervals(self, play_m: float) -> Array:
+        """Those of all contacts, (c, 2), in the order of `relations()`, [m]."""
+        return np.array([self.interval(relation.contact, play_m) for relation in self.relations()]).reshape(-1, 2)
+
     def first(self, n: int) -> Assembly:
         """What is known after n operations: the same parts, no later operation."""
         return replace(self, operations=self.operations[:n])

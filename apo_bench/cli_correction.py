@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -135,12 +135,12 @@ def _explained(seen: Observation, made: Correction) -> Any:
 
 def _corrector(method: str, doubt: str | None) -> Any:
     """The corrector `contact` with what it is to do in doubt, or any other by its name."""
-    from apo_bench.correction.contact import ContactCorrector
+    from apo_bench.correction.contact import ContactCorrector, Doubt
 
     if doubt is not None and doubt not in DOUBTS:
         raise InputError(f"--if-doubtful {doubt} was given; {', '.join(DOUBTS[:-1])} or {DOUBTS[-1]} is allowed.")
     if method == "contact":
-        return ContactCorrector(doubt or "warn")  # type: ignore[arg-type]
+        return ContactCorrector(cast(Doubt, doubt or "warn"))
     if doubt is not None:
         raise InputError(f"--if-doubtful was given with --method {method}; only contact can be told what to do.")
     return method

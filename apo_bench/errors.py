@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
 
 MOST = 20
 """A longer list of names helps nobody."""
@@ -21,3 +22,11 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     shown = names if len(names) <= MOST else get_close_matches(given, names, n=MOST, cutoff=0.3)
     more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
     return f"unknown {kind} '{given}'{hint} Known: {', '.join(shown) or 'none'}{more}."
+
+
+def kind(value: Any) -> str:
+    """What a value is, for a sentence: `a str`, `an int`, `None`, `a class`."""
+    if value is None or isinstance(value, type):
+        return "None" if value is None else "a class"
+    name = type(value).__name__
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import FARTHEST_M, rigid
 from apo_bench.program import Observation
@@ -28,7 +28,7 @@ def check_observations(seen: Sequence[Any]) -> None:
     """
     for i, one in enumerate(seen):
         if not isinstance(one, Observation):
-            raise InputError(f"an Observation is needed, {_kind(one)} was given; make one, or read it from a file.")
+            raise InputError(f"an Observation is needed, {kind(one)} was given; make one, or read it from a file.")
         _check_lengths(one, _name(seen, i))
     if not seen:
         return
@@ -75,9 +75,3 @@ def _operation(seen: Sequence[Observation], j: int) -> str:
 
 def _name(seen: Sequence[Any], i: int) -> str:
     return f"observation {i + 1}" if len(seen) > 1 else "the observation"
-
-
-def _kind(value: Any) -> str:
-    """`None`, `a list`."""
-    name = type(value).__name__
-    return "None" if value is None else f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"

@@ -89,8 +89,12 @@ def p_value(chi_square: float, freedom: int) -> float:
     return float(chdtrc(freedom, chi_square)) if freedom else 1.0
 
 
-def measured(system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Array) -> tuple[float, int]:
+def measured(
+    system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Array
+) -> tuple[float, int, Nearest | None]:
     """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
+
+    These have no nearest goals; those that share the contradiction out are returned with the numbers, otherwise None.
 
     Args:
         seen: (n, 4, 4), the goals that were seen.
@@ -99,12 +103,12 @@ def measured(system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Ar
     """
     freedom = rank(found.Jt)
     if not found.finite:
-        return np.inf, freedom
+        return np.inf, freedom, None
     holds = found.at_rest and np.abs(found.e).max(initial=0.0) <= SOFT_M
     if holds and not slack_m.any():
-        return float(found.z @ found.z), freedom
+        return float(found.z @ found.z), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
     relaxed = nearest(system, seen, L, soft)
     asked = soft > 0.0
     over = relaxed.e[asked] / soft[asked]
-    return float(relaxed.z @ relaxed.z + over @ over), freedom
+    return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed

@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.measured import gap_of, measured
 from apo_bench.correction.returned import RIGID, check_near, checked
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 from apo_bench.names import resolve
@@ -61,7 +61,7 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     if not callable(chosen) or isinstance(chosen, type):
         raise InputError(
-            f"the corrector '{name}' is {_kind(chosen)}; give a function that takes an Observation "
+            f"the corrector '{name}' is {kind(chosen)}; give a function that takes an Observation "
             "and returns a Correction, or an object with such a __call__."
         )
     try:
@@ -99,7 +99,7 @@ def _bare(found: Any, n: int, name: str) -> Array:
     except (TypeError, ValueError):
         goals = np.zeros(0)
     if goals.shape != (n, 4, 4):
-        given = f"an array of shape {found.shape}" if isinstance(found, np.ndarray) else _kind(found)
+        given = f"an array of shape {found.shape}" if isinstance(found, np.ndarray) else kind(found)
         raise InputError(f"the corrector '{name}' returned {given}; return a Correction or goals of shape ({n}, 4, 4).")
     for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~rigid(goals)):
         raise InputError(
@@ -107,11 +107,3 @@ def _bare(found: Any, n: int, name: str) -> Array:
         )
     check_near(goals, name, "a goal for operation")
     return goals
-
-
-def _kind(value: Any) -> str:
-    """`a str`, `an int`, `None`, `a class`."""
-    if value is None or isinstance(value, type):
-        return "None" if value is None else "a class"
-    name = type(value).__name__
-    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"

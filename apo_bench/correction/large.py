@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.correction.compact import Compact
-from apo_bench.correction.manifold import TURNS, Nearest, Turn, damping, settles, shortened
+from apo_bench.correction.manifold import SMALLEST, TURNS, Nearest, Turn, damping, settles, shortened
 from apo_bench.correction.sparse import incidence, solver
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
@@ -27,8 +27,8 @@ def nearest_large(system: Compact, seen: Array, L: Array, soft_m: Array | None =
         if not finite:
             break
         demanded = e if soft_m is None else e * (soft_m == 0.0)
-        mu = damping(np.array(float(demanded @ demanded) / max(m * size, 1e-300)), turn) * size
-        added = np.full(m, max(float(mu), 1e-300)) + (0.0 if soft_m is None else soft_m * soft_m)
+        mu = damping(np.array(float(demanded @ demanded) / max(m * size, SMALLEST)), turn) * size
+        added = np.full(m, max(float(mu), SMALLEST)) + (0.0 if soft_m is None else soft_m * soft_m)
         step = solve(added, blocks, where.times(blocks, z) - e) - z
         length = float(np.abs(step).max(initial=0.0))
         trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))

@@ -13,8 +13,8 @@ from apo_bench.correction.compact import Compact, compact, moments
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.equations import Equations, equations, lies_on
 from apo_bench.correction.manifold import Nearest
-from apo_bench.correction.problem import scales
 from apo_bench.correction.walls import asked
+from apo_bench.correction.whitened import scales
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

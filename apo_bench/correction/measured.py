@@ -10,7 +10,7 @@ from apo_bench import outcomes
 from apo_bench.correction.ending import refused, sentence
 from apo_bench.correction.equations import equations, gap, largest
 from apo_bench.correction.newton import CUT_OFF, LENGTH_M, least_step
-from apo_bench.correction.walls import asked
+from apo_bench.correction.walls import asked, left_open
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 
@@ -46,8 +46,7 @@ def gap_of(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> fl
     """
     plain = equations(seen.assembly, seen.start, seen.goals)
     system, exact, walls = asked(plain, seen.assembly, seen.play_m)
-    kept = seen.assembly.without(dropped)
-    return max(largest(system.gaps(goals)[kept & exact]), walls.among(kept[~exact]).overstepped(goals))
+    return left_open(system, exact, walls, goals, seen.assembly.without(dropped))
 
 
 def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:

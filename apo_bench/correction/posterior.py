@@ -110,5 +110,5 @@ def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.9
 
 def _equal(seen: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
     """The contacts that were equations, (c,): neither walls nor left out."""
-    intervals = [seen.assembly.interval(relation.contact, seen.play_m) for relation in seen.assembly.relations()]
-    return np.array([low == high for low, high in intervals], dtype=np.bool_) & seen.assembly.without(dropped)
+    low, high = seen.assembly.intervals(seen.play_m).T
+    return np.asarray(low == high) & seen.assembly.without(dropped)

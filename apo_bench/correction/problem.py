@@ -13,8 +13,8 @@ from apo_bench.correction.compact import Compact, compact
 from apo_bench.correction.consistency import LEVEL, SOFT_M, measured, narrowed, p_value, slack, suspects
 from apo_bench.correction.equations import Equations, equations, largest
 from apo_bench.correction.manifold import Nearest, nearest
-from apo_bench.correction.walls import Walls, asked, between, touching
-from apo_bench.errors import InputError
+from apo_bench.correction.walls import Walls, asked, between, left_open, touching
+from apo_bench.correction.whitened import scales
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Consistency, Observation, Suspect
 
@@ -56,9 +56,9 @@ class Problem:
         chosen = kept & self.exact
         part, slack_m = self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
         found = self.solver(part, self.seen.goals, self.L) if found is None else found
-        chi_square, freedom = measured(part, self.seen.goals, self.L, found, slack_m)
+        chi_square, freedom, shared = measured(part, self.seen.goals, self.L, found, slack_m)
         if found.finite and largest(self.system.gaps(found.goals)[chosen]) > self.seen.gap_m:
-            found = nearest(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
+            found = shared or nearest(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
         elif found.finite and kept[~self.exact].any():
             walls = self.walls.among(kept[~self.exact])
             held = between(part, walls, self.seen.goals, self.L, found)
@@ -93,8 +93,7 @@ class Problem:
 
     def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
         """The largest |e| of what is kept, [m]; of walls, by how much they are overstepped."""
-        equal = largest(self.system.gaps(goals)[kept & self.exact])
-        return max(equal, self.walls.among(kept[~self.exact]).overstepped(goals))
+        return left_open(self.system, self.exact, self.walls, goals, kept)
 
 
 def problem(seen: Observation, solver: Solver) -> Problem:
@@ -109,23 +108,3 @@ def problem(seen: Observation, solver: Solver) -> Problem:
     every = compact(system, len(seen.goals))
     fits = np.array([seen.assembly.is_fit(r.contact) for r in seen.assembly.relations()], dtype=np.bool_)
     return Problem(seen, system, every, exact, walls, L, slack(fits, every, seen.play_m), solver)
-
-
-def scales(covariance: Array) -> Array:
-    """L with L L^t = covariance, (n, 6, 6).
-
-    Raises:
-        InputError: One is not positive definite.
-    """
-    L = np.zeros(covariance.shape)
-    for k, C in enumerate(covariance):
-        try:
-            L[k] = np.linalg.cholesky(C)
-        except np.linalg.LinAlgError:
-            L[k] = np.nan
-        if not np.isfinite(L[k]).all():
-            raise InputError(
-                f"the covariance of operation {k + 1} is not positive definite; "
-                "state finite numbers and a variance above zero in every direction."
-            )
-    return L

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
 from apo_bench.correction.compact import Compact
-from apo_bench.correction.equations import Equations
+from apo_bench.correction.equations import Equations, largest
 from apo_bench.correction.manifold import Nearest, Turn, project, settles, shortened
 from apo_bench.correction.posterior import LARGE, rank
 from apo_bench.errors import InputError
@@ -63,10 +63,16 @@ class Walls:
         return float(np.maximum(self.low - e, e - self.high).max(initial=0.0))
 
 
+def left_open(
+    system: Equations, exact: NDArray[np.bool_], walls: Walls, goals: Array, kept: NDArray[np.bool_]
+) -> float:
+    """The largest |e| of the equations that are `kept`, (c,), [m]; of walls, by how much they are overstepped."""
+    return max(largest(system.gaps(goals)[kept & exact]), walls.among(kept[~exact]).overstepped(goals))
+
+
 def asked(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Walls]:
     """What is demanded of each contact: shifted planes, (c,) whether it is an equation, and the walls of the others."""
-    intervals = [assembly.interval(relation.contact, play_m) for relation in assembly.relations()]
-    low, high = np.array(intervals).reshape(-1, 2).T
+    low, high = assembly.intervals(play_m).T
     exact = low == high
     plane = np.array(system.plane)
     plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]

@@ -44,9 +44,24 @@ def whitened(seen: Observation) -> Whitened:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    try:
-        return Whitened(seen.goals, np.asarray(np.linalg.cholesky(seen.covariance), dtype=np.float64))
-    except np.linalg.LinAlgError:
-        raise InputError(
-            "a covariance that is not positive definite was given; state a variance above zero in every direction."
-        ) from None
+    return Whitened(seen.goals, scales(seen.covariance))
+
+
+def scales(covariance: Array) -> Array:
+    """L with L L^t = covariance, (n, 6, 6).
+
+    Raises:
+        InputError: One is not positive definite.
+    """
+    L = np.zeros(covariance.shape)
+    for k, C in enumerate(covariance):
+        try:
+            L[k] = np.linalg.cholesky(C)
+        except np.linalg.LinAlgError:
+            L[k] = np.nan
+        if not np.isfinite(L[k]).all():
+            raise InputError(
+                f"the covariance of operation {k + 1} is not positive definite; "
+                "state finite numbers and a variance above zero in every direction."
+            )
+    return L
