@@ -8,9 +8,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.correction.equations import Equations
-from apo_bench.geometry import pose
+from apo_bench.correction.whitened import Whitened
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
 
 
 @final
@@ -28,11 +27,12 @@ class InZ:
     def zero(self) -> Array:
         return np.zeros(6 * len(self.seen))
 
-    def twists(self, z: Array) -> Array:
-        return np.asarray((self.L @ z.reshape(-1, 6, 1))[..., 0])
+    @property
+    def chart(self) -> Whitened:
+        return Whitened(self.seen, self.L)
 
     def goals(self, z: Array) -> Array:
-        return np.asarray(self.seen @ pose.exp(self.twists(z)))
+        return self.chart.goals(z)
 
     def value(self, z: Array) -> Array:
         """e, (m,), [mm]."""
@@ -41,6 +41,4 @@ class InZ:
     def slope(self, z: Array) -> Array:
         """de/dz, (m, 6 n), [mm] per sigma."""
         _, J = self.system.linearised(self.goals(z))
-        n = len(self.seen)
-        B = right_jacobian(self.twists(z)) @ self.L
-        return 1e3 * np.asarray(np.einsum("mki,kij->mkj", J.reshape(-1, n, 6), B).reshape(-1, 6 * n))
+        return 1e3 * self.chart.pulled(z, J)
