@@ -37,6 +37,7 @@ GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal g
 ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
 NOISE = "isotropic, anisotropic, per-part, or package.module:name"
 RELATIONS = "What correctors are told of the contacts: given (right), missed, false, shifted:3 (mm)"
+EYE = "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)"
 Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
 
 
@@ -176,6 +177,7 @@ def replay(
     arm: ArmOption = "six_axis",
     noise: Annotated[str | None, typer.Option(help=f"{NOISE}; default: isotropic.")] = None,
     relations: Annotated[str | None, typer.Option(help=f"{RELATIONS}; default: given.")] = None,
+    eye: Annotated[str | None, typer.Option(help=f"{EYE}; default: noise.")] = None,
     timestep_ms: Timestep = 1.0,
     observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,
     save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
@@ -201,6 +203,7 @@ def replay(
             careless=careless,
             noise=noise,
             relations=relations,
+            eye=eye,
             seed=seed,
             method=method,
             clearance_mm=clearance,
@@ -241,6 +244,7 @@ def sweep(
     arm: ArmOption = "six_axis",
     noise: Annotated[str, typer.Option(help=f"{NOISE}; several with commas.")] = "isotropic",
     relations: Annotated[str, typer.Option(help=f"{RELATIONS}; several with commas.")] = "given",
+    eye: Annotated[str, typer.Option(help=f"{EYE}; several with commas.")] = "noise",
     timestep_ms: Timestep = 1.0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
 ) -> None:
@@ -260,6 +264,7 @@ def sweep(
         seed=seed,
         noises=words(noise, "--noise"),
         relations=words(relations, "--relations"),
+        eyes=words(eye, "--eye"),
         grasp=grasp,
         arm=arm,
         timestep_s=timestep_ms * 1e-3,

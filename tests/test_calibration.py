@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark.calibration import calibration_lines, calibrations
-from apo_bench.benchmark.confidence import UNKNOWN
-from apo_bench.benchmark.journal import OLD_ROW, read_rows
+from apo_bench.benchmark.journal import OLD_ROWS, UNSAID, read_rows
 from apo_bench.benchmark.report import report
 from apo_bench.errors import InputError
 from tests.test_statistics import row, write
@@ -54,9 +53,10 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
 
 
 def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:
-    old = {k: v for k, v in row().items() if k not in UNKNOWN} | {"schema": OLD_ROW}
-    folder = write(tmp_path / "old", [old, old | {"seed": 1}])
-    assert read_rows(folder) == [{**UNKNOWN, **old}, {**UNKNOWN, **old, "seed": 1}]
+    old = {k: v for k, v in row().items() if k not in UNSAID} | {"schema": OLD_ROWS[0]}
+    new = row() | {"seed": 1, "schema": OLD_ROWS[1]}
+    folder = write(tmp_path / "old", [old, new])
+    assert read_rows(folder) == [{**UNSAID, **old}, {**UNSAID, **new}]
     assert "| stick_in_tower | 0.25 mm |" in report(folder).page.read_text()
     with pytest.raises(InputError, match="a row of schema 'apo-bench/row/1' was given"):
         read_rows(write(tmp_path / "older", [old | {"schema": "apo-bench/row/1"}]))

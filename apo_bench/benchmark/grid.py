@@ -7,9 +7,11 @@ from dataclasses import asdict, dataclass
 from typing import Any, final
 
 from apo_bench.benchmark.spec import (
+    RANGE,
     TrialSpec,
     check_careless,
     check_clearance,
+    check_eye,
     check_level,
     check_method,
     check_seed,
@@ -46,15 +48,17 @@ class SweepSpec:
     noises: tuple[str, ...] = ("isotropic",)
     relations: tuple[str, ...] = ("given",)
     """What correctors are told of the contacts, as in `TrialSpec`."""
+    eyes: tuple[str, ...] = ("noise",)
+    """As in `TrialSpec`; the noise models are those of the eye `noise`."""
     grasp: str = "friction"
     arm: str = "six_axis"
     timestep_s: float = 0.001
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
-        for name in ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations"):
+        for name in ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes"):
             object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
-        for name in ("scenarios", "levels", "careless", "methods", "noises", "relations"):
+        for name in ("scenarios", "levels", "careless", "methods", "noises", "relations", "eyes"):
             if not getattr(self, name):
                 raise InputError(f"no {name} were given for the sweep; at least one is needed.")
         if not 1 <= self.trials <= LARGEST_TRIALS:
@@ -69,6 +73,8 @@ class SweepSpec:
             check_clearance(clearance)
         for method in self.methods:
             check_method(method)
+        for eye in self.eyes:
+            check_eye(eye)
 
 
 @final
@@ -97,7 +103,7 @@ def units(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
     """All the work of a sweep, seeds first, so that an interrupted sweep has every cell about equally full.
 
     The oracle meets neither noise nor carelessness: it runs once per seed, recorded at level 0, carelessness 0 and the
-    first noise. Neither it nor `none` asks what touches what: both are recorded with the relations as given.
+    first noise model or eye. Neither it nor `none` asks what touches what: both are recorded with relations as given.
     """
     return tuple(
         Unit(_trials(spec, given, clearance, seed))
@@ -130,30 +136,37 @@ def row_key(row: Mapping[str, Any]) -> Key:
 
 
 def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tuple[TrialSpec, ...]:
-    def trial(method: str, level: float, careless: float, noise: str, relations: str) -> TrialSpec:
+    def trial(method: str, level: float, careless: float, seen: tuple[str, str], relations: str) -> TrialSpec:
         return TrialSpec(
             scenario=given,
             level_mm=level,
             level_deg=level,
             careless=careless,
             clearance_mm=clearance_mm,
-            noise=noise,
+            noise=seen[1],
             grasp=spec.grasp,
             arm=spec.arm,
             method=method,
             seed=seed,
             timestep_s=spec.timestep_s,
             relations=relations,
+            eye=seen[0],
         )
 
-    ceiling = tuple(trial(m, 0.0, 0.0, spec.noises[0], "given") for m in spec.methods if m == "oracle")
+    ways = [way for eye in spec.eyes for way in _ways(eye, spec.noises)]
+    ceiling = tuple(trial(m, 0.0, 0.0, ways[0], "given") for m in spec.methods if m == "oracle")
     rest = tuple(
-        trial(method, level, careless, noise, relations)
+        trial(method, level, careless, seen, relations)
         for careless in spec.careless
         for level in spec.levels
-        for noise in spec.noises
+        for seen in ways
         for method in spec.methods
         if method != "oracle"
         for relations in (spec.relations if knows_relations(method) else ("given",))
     )
     return ceiling + rest
+
+
+def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Eye and noise model, of every way of seeing that an eye stands for."""
+    return [(eye, RANGE)] if eye == RANGE else [(eye, noise) for noise in noises]

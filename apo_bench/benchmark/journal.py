@@ -21,8 +21,11 @@ from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
 
 RUN = "apo-bench/run/2"
-OLD_ROW = "apo-bench/row/2"
-"""Rows that say nothing about the test of a correction and its posterior; reports still read them."""
+OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3")
+"""Rows that say less: nothing about the test of a correction and its posterior, nothing about the eye. Reports still
+read them."""
+UNSAID = {**UNKNOWN, "eye": "noise"}
+"""What stands in place of what older rows do not say."""
 PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
@@ -118,8 +121,8 @@ def _row(line: bytes, path: Path, number: int) -> dict[str, Any]:
         raise InputError(
             f"{path}, line {number}: this is not a row of a sweep; remove the line or the folder."
         ) from error
-    if row.get("schema") == OLD_ROW:
-        return {**UNKNOWN, **row}
+    if row.get("schema") in OLD_ROWS:
+        return {**UNSAID, **row}
     if row.get("schema") != ROW:
         raise InputError(f"{path}, line {number}: a row of schema '{row.get('schema')}' was given; '{ROW}' is needed.")
     return row

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
-from apo_bench.benchmark.spec import TrialSpec, check_clearance
+from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import see, show
 from apo_bench.benchmark.trial import Row, run_measured, run_trial
 from apo_bench.errors import InputError
@@ -29,6 +29,7 @@ class Request:
     careless: float | None = None
     noise: str | None = None
     relations: str | None = None
+    eye: str | None = None
     seed: int | None = None
     method: str = "none"
     clearance_mm: float | None = None
@@ -82,6 +83,12 @@ def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
 def _spec(request: Request, clearance_mm: float) -> TrialSpec:
     if request.observation:
         _refuse_contradictions(request)
+    for name in ("noise", "level_deg"):
+        if request.eye == RANGE and getattr(request, name) is not None:
+            raise InputError(
+                f"--{name.replace('_', '-')} was given together with --eye range, which draws no pose noise; "
+                "--level is the noise of its rays in mm."
+            )
     if request.clearance_mm is not None:
         check_clearance(request.clearance_mm)
     level = 1.0 if request.level is None else request.level
@@ -98,12 +105,13 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
         seed=0 if request.seed is None else request.seed,
         timestep_s=request.timestep_s,
         relations=request.relations or "given",
+        eye=request.eye or "noise",
     )
 
 
 def _refuse_contradictions(request: Request) -> None:
     """Nothing is drawn for an observation that comes from a file."""
-    for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "seed", "save_observation"):
+    for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "eye", "seed", "save_observation"):
         if getattr(request, name) is not None:
             option = "--" + name.replace("_", "-")
             raise InputError(

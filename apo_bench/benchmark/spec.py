@@ -10,7 +10,10 @@ from typing import final
 from apo_bench.errors import InputError, unknown
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/3"
+ROW = "apo-bench/row/4"
+EYES = ("noise", "range")
+"""Poses with noise that is drawn, or a simulated range finder that measures them."""
+RANGE = "range"
 LARGEST_LEVEL = 50.0
 """[mm] and [degrees]: five times that is still inside the room."""
 LARGEST_CARELESS = 10.0
@@ -37,6 +40,9 @@ class TrialSpec:
     timestep_s: float = 0.001
     relations: str = "given"
     """What a corrector is told of the contacts: `given`, `missed`, `false`, `shifted:3` (mm), or `module:name`."""
+    eye: str = "noise"
+    """`noise`, or `range`: poses are measured in depth images; `level_mm` is the noise of a ray then, `level_deg` is
+    zero and `noise` is `range`."""
 
     def __post_init__(self) -> None:
         check_level(self.level_mm, "level in mm")
@@ -46,6 +52,10 @@ class TrialSpec:
         check_method(self.method)
         check_seed(self.seed)
         object.__setattr__(self, "relations", checked_relations(self.relations))
+        check_eye(self.eye)
+        if self.eye == RANGE:
+            object.__setattr__(self, "noise", RANGE)
+            object.__setattr__(self, "level_deg", 0.0)
 
 
 def check_level(level: float, what: str = "level") -> None:
@@ -78,6 +88,12 @@ def check_seed(seed: int) -> None:
     """Raise an `InputError` unless the seed is a whole number from 0."""
     if not 0 <= seed <= LARGEST_SEED:
         raise InputError(f"a seed of {seed} was given; whole numbers from 0 to {LARGEST_SEED} are allowed.")
+
+
+def check_eye(eye: str) -> None:
+    """Raise an `InputError` unless there is such an eye."""
+    if eye not in EYES:
+        raise InputError(unknown("eye", eye, EYES))
 
 
 def check_method(method: str) -> None:

@@ -132,6 +132,7 @@ def _head(spec: TrialSpec, scene: Scene, hashed: str) -> Row:
         "level_deg": spec.level_deg,
         "careless": spec.careless,
         "clearance_mm": spec.clearance_mm,
+        "eye": spec.eye,
         "noise": spec.noise,
         "grasp": spec.grasp,
         "arm": spec.arm,
