@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import pose
-from apo_bench.human_error import careless_covariance, spread
+from apo_bench.human_error import NOTHING_M, careless_covariance, spread
 from apo_bench.layout import draw_layout
 from apo_bench.placement import placed
 from apo_bench.program import Layout
@@ -52,16 +52,20 @@ def test_without_an_error_nothing_is_displaced(name: str):
 @given(st.floats(-0.01, 0.01), st.floats(-0.01, 0.01), st.integers(0, 20))
 @settings(max_examples=30, deadline=None)
 def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, seed: int):
-    """Whatever the direction of the error, the castle follows by what the face says and by nothing else."""
+    """Whatever the direction of the error, the castle follows by what the face says and by nothing else.
+
+    An error below `NOTHING_M` is none, so it may stay open.
+    """
     scenario = SCENARIOS["vanished_fixture"]
     truth = layout(scenario, seed)
+    allowed = 1e-12 if np.hypot(x, y) > 2.0 * NOTHING_M else 2.0 * NOTHING_M
     offsets = spread(scenario, truth, np.array([x, y, 0.0])).offsets
     shown = truth.goals @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
     poses = placed(scenario.assembly, truth.start, shown)[2]
     face, on = (scenario.assembly.face(of) for of in scenario.assembly.operations[2].contacts[1])
     corner = pose.apply(pose.inverse(poses["cube"]) @ poses["castle2"], face.outline[:1])[0]
-    assert on.plane[:3] @ corner + on.plane[3] == pytest.approx(0.0, abs=1e-12)
-    assert offsets[2] == pytest.approx((0.0, y, 0.0), abs=1e-12)
+    assert on.plane[:3] @ corner + on.plane[3] == pytest.approx(0.0, abs=allowed)
+    assert offsets[2] == pytest.approx((0.0, y, 0.0), abs=allowed)
 
 
 @given(st.floats(-3.0, 3.0))

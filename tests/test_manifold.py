@@ -12,7 +12,7 @@ from scipy.optimize import least_squares, minimize
 from apo_bench.assembly import Operation
 from apo_bench.correction.compact import Compact, compact
 from apo_bench.correction.equations import Equations, equations
-from apo_bench.correction.manifold import Nearest, nearest
+from apo_bench.correction.manifold import STEP, Nearest, nearest
 from apo_bench.correction.posterior import rank
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -138,8 +138,9 @@ def test_only_the_shape_of_the_noise_matters(seed: int, factor: float) -> None:
     scene, L = scenes.stick_on_castles(), crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     a, b = (nearest(system_of(scene, seen), seen, scale) for scale in (L, factor * L))
-    assert_allclose(b.goals, a.goals, rtol=0, atol=1e-8)
-    assert_allclose(factor * b.z, a.z, rtol=0, atol=1e-4)
+    resting = 10.0 * STEP * max(1.0, factor)  # the solver rests within `STEP` of the noise that it was told
+    assert_allclose(factor * b.z, a.z, rtol=0, atol=resting)
+    assert_allclose(b.goals, a.goals, rtol=0, atol=resting * np.abs(L).max())
 
 
 @given(SEEDS)
