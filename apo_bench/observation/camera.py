@@ -1,0 +1,96 @@
+"""A camera, and errors along and across the rays on which it sees parts.
+
+The camera's axes are those of OpenCV: x to the right, y down, z along the optical axis. The frame of a ray is that of
+the camera, turned the shortest way so that its third axis is the ray: errors in it are (x, y, along; rx, ry, about).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, frozen
+
+MIDDLE_M = np.array([0.12, 0.0, 0.03])
+"""What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
+MIDDLE_M.flags.writeable = False
+DISTANCE_M, ELEVATION_DEG, AZIMUTH_DEG = 0.9, 40.0, 25.0
+"""How far from there it stands, how high above the table, and how far from the x axis of the world."""
+BEHIND = 1e-9
+"""A ray whose cosine with the optical axis is this near to -1 has no shortest turn."""
+
+
+def default_pose() -> Array:
+    """T_world_camera of the default camera, (4, 4): obliquely from above, its x axis level."""
+    up, round_z = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
+    z = -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
+    x = np.array([-np.sin(round_z), np.cos(round_z), 0.0])
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    T[:3, 3] = MIDDLE_M - DISTANCE_M * z
+    return T
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Where a camera stands in the world."""
+
+    T_world_camera: Array = field(default_factory=default_pose)
+    """(4, 4), axes of OpenCV, [m]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_camera", frozen(self.T_world_camera, 4, 4))
+
+    def rays(self, goals: Array) -> Array:
+        """Unit vectors (n, 3) from the camera to the origin of each part, world frame; on its very place, the axis."""
+        to = goals[:, :3, 3] - self.T_world_camera[:3, 3]
+        length = np.linalg.norm(to, axis=1, keepdims=True)
+        return np.where(length > 0.0, to / np.where(length > 0.0, length, 1.0), self.T_world_camera[:3, 2])
+
+    def frames(self, goals: Array) -> Array:
+        """The frames of the rays, (n, 3, 3), world from ray: the third column is the ray."""
+        R = self.T_world_camera[:3, :3]
+        ray = self.rays(goals) @ R
+        K = pose.hat(np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1))
+        cosine = ray[:, 2, None, None]
+        behind = cosine < BEHIND - 1.0
+        shortest = np.eye(3) + K + K @ K / np.where(behind, 1.0, 1.0 + cosine)
+        return np.asarray(R @ np.where(behind, np.diag([1.0, -1.0, -1.0]), shortest))
+
+    def twists(self, goals: Array, errors: Array) -> Array:
+        """Body twists (n, 6) of errors that are given in the frames of the rays.
+
+        Turn first, then shift in the frame that is seen: xi = (R_seen^t F d, R^t F w), R_seen = R exp(R^t F w). The
+        twist is thus linear in the error, and with covariance S in the frame of the ray its own is exactly that of
+        `covariance` for that ray, since a turn leaves its own axis where it is.
+
+        Args:
+            goals: (n, 4, 4), where the parts are, world frame, [m].
+            errors: (n, 6), (x, y, along; rx, ry, about), [m, rad].
+        """
+        frames = self.frames(goals)
+        turn = np.zeros((len(goals), 6))
+        turn[:, 3:] = np.einsum("nji,njk,nk->ni", goals[:, :3, :3], frames, errors[:, 3:])
+        R_seen = (goals @ pose.exp(turn))[:, :3, :3]
+        shift = np.einsum("nji,njk,nk->ni", R_seen, frames, errors[:, :3])
+        return np.concatenate([shift, turn[:, 3:]], axis=1)
+
+    def covariance(self, seen: Array, errors: Array) -> Array:
+        """The body covariance (n, 6, 6) of errors whose covariance in the frames of the rays is known.
+
+        Computed for the rays on which parts are seen, so that nothing of the truth is in it. Those differ from the
+        true ones by the error across over the distance, a thousandth for a millimetre.
+
+        Args:
+            seen: (n, 4, 4), where the parts are seen, world frame, [m].
+            errors: (6, 6) or (n, 6, 6), of (x, y, along; rx, ry, about), [m, rad].
+        """
+        turned = np.swapaxes(seen[:, :3, :3], 1, 2) @ self.frames(seen)
+        Q = np.zeros((len(seen), 6, 6))
+        Q[:, :3, :3] = Q[:, 3:, 3:] = turned
+        C = Q @ errors @ np.swapaxes(Q, 1, 2)
+        return np.asarray((C + np.swapaxes(C, 1, 2)) / 2)
