@@ -15,9 +15,8 @@ from typing import Annotated
 
 import typer
 
-from apo_bench import __version__
+from apo_bench import __version__, cli_correction, cli_noise, cli_show
 from apo_bench.arguments import check_writable, cores, numbers, path_given, words
-from apo_bench.cli_correction import register
 from apo_bench.errors import InputError
 
 app = typer.Typer(
@@ -35,7 +34,7 @@ ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench 
 Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that fit; default: the scenario's.")]
 GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
 ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
-NOISE = "isotropic, anisotropic, per-part, or package.module:name"
+NOISE = "A name out of `apo-bench noise list`, or package.module:name"
 RELATIONS = "What correctors are told of the contacts: given (right), missed, false, shifted:3 (mm)"
 EYE = "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)"
 Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
@@ -137,7 +136,8 @@ def graph(
             typer.echo(f"\nWrote {out}")
 
 
-register(app)
+for commands in (cli_correction, cli_noise, cli_show):
+    commands.register(app)
 
 
 @app.command()
