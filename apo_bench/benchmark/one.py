@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
-from apo_bench.benchmark.stages import see, show
+from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import Row, run_measured, run_trial
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observed import read_stated
+from apo_bench.observed import read_observation, read_stated
+from apo_bench.program import Observation
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
 
@@ -66,12 +67,35 @@ def run_one(request: Request) -> Row:
     return row
 
 
+def watched(request: Request) -> Observation:
+    """What is seen of the trial, or read from the file, that was asked for; nothing is replayed.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
+        RuntimeError: The demonstration itself failed.
+    """
+    scenario = load_scenario(request.scenario)
+    spec = _spec(request, scenario.clearance_mm)
+    if request.observation:
+        return read_observation(request.observation, scenario)
+    scene = build_scene(scenario, clearance_mm=spec.clearance_mm, grasp=spec.grasp, arm=spec.arm)
+    shown = show(scene, spec.careless, spec.seed)
+    if shown.demonstration.code != "ok":
+        raise RuntimeError(f"{misshown(shown.demonstration).sentence}; try another seed")
+    return look(spec, scene, shown)
+
+
+def look(spec: TrialSpec, scene: Scene, shown: Shown) -> Observation:
+    """The demonstration of a trial through its eye."""
+    noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
+    return see(scene, shown, noise, spec.seed)
+
+
 def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
     shown = show(scene, spec.careless, spec.seed)
     if request.save_observation:
-        noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
-        write_form(observation_form(see(scene, shown, noise, spec.seed), name), request.save_observation)
+        write_form(observation_form(look(spec, scene, shown), name), request.save_observation)
     return run_trial(spec, scene, shown=shown, watch=film)
 
 

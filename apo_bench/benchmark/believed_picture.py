@@ -1,0 +1,109 @@
+"""What is believed after a step, drawn: the parts where the motion parameters put them (Fig. 9, 13 and 16)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.benchmark.explain_text import listed
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import extent
+from apo_bench.graph import arc_residuals, relation_graph
+from apo_bench.placement import placed
+from apo_bench.program import Observation, Poses
+from apo_bench.scenario import Scenario
+
+WIDTH, HEIGHT, LINE_PX = 620, 480, 20
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.06, 0.85, 38.0, -24.0
+MOST_LINES = 6
+
+
+class Belief(NamedTuple):
+    """A panel: where the motion parameters put the parts, and which contacts are not right then."""
+
+    title: str
+    poses: Poses
+    gap_m: float
+    """The largest |e| of all contacts."""
+    open: tuple[str, ...]
+    """`R4 stick -> castle2: 1.31 mm`, the worst first; of contacts that stand."""
+
+
+def belief(title: str, seen: Observation, goals: Array, step: int) -> Belief:
+    """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
+    graph = relation_graph(seen.assembly, step)
+    residuals = arc_residuals(seen.assembly, seen.start, goals, graph)
+    found = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
+    wrong = tuple(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}" for e, arc in found)
+    poses = placed(seen.assembly.first(step), seen.start, goals[:step])[-1]
+    return Belief(title, poses, max(residuals, default=0.0), wrong[: sum(e > seen.gap_m for e in residuals)])
+
+
+def belief_lines(beliefs: Sequence[Belief]) -> list[str]:
+    """A sentence for each: `as seen: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
+    return [
+        f"{b.title}: largest gap {1e3 * b.gap_m:.3f} mm; " + (f"open: {', '.join(b.open)}" if b.open else "all hold")
+        for b in beliefs
+    ]
+
+
+def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: str | Path) -> None:
+    """Write the panels beside each other, from one point of view, as PNG.
+
+    Raises:
+        InputError: There is nothing to draw with, or the file cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    from apo_bench.simulation.render import picture
+    from apo_bench.simulation.scene import build_scene
+
+    scene = build_scene(scenario)
+    moved = dict.fromkeys(part for o in scenario.assembly.operations[:step] for part in o.moves)
+    camera = _camera(scenario, beliefs[0].poses, tuple(moved))
+    lines = min(MOST_LINES, max(len(b.open) for b in beliefs)) + 1
+    below, width = LINE_PX * lines + 8, WIDTH * len(beliefs)
+    height = HEIGHT + below + 56
+    figure = Figure(figsize=(width / 100, height / 100))
+    what = listed([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"
+    figure.text(0.5, 1 - 16 / height, f"{scenario.name}, believed after {'operation' if step == 1 else 'operations'} "
+                f"{what}", ha="center", va="center", fontsize=12)  # fmt: skip
+    for i, one in enumerate(beliefs):
+        axes = figure.add_axes((i / len(beliefs), below / height, 1 / len(beliefs), HEIGHT / height))
+        axes.imshow(picture(scene, one.poses, WIDTH, HEIGHT, camera))
+        axes.axis("off")
+        figure.text((i + 0.5) / len(beliefs), 1 - 42 / height, one.title, ha="center", va="center", fontsize=11)
+        for j, line in enumerate(_below(one)):
+            figure.text(
+                (i + 0.03) / len(beliefs), (below - LINE_PX * (j + 0.8)) / height, line, va="center", fontsize=9.5
+            )
+    try:
+        figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{out} cannot be written ({error.strerror}); choose another place.") from error
+
+
+def _below(one: Belief) -> list[str]:
+    """The lines below a panel."""
+    if not one.open:
+        return [f"every contact holds: largest gap {1e3 * one.gap_m:.3f} mm"]
+    shown = [f"contacts that do not hold: {one.open[0]}", *one.open[1 : MOST_LINES - 1]]
+    left = len(one.open) - len(shown)
+    return [*shown, f"and {left} more"] if left else shown
+
+
+def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
+    """One that sees all parts that were moved, obliquely to the assembly."""
+    from apo_bench.simulation.render import view
+
+    boxes = {part: scenario.assembly.solids[part].boxes for part in parts}
+    ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
+    at = np.array([poses[part][:3, 3] for part in parts])
+    low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+    first = poses[scenario.assembly.operations[0].main]
+    azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + AZIMUTH_DEG
+    return view((low + high) / 2, NEAREST_M + FARTHER * float(np.linalg.norm(high - low)), azimuth, ELEVATION_DEG)

@@ -1,0 +1,99 @@
+"""`apo-bench show`: what is believed, drawn and said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench import cli
+from apo_bench.benchmark.believed_picture import belief, belief_lines
+from apo_bench.correction.correct import correct
+from apo_bench.geometry import pose
+from apo_bench.observed import as_planned
+from apo_bench.program import Observation
+from apo_bench.scenario_file import load_scenario
+
+SHIFT_M = 2e-3
+
+
+def lifted() -> Observation:
+    """Example 5.1 with castle 2 seen 2 mm too high, and the stick half a millimetre."""
+    seen = as_planned(load_scenario("stick_in_tower"), 1.0, 1.0)
+    goals = np.array(seen.goals)
+    goals[1, 2, 3] += SHIFT_M
+    goals[2, 2, 3] += SHIFT_M / 4
+    return Observation(seen.assembly, seen.start, goals, seen.covariance, seen.seen, seen.gap_m)
+
+
+def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
+    seen = lifted()
+    found = belief("as seen", seen, seen.goals, 3)
+    assert found.gap_m == pytest.approx(SHIFT_M)
+    wrong = ("R2 castle2 -> castle1: 2.00 mm", "R4 stick -> castle2: 1.50 mm", "R3 stick -> castle1: 0.50 mm")
+    assert found.open == wrong
+    np.testing.assert_array_equal(found.poses["castle2"], seen.goals[1])
+    mended = belief("corrected", seen, correct(seen, "contact").goals, 3)
+    assert (mended.open, mended.gap_m < 1e-9) == ((), True)
+    assert belief_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
+
+
+def test_only_what_was_done_by_then_is_shown() -> None:
+    seen = lifted()
+    one, two = (belief("as seen", seen, seen.goals, k) for k in (1, 2))
+    assert one.open == ()
+    assert two.open == ("R2 castle2 -> castle1: 2.00 mm",)
+    np.testing.assert_array_equal(one.poses["castle2"], seen.start["castle2"])
+
+
+def test_disappeared_contacts_are_said_to_be() -> None:
+    scenario = load_scenario("vanished_fixture")
+    seen = as_planned(scenario, 1.0, 1.0)
+    goals = np.array(seen.goals)
+    goals[1] = pose.at((0.0, 1e-3, 0.0)) @ goals[1]
+    found = belief("as seen", seen, goals, len(goals))
+    assert found.open == ("R4 castle2 -> cube: 1.00 mm (disappeared)",)
+
+
+def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import imageio.v3 as imageio
+
+    out = tmp_path / "seen.png"
+    assert cli.main(["show", "stick_in_tower", "--observation", "docs/seen.csv", "--out", str(out)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("as seen: largest gap 5.466 mm; open: ")
+    assert said[1:] == ["corrected by contact: largest gap 0.000 mm; all hold", f"Wrote {out}"]
+    drawn = imageio.imread(out)
+    left, right = drawn[60:530, :620], drawn[60:530, 620:1240]
+    assert left.std() > 10.0
+    assert np.abs(left.astype(float) - right).mean() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (("--step", "4"), "step 4 was given; the scenario has operations 1 to 3"),
+        (("--level", "1", "--observation", "docs/seen.csv"), "--level was given together with --observation"),
+        (("--method", "contakt"), "contact"),
+        (("--out", "seen.jpg"), "ends in .png"),
+        (("--eye", "telescope"), "telescope"),
+    ],
+)
+def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", "stick_in_tower", *arguments]) == 2
+    said = capsys.readouterr()
+    assert part in said.err
+    assert said.err.count("\n") == 1
+    assert not Path("believed.png").exists()
+
+
+def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = Path("docs/seen.csv").read_text(encoding="utf-8").splitlines()
+    rows = [table[0] + ",seen", *(f"{line},{'false' if i == 1 else 'true'}" for i, line in enumerate(table[1:]))]
+    path = tmp_path / "half.csv"
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    out = tmp_path / "x.png"
+    assert cli.main(["show", "stick_in_tower", "--observation", str(path), "--out", str(out)]) == 1
+    assert "operation 2 was not seen" in capsys.readouterr().err
+    assert not out.exists()
