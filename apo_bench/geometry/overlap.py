@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, final
 
 import numpy as np
@@ -81,6 +82,7 @@ def area(face: Face) -> float:
     return float(_polygon(face, pose.inverse(_plane_frame(face))).area)
 
 
+@lru_cache(maxsize=4096)
 def _plane_frame(face: Face) -> Array:
     """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
     edges = np.roll(face.outline, -1, axis=0) - face.outline

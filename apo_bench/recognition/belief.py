@@ -1,0 +1,85 @@
+"""What is believed of all goals together: where they are, how uncertain, and what a contact says of that.
+
+A linear filter: contacts are measurements without noise but for play, taken one after the other. It serves to tell
+which contacts go together; the correction itself is not its business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.program import Observation, Poses
+
+
+class Standing(NamedTuple):
+    """Every part after an operation."""
+
+    poses: Poses
+    reach: Mapping[str, Array]
+    """Part -> (6, 6 n): the world twist (v, w), about the origin, that body twists of all goals make of its pose."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """Goals with one covariance over all of them; the assembly gives who moves and who is carried, no contact."""
+
+    assembly: Assembly
+    start: Poses
+    goals: Array
+    """(n, 4, 4), world frame, [m]."""
+    covariance: Array
+    """(6 n, 6 n), of the body twists by which the goals are wrong, [m, rad]."""
+
+    def standing(self, k: int) -> Standing:
+        """Where every part is after operation k, counted from 0, and what errors of the goals do to it.
+
+        With D' = T D_m^-1 D_s of a carried part, and exp(w) D a displaced D: w' = Ad(T) xi + Ad(T D_m^-1) (w_s - w_m).
+        """
+        n = len(self.goals)
+        poses = dict(self.start)
+        reach = {part: np.zeros((6, 6 * n)) for part in poses}
+        for i, (operation, T) in enumerate(zip(self.assembly.operations[: k + 1], self.goals, strict=False)):
+            own = np.zeros((6, 6 * n))
+            own[:, 6 * i : 6 * i + 6] = adjoint(T)
+            by = T @ pose.inverse(poses[operation.main])
+            for part in operation.carries:
+                poses[part] = by @ poses[part]
+                reach[part] = own + adjoint(by) @ (reach[part] - reach[operation.main])
+            poses[operation.main], reach[operation.main] = T, own
+        return Standing(poses, reach)
+
+    def given(self, e: Array, J: Array, noise: Array) -> Belief:
+        """The same after learning that three quantities, now e (3,) with derivative J (3, 6 n), are zero up to noise.
+
+        Args:
+            noise: (3, 3), covariance of what the quantities really are.
+        """
+        PJ = self.covariance @ J.T
+        K = np.linalg.solve(J @ PJ + noise, PJ.T).T
+        covariance = self.covariance - K @ PJ.T
+        goals = self.goals @ pose.exp(-(K @ e).reshape(-1, 6))
+        return Belief(self.assembly, self.start, goals, (covariance + covariance.T) / 2)
+
+
+def believed(seen: Observation) -> Belief:
+    """What an observation says before any contact is known: goals are wrong independently of each other."""
+    n = len(seen.goals)
+    covariance = np.zeros((n, 6, n, 6))
+    covariance[np.arange(n), :, np.arange(n)] = seen.covariance
+    return Belief(seen.assembly, seen.start, seen.goals, covariance.reshape(6 * n, 6 * n))
+
+
+def adjoint(T: Array) -> Array:
+    """Ad(T), (6, 6): T exp(xi) = exp(Ad(T) xi) T."""
+    A = np.zeros((6, 6))
+    A[:3, :3] = A[3:, 3:] = T[:3, :3]
+    A[:3, 3:] = pose.hat(T[:3, 3]) @ T[:3, :3]
+    return A

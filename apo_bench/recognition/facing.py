@@ -1,0 +1,141 @@
+"""Faces of two solids that look at each other: how far apart, how far from parallel, how much they cover each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import area, overlap
+from apo_bench.geometry.solid import Face, Solid
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Facing:
+    """Two faces with opposite normals, one of which covers part of the other."""
+
+    a: str
+    """The face of the first solid."""
+    b: str
+    """The face of the second one."""
+    gap_m: float
+    """From the middle of the overlap, on b, to the plane of a: above 0 apart, below 0 inside each other."""
+    angle_rad: float
+    """Between the normal of a and the opposite of that of b."""
+    share: float
+    """Area of the overlap over that of the smaller face, 0 to 1."""
+    residual: Array
+    """(3,): the gap, [m], and the parts of the normal of a along two axes in the plane of b, [rad] while small."""
+    slope: Array
+    """(3, 6): its derivative by a twist (v, w) of the first solid in the world, about the origin, b at rest."""
+    half_m: tuple[float, float]
+    """Half the extent of the overlap across the two axes, (2,), so that a tilt about them opens it by as much."""
+
+
+def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
+    """Whether two posed faces look at each other, their normals opposite within an angle."""
+    return bool((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal) < -np.cos(angle_rad))
+
+
+def height(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
+    """How far the middle of face a stands in front of the plane of face b, [m]; below 0 behind it."""
+    n = T_b[:3, :3] @ b.normal
+    return float((pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]) @ n)
+
+
+def facing(
+    a: Solid, T_a: Array, b: Solid, T_b: Array, *, gap_m: float, angle_rad: float, share: float
+) -> Iterator[Facing]:
+    """All pairs of faces of two posed solids that might touch.
+
+    Args:
+        T_a: World pose of the first solid, (4, 4), [m].
+        T_b: That of the second one.
+        gap_m: Pairs whose planes are farther apart in the middle of the overlap are left out.
+        angle_rad: Pairs whose normals are farther from opposite are left out.
+        share: Pairs that cover less of the smaller face are left out.
+    """
+    posed_a, posed_b = _posed(a, T_a), _posed(b, T_b)
+    for i, j in np.argwhere(posed_a.normals @ posed_b.normals.T < -np.cos(angle_rad)):
+        heights = (posed_a.corners[i] - posed_b.corners[j][0]) @ posed_b.normals[j]
+        if heights.min() > gap_m or heights.max() < -gap_m:
+            continue
+        found = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
+        if found is not None and abs(found.gap_m) <= gap_m:
+            yield found
+
+
+def gap(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
+    """From the middle of the overlap, on b, to the plane of a, [m]; from the middle of b where nothing overlaps."""
+    common = overlap(a, T_a, b, T_b)
+    middle = (common.corners if len(common.corners) else pose.apply(T_b, b.outline)).mean(axis=0)
+    return float((T_a[:3, :3] @ a.normal) @ (middle - pose.apply(T_a, a.outline[:1])[0]))
+
+
+class _Posed(NamedTuple):
+    """The faces of a solid in the world."""
+
+    faces: tuple[Face, ...]
+    normals: Array
+    """(f, 3)."""
+    corners: list[Array]
+    """Of each outline, (k, 3), [m]."""
+
+
+def _posed(solid: Solid, T: Array) -> _Posed:
+    faces = tuple(solid.faces.values())
+    normals = np.array([_measured(face).normal for face in faces]).reshape(-1, 3)
+    return _Posed(faces, normals @ T[:3, :3].T, [pose.apply(T, face.outline) for face in faces])
+
+
+class _Measured(NamedTuple):
+    """What does not depend on where a face is."""
+
+    normal: Array
+    area: float
+
+
+@lru_cache(maxsize=4096)
+def _measured(face: Face) -> _Measured:
+    return _Measured(face.normal, area(face))
+
+
+def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> Facing | None:
+    """What is measured of face i of one solid and face j of another; None if they cover too little of each other."""
+    face_a, face_b, n_a, n_b = a.faces[i], b.faces[j], a.normals[i], b.normals[j]
+    common = overlap(face_a, T_a, face_b, T_b)
+    covered = common.area / min(_measured(face_a).area, _measured(face_b).area)
+    if covered < share or not len(common.corners):
+        return None
+    middle = common.corners.mean(axis=0)
+    u, v = _axes(n_b, T_b[:3, :3])
+    residual = np.array([n_a @ (middle - a.corners[i][0]), u @ n_a, v @ n_a])
+    lever, turn_u, turn_v = np.cross(np.array([middle, n_a, n_a]), np.array([n_a, u, v]))
+    slope = np.zeros((3, 6))
+    slope[0] = [*-n_a, *-lever]
+    slope[1, 3:], slope[2, 3:] = turn_u, turn_v
+    half = np.ptp((common.corners - middle) @ np.array([u, v]).T, axis=0) / 2
+    return Facing(
+        a=face_a.name,
+        b=face_b.name,
+        gap_m=float(residual[0]),
+        angle_rad=float(np.arctan2(np.hypot(*residual[1:]), -(n_a @ n_b))),
+        share=covered,
+        residual=residual,
+        slope=slope,
+        half_m=(float(half[0]), float(half[1])),
+    )
+
+
+def _axes(n: Array, R: Array) -> tuple[Array, Array]:
+    """Two unit vectors across n and each other; the first follows the axis of the part that is most across."""
+    u = R[:, int(np.abs(n @ R).argmin())]
+    u = u - (u @ n) * n
+    u = u / np.sqrt(u @ u)
+    return u, np.array([n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]])

@@ -1,0 +1,94 @@
+"""Operations understood: the contact state before and after each, and the macros that lead from one to the other.
+
+States and macros are those of the nominal goals; a plan with other motion parameters has the same macros in the same
+directions of its parts, so that a minor change is made by replacing one part of the plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import final
+
+from apo_bench.assembly import Assembly, Contact
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.placement import placed
+from apo_bench.program import Poses
+from apo_bench.recognition.arrival import Arrival, arrive
+from apo_bench.recognition.states import ANGLE_RAD
+from apo_bench.scenario import Attach, Scenario
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Understood:
+    """One operation, in terms of macros."""
+
+    operation: int
+    """Counted from 0."""
+    main: str
+    carries: tuple[str, ...]
+    before: Arrival
+    """How the part would come to where it is taken from: undoing the operation does that."""
+    after: Arrival
+    """How it comes to its goal."""
+    came_by: int | None
+    """The operation that had put the main part where it is taken from; None if it was never moved by itself."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The macros in their order, such as `depart`, `move-to-contact`."""
+        return tuple(macro.name for macro in (*self.before.departs, *self.after.macros))
+
+
+def understand(
+    assembly: Assembly,
+    start: Poses,
+    goals: Array,
+    stated: Sequence[Attach | None] = (),
+    angle_rad: float = ANGLE_RAD,
+) -> tuple[Understood, ...]:
+    """Every operation.
+
+    Args:
+        start: Poses before the first operation, z upwards, [m].
+        goals: (n, 4, 4), in the same frame, [m].
+        stated: Lines of attach to be preferred, each in the frame of its main part; one that leads through a contact
+            is not followed.
+        angle_rad: Faces this near to parallel are; more than rounding where goals were only seen.
+    """
+    stages = (start, *placed(assembly, start, goals))
+    lines = tuple(stated) or (None,) * len(assembly)
+    understood: list[Understood] = []
+    put: dict[str, int] = {}
+    for k, operation in enumerate(assembly.operations):
+        was = put.get(operation.main)
+        back = lines[was] if was is not None else None
+        if back is None and was is not None and understood[was].after.free:
+            back = understood[was].after.line
+        before = arrive(assembly, operation.moves, lost_at(assembly, k), stages[k], back, angle_rad)
+        after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
+        understood.append(Understood(k, operation.main, operation.carries, before, after, was))
+        put[operation.main] = k
+    return tuple(understood)
+
+
+def lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:
+    """The contacts that operation k breaks: undoing it makes them again."""
+    return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)
+
+
+@lru_cache(maxsize=32)
+def understood(scenario: Scenario) -> tuple[Understood, ...]:
+    """The operations of a scenario at its nominal goals."""
+    return understand(scenario.assembly, waiting(scenario), scenario.goals, scenario.attach)
+
+
+def waiting(scenario: Scenario) -> Poses:
+    """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
+    (x, y), (low, high) = scenario.site.center_m, scenario.site.yaw_rad
+    site = pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2])
+    back = pose.inverse(site)
+    return {part: T if part in scenario.follows_site else back @ T for part, T in scenario.start.items()}

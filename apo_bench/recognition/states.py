@@ -1,0 +1,131 @@
+"""Contact states: which infinitesimal motions the contacts of a part admit, by one linear programme.
+
+Every contact normal n, from what rests into the free side of what moves, admits the motions with n x >= 0. Directions
+in which all of them stay closed are *maintaining*, those that only open some *detaching*, all others *constraining*;
+for translations the three numbers add up to 3, which leaves ten states. Rows of six numbers (screws) work alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry.arrays import Array, frozen
+
+ANGLE_RAD = 1e-3
+"""Directions nearer than this to each other, or to being opposite, are the same where poses are exact."""
+RANK = 1e-4
+"""Singular values below this part of the largest are zero."""
+FASTEST = 1e3
+"""Bound of the components of a motion that opens contacts at unit speed: a narrower cone counts as flat."""
+LETTERS = {
+    (3, 0, 0): "S",
+    (2, 1, 0): "A",
+    (2, 0, 1): "B",
+    (1, 2, 0): "C",
+    (1, 1, 1): "D",
+    (1, 0, 2): "E",
+    (0, 3, 0): "F",
+    (0, 2, 1): "G",
+    (0, 1, 2): "H",
+    (0, 0, 3): "I",
+}
+"""The ten states of translation, by decreasing freedom: S in the air, A on a plane, E in a through hole, I captured."""
+
+
+class State(NamedTuple):
+    """Degrees of freedom of each kind."""
+
+    maintaining: int
+    detaching: int
+    constraining: int
+
+    @property
+    def letter(self) -> str:
+        """Of a state of translation; empty for screws."""
+        return LETTERS.get(tuple(self), "")
+
+    def __str__(self) -> str:
+        """`D (1,1,1)`."""
+        return f"{self.letter} ({self.maintaining},{self.detaching},{self.constraining})".strip()
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cone:
+    """The motions {x: N x >= 0} that contacts admit: a linear space, and a pointed cone across it."""
+
+    rows: Array
+    """N, (k, n)."""
+    detachable: NDArray[np.bool_]
+    """(k,): contacts that some admissible motion opens; the others are equations."""
+    direction: Array
+    """A unit motion that opens all of those at once, (n,); zero if there are none."""
+    state: State
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", frozen(self.rows, None, None))
+        object.__setattr__(self, "direction", frozen(self.direction, self.rows.shape[1]))
+
+    def admits(self, motion: Array, slack: float = ANGLE_RAD) -> bool:
+        """Whether a unit motion, (n,), closes in on nothing."""
+        return bool((self.rows @ motion >= -slack).all())
+
+
+def classify(rows: Array) -> Cone:
+    """The cone of contacts with these rows, (k, n), and its state.
+
+    The programme asks for a motion that opens as many contacts as it can: max sum s, N x >= s, 0 <= s <= 1. Motions
+    that open single contacts add up to one that opens all that can be opened, so every s is 0 or 1.
+    """
+    from scipy.optimize import linprog
+
+    k, n = rows.shape
+    if k == 0:
+        return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), State(n, 0, 0))
+    found = linprog(
+        np.concatenate([np.zeros(n), -np.ones(k)]),
+        A_ub=np.hstack([-rows, np.eye(k)]),
+        b_ub=np.zeros(k),
+        bounds=[(-FASTEST, FASTEST)] * n + [(0.0, 1.0)] * k,
+        method="highs",
+    )
+    detachable = found.x[n:] > 0.5
+    x = found.x[:n] if detachable.any() else np.zeros(n)
+    x = x / max(float(np.linalg.norm(x)), 1e-300)
+    maintaining, constraining = n - rank(rows), rank(rows[~detachable])
+    return Cone(rows, detachable, x, State(maintaining, n - maintaining - constraining, constraining))
+
+
+def rank(rows: Array) -> int:
+    """How many rows, (k, n), are independent."""
+    if not len(rows):
+        return 0
+    sizes = np.linalg.svd(rows, compute_uv=False)
+    return int((sizes > RANK * sizes[0]).sum())
+
+
+def null_space(rows: Array) -> Array:
+    """An orthonormal basis of the motions that keep every contact closed, (m, n)."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    return np.linalg.svd(rows)[2][rank(rows) :]
+
+
+def snapped(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
+    """Unit normals, (k, 3), of which those within an angle of an earlier one, or of its opposite, become that.
+
+    Between two walls a part is held; between two that are seen a little askew it would seem to be in a wedge.
+    """
+    axes: list[Array] = []
+    made = np.empty_like(normals)
+    for i, n in enumerate(normals):
+        near = [a for a in axes if np.linalg.norm(np.cross(a, n)) < np.sin(angle_rad)]
+        axis = max(near, key=lambda a: abs(a @ n), default=None)
+        if axis is None:
+            axes.append(n)
+        made[i] = n if axis is None else np.sign(axis @ n) * axis
+    return made

@@ -1,0 +1,85 @@
+"""Boxes moved along a straight line against boxes that rest: exactly where they meet, and where they come free.
+
+Two boxes overlap where their shadows do along every separating axis; along a line each shadow does so in an interval,
+so each pair of boxes meets in one interval of the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Box
+
+SLACK_M = 5e-5
+"""Boxes are less than this deep in each other where they touch."""
+
+
+class Posed(NamedTuple):
+    """The boxes of a part somewhere."""
+
+    boxes: tuple[Box, ...]
+    T: Array
+    """(4, 4), world, [m]."""
+
+
+def meetings(moving: Posed, way: Array, resting: Posed, slack_m: float = SLACK_M) -> Array:
+    """Where along a line the boxes of two parts overlap by more than a slack, (k, 2), [m]: from and until.
+
+    Args:
+        way: Unit vector of the motion, (3,), world.
+        slack_m: Negative: boxes count that are still this far apart.
+    """
+    a, half_a = _world(moving)
+    b, half_b = _world(resting)
+    axes = _axes(moving.T[:3, :3], resting.T[:3, :3])
+    reach_a = half_a @ np.abs(axes @ moving.T[:3, :3]).T
+    reach_b = half_b @ np.abs(axes @ resting.T[:3, :3]).T
+    reach = (reach_a[:, None] + reach_b[None]).reshape(-1, len(axes)) - slack_m
+    at = ((a @ axes.T)[:, None] - (b @ axes.T)[None]).reshape(-1, len(axes))
+    return _intervals(at, axes @ way, reach)
+
+
+def free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
+    """Whether parts can be moved so far as one without coming into any other."""
+    spans = [meetings(m, way, r) for m in moving for r in resting]
+    return not any(((span[:, 1] > 0.0) & (span[:, 0] < length_m)).any() for span in spans)
+
+
+def exit_after(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
+    """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap."""
+    found = [meetings(m, way, r, -SLACK_M) for m in moving for r in resting]
+    spans = np.concatenate(found) if found else np.zeros((0, 2))
+    at = 0.0
+    while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):
+        at = float(on[:, 1].max())
+    return at
+
+
+def _intervals(at: Array, speed: Array, reach: Array) -> Array:
+    """Where |at + s speed| < reach holds along all axes at once: (k, axes) -> (l, 2), empty ones left out."""
+    still = np.abs(speed) < 1e-9
+    apart = (np.abs(at) >= reach) & still
+    rate = np.where(still, 1.0, speed)
+    ends = np.stack([(-reach - at) / rate, (reach - at) / rate])
+    low = np.where(still, -np.inf, ends.min(axis=0)).max(axis=1)
+    high = np.where(still, np.inf, ends.max(axis=0)).min(axis=1)
+    kept = (low < high) & ~apart.any(axis=1) & (reach > 0.0).all(axis=1)
+    return np.column_stack([low[kept], high[kept]])
+
+
+def _world(posed: Posed) -> tuple[Array, Array]:
+    """Centres in the world and half sizes, (k, 3) each."""
+    centers = np.array([box.center for box in posed.boxes])
+    return centers @ posed.T[:3, :3].T + posed.T[:3, 3], np.array([box.half for box in posed.boxes])
+
+
+def _axes(R_a: Array, R_b: Array) -> Array:
+    """Directions along which two boxes may be apart, (k, 3): normals of sides, and across one edge of each."""
+    crossed = np.cross(R_a.T[:, None], R_b.T[None]).reshape(-1, 3)
+    length = np.linalg.norm(crossed, axis=1)
+    kept = length > 1e-6
+    return np.concatenate([R_a.T, R_b.T, crossed[kept] / length[kept, None]])
