@@ -134,5 +134,8 @@ def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
 
 
 def _own(x: Any, dtype: Any = np.float64) -> NDArray[Any]:
-    """A copy that is contiguous and may be written: the compiled code knows one kind of array."""
+    """The same, contiguous and such that it could be written: the compiled code knows one kind of array."""
+    known = x.flags
+    if x.dtype == dtype and known.c_contiguous and known.writeable:
+        return np.asarray(x)
     return np.array(x, dtype=dtype, order="C")

@@ -69,8 +69,11 @@ def rank(Jt: Any) -> int:
     if not Jt.size:
         return 0
     w = np.linalg.eigvalsh(Jt @ Jt.T if Jt.shape[0] <= Jt.shape[1] else Jt.T @ Jt)
-    if not ((w > UNCLEAR[0] * w[-1]) & (w < UNCLEAR[1] * w[-1])).any():
-        return int(np.count_nonzero(w > UNCLEAR[1] * w[-1]))
+    if not w[-1] > 0.0:
+        return 0
+    unclear, clear = w.searchsorted((UNCLEAR[0] * w[-1], UNCLEAR[1] * w[-1]))
+    if unclear == clear:
+        return int(len(w) - clear)
     w = np.linalg.svd(Jt, compute_uv=False)
     return int(np.count_nonzero(w > CUT_OFF * w[0]))
 
