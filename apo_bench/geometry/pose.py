@@ -65,6 +65,16 @@ def hat(w: ArrayLike) -> Array:
     return out - np.swapaxes(out, -1, -2)
 
 
+def adjoint(T: ArrayLike) -> Array:
+    """The matrix Ad in T exp(xi) T^-1 = exp(Ad xi), (*, 4, 4) -> (*, 6, 6)."""
+    T = np.asarray(T, dtype=np.float64)
+    R = T[..., :3, :3]
+    out = np.zeros((*T.shape[:-2], 6, 6))
+    out[..., :3, :3] = out[..., 3:, 3:] = R
+    out[..., :3, 3:] = hat(T[..., :3, 3]) @ R
+    return out
+
+
 def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """A pose from a position [m] and turns about the fixed x, then y, then z axis [degrees].
 

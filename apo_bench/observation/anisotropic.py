@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
 from apo_bench.observation.noise import Level
 from apo_bench.program import Demonstration, Observation
@@ -36,6 +37,22 @@ class Anisotropic:
     """
 
     level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="worse along one line of sight, the same for all parts",
+        formula=(
+            "T_seen = T exp(xi), xi = (R_seen^t S1 e, R^t S2 e')",
+            f"S1 = L ({ACROSS:g} (I - s s^t) + {ALONG:g} s s^t)",
+            f"S2 = L ({OUT_OF_IMAGE:.3g} (I - s s^t) + {IN_IMAGE:g} s s^t)",
+        ),
+        frame="of the world, in which the line of sight s is fixed",
+        parameters=(
+            f"s = down from {ELEVATION_DEG:g} deg above the table, {AZIMUTH_DEG:g} deg from the x axis",
+            f"{ALONG:g} and {ACROSS:g}: position over the level, along s and across it",
+            f"{OUT_OF_IMAGE:.3g} and {IN_IMAGE:g}: turn over the level, about axes across s and about s",
+        ),
+        states="R^t S S R with R as seen, which is exact",
+    )
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         sight, unit = line_of_sight(), rng.standard_normal((len(assembly), 6))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.observation.facts import Facts
 from apo_bench.observation.noise import Level
 from apo_bench.program import Demonstration, Observation
 
@@ -28,6 +29,14 @@ class Isotropic:
     """
 
     level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="the same in every direction",
+        formula=("T_seen = T exp(L e)",),
+        frame="of the part that is seen",
+        parameters=(),
+        states="L^2 in every direction, which is exact",
+    )
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)

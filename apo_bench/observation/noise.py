@@ -23,6 +23,13 @@ NOISES = MappingProxyType(
         "isotropic": "apo_bench.observation.isotropic:Isotropic",
         "anisotropic": "apo_bench.observation.anisotropic:Anisotropic",
         "per-part": "apo_bench.observation.per_part:PerPart",
+        "camera": "apo_bench.observation.sighted:Sighted",
+        "heavy-tailed": "apo_bench.observation.heavy_tailed:HeavyTailed",
+        "outliers": "apo_bench.observation.outliers:Outliers",
+        "bias": "apo_bench.observation.bias:Bias",
+        "bias-view": "apo_bench.observation.bias_view:BiasView",
+        "correlated": "apo_bench.observation.correlated:Correlated",
+        "symmetric": "apo_bench.observation.symmetric:Symmetric",
     }
 )
 
@@ -39,11 +46,13 @@ def make_noise(given: Any, level: Level) -> Noise:
 
     Args:
         given: A name out of `NOISES`, `"package.module:name"`, or the object: a class is made with the level, a
-            function `(assembly, shown, rng) -> Observation` is used as it is.
+            function `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(goals, rng) -> goals`
+            that has attributes `deviation_mm` and `deviation_deg`.
         level: How much noise.
 
     Raises:
-        InputError: There is no such noise model, or the level is negative or not finite.
+        InputError: There is no such noise model, it does not say how large its errors are, or the level is negative or
+            not finite.
     """
     for value, unit in zip(level, ("mm", "degrees"), strict=True):
         if not (math.isfinite(value) and value >= 0.0):
@@ -53,13 +62,23 @@ def make_noise(given: Any, level: Level) -> Noise:
     if isinstance(model, type):
         _check(model, 1, f"the noise model '{name}' is a class that cannot be made with one argument, the level")
         model = model(level)
+    if _takes(model, 2) and not _takes(model, 3):
+        from apo_bench.observation.plain import declared
+
+        return declared(model, name)
     _check(model, 3, f"the noise model '{name}' cannot be called with (assembly, shown, rng)")
     return model
 
 
-def _check(model: Any, arguments: int, complaint: str) -> None:
+def _takes(model: Any, arguments: int) -> bool:
     """Whether it can be called with so many arguments."""
     try:
         inspect.signature(model).bind(*[None] * arguments)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{complaint}; give a function (assembly, shown, rng) -> Observation.") from error
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _check(model: Any, arguments: int, complaint: str) -> None:
+    if not _takes(model, arguments):
+        raise InputError(f"{complaint}; give a function (assembly, shown, rng) -> Observation.")

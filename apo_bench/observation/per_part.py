@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
+from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
 from apo_bench.observation.noise import Level
 from apo_bench.program import Demonstration, Observation
@@ -27,6 +28,16 @@ class PerPart:
     """
 
     level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="some parts are seen much worse than others",
+        formula=("T_seen = T exp(L f_part e)",),
+        frame="of the part that is seen, the same in every direction",
+        parameters=(
+            f"f = {LEAST:g} to {MOST:g}, log-uniform: factor of a part, drawn per trial, for all its operations",
+        ),
+        states="(L f)^2 in every direction, with the factor that was drawn: exact",
+    )
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         unit = rng.standard_normal((len(assembly), 6))

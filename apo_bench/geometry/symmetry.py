@@ -1,0 +1,83 @@
+"""The turns after which a part looks the same."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid
+
+SAME_M = 1e-6
+"""Corners of boxes that are nearer than this have the same coordinate."""
+
+
+def quarter_turns() -> Array:
+    """The rotations that carry the axes of a frame onto each other, (24, 3, 3), the identity first."""
+    found = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            R = np.zeros((3, 3))
+            R[range(3), order] = signs
+            if np.linalg.det(R) > 0.0:
+                found.append(R)
+    return np.array(found)
+
+
+def symmetries(solid: Solid) -> Array:
+    """The displacements g of a solid that leave the space it fills as it is, (m, 4, 4), the identity first.
+
+    A union of axis-aligned boxes has faces towards both ends of all three axes and no others, so a turn that leaves it
+    as it is carries axes onto axes: the 24 quarter turns about the centre of volume are all that can. Names of faces
+    do not count. Seen at `T g` it looks as it does at `T`.
+    """
+    c = solid.centroid
+    centred = [(box.center - c, box.half) for box in solid.boxes]
+    turned = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
+    g = np.tile(np.eye(4), (len(turned), 1, 1))
+    g[:, :3, :3] = turned
+    g[:, :3, 3] = c - np.array(turned) @ c
+    return g
+
+
+def folds(symmetric: Array) -> Array:
+    """How often a part looks the same in a whole turn about each axis of its frame, (3,): 1, 2 or 4.
+
+    Args:
+        symmetric: (m, 4, 4), from `symmetries`.
+    """
+    return np.array([1.0 + sum(R[i, i] == 1.0 for R in symmetric[1:, :3, :3]) for i in range(3)])
+
+
+def nearest(symmetric: Array, off: Array) -> Array:
+    """For each displacement (n, 4, 4), the symmetry g (n, 4, 4) for which `off @ g` turns the least.
+
+    Of several that are as good the first is taken, which is the identity wherever that is one of them.
+    """
+    traces = np.einsum("nij,mji->nm", off[:, :3, :3], symmetric[:, :3, :3])
+    close = traces >= traces.max(axis=1, keepdims=True) - 1e-12
+    return np.asarray(symmetric[np.argmax(close, axis=1)])
+
+
+def _same(a: list[tuple[Array, Array]], b: list[tuple[Array, Array]]) -> bool:
+    """Whether two unions of boxes, each a centre and half sizes, fill the same space: cell by cell of their grid."""
+    cuts = [_cuts(np.array([at[i] + s * half[i] for at, half in a + b for s in (-1.0, 1.0)])) for i in range(3)]
+    middles = [(cut[1:] + cut[:-1]) / 2 for cut in cuts]
+    return bool(np.array_equal(_filled(a, middles), _filled(b, middles)))
+
+
+def _cuts(values: Array) -> Array:
+    """Sorted, with one of those that are the same."""
+    ordered = np.sort(values)
+    return ordered[np.append(True, np.diff(ordered) > SAME_M)]
+
+
+def _filled(boxes: list[tuple[Array, Array]], middles: list[Array]) -> NDArray[np.bool_]:
+    """Which cells, given by their middles along each axis, are in one of the boxes."""
+    filled = np.zeros([len(m) for m in middles], dtype=np.bool_)
+    for at, half in boxes:
+        inside = [np.abs(m - at[i]) < half[i] for i, m in enumerate(middles)]
+        filled |= inside[0][:, None, None] & inside[1][None, :, None] & inside[2][None, None, :]
+    return filled
