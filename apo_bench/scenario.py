@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -28,6 +28,19 @@ class Attach:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", frozen(self.direction, 3))
+
+    @property
+    def stated(self) -> Preference:
+        """The whole line as a preference."""
+        return Preference(self.direction, self.travel_m)
+
+
+class Preference(NamedTuple):
+    """What of a line of attach is stated; the rest is left to the plan."""
+
+    direction: Array | None = None
+    """As in `Attach`."""
+    travel_m: float | None = None
 
 
 @final

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -16,7 +16,7 @@ from apo_bench.recognition.screw import Screw, screw_state
 from apo_bench.recognition.states import ANGLE_RAD, State, classify, null_space, snapped
 from apo_bench.recognition.swept import Posed, exit_after, free
 from apo_bench.recognition.touching import Touching, corners, touching
-from apo_bench.scenario import Attach
+from apo_bench.scenario import Attach, Preference
 
 ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
@@ -25,6 +25,7 @@ TRAVEL_M = 0.03
 CLEAR_M = 0.3
 """A part comes from above to where its way in begins: so much above that place must be free."""
 SAME = 1e-9
+ANY = Preference()
 
 
 @final
@@ -43,8 +44,6 @@ class Arrival:
     """The line on which it arrives, in its own frame."""
     free: bool
     """Whether nothing is in the way of that line, nor above its beginning."""
-    screw: Screw
-    """The state with rotation."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T", frozen(self.T, 4, 4))
@@ -81,14 +80,14 @@ def arrive(
     moves: Sequence[str],
     contacts: Iterable[Contact],
     poses: Poses,
-    stated: Attach | None = None,
+    stated: Preference = ANY,
     angle_rad: float = ANGLE_RAD,
 ) -> Arrival:
     """How what moves, the main part first, comes into its contacts.
 
     Args:
         poses: Every part, what moves at its goal, z upwards, [m]. Nothing else may be inside of anything.
-        stated: A line to be preferred, in the frame of the main part.
+        stated: A line to be preferred, in the frame of the main part; one that leads through a contact is not.
         angle_rad: Normals this near to parallel are; more than rounding where poses were only seen.
     """
     T = poses[moves[0]]
@@ -96,29 +95,42 @@ def arrive(
     normals = _normals(touched, angle_rad)
     moving = [Posed(assembly.solids[part].boxes, poses[part]) for part in moves]
     resting = {part: Posed(solid.boxes, poses[part]) for part, solid in assembly.solids.items() if part not in moves}
-    if stated is not None and not classify(normals).admits(-(T[:3, :3] @ stated.direction), np.sin(angle_rad)):
-        stated = None
+    direction = stated.direction
+    if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
+        direction = None
 
-    def clear(direction: Array, length_m: float) -> bool:
-        begin = [Posed(posed.boxes, _shifted(posed.T, length_m * direction)) for posed in moving]
+    def clear(way: Array, length_m: float) -> bool:
+        begin = [Posed(posed.boxes, _shifted(posed.T, length_m * way)) for posed in moving]
         others = list(resting.values())
-        return free(moving, direction, length_m, others) and free(begin, UP, CLEAR_M, others)
+        return free(moving, way, length_m, others) and free(begin, UP, CLEAR_M, others)
+
+    def reach(exit_m: float) -> float:
+        return _length(exit_m) if stated.travel_m is None else stated.travel_m
 
     def out(along: Array, walls: tuple[int, ...]) -> Way:
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
         floors = [normals[i] for i in range(len(normals)) if i not in walls]
-        if stated is not None:
-            there = -(T[:3, :3] @ stated.direction)
-            return Way(there, exit_after(moving, there, around), clear(there, stated.travel_m))
-        ways = [Way(u, exit_after(moving, u, around), False) for u in _directions(along, floors, T)]
-        found = (way._replace(free=True) for way in ways if clear(way.direction, _length(way.length_m)))
+        there = [-(T[:3, :3] @ direction)] if direction is not None else list(_directions(along, floors, T))
+        ways = [Way(u, exit_after(moving, u, around), False) for u in there]
+        found = (way._replace(free=True) for way in ways if clear(way.direction, reach(way.length_m)))
         return next(found, ways[0])
 
     found = chain(normals, out, float(np.sin(angle_rad)))
-    line, is_free = _line(found, normals, T, stated, clear)
+    if found.way is not None:
+        line, is_free = Attach(_own(-found.way.direction, T), reach(found.way.length_m)), found.way.free
+    else:
+        there = list(_admissible(found, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
+        way = next((way for way in there if clear(way, reach(0.0))), None)
+        line, is_free = Attach(_own(-(there[0] if way is None else way), T), reach(0.0)), way is not None
+    if direction is not None:
+        line = Attach(direction, line.travel_m)
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > 0.5)
-    screw = screw_state(*corners(assembly, touched, poses))
-    return Arrival(T, touched, found, departs(found, supports), line, is_free and not found.locked, screw)
+    return Arrival(T, touched, found, departs(found, supports), line, is_free and not found.locked)
+
+
+def turning(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
+    """The state of what has arrived if it may also turn; `poses` as it was understood at."""
+    return screw_state(*corners(assembly, found.touched, poses))
 
 
 def readable(basis: Array, T: Array) -> Array:
@@ -131,19 +143,6 @@ def readable(basis: Array, T: Array) -> Array:
         if inside and np.linalg.norm(rest) > 1e-6 and len(found) < len(basis):
             found.append(rest / np.linalg.norm(rest))
     return np.array(found).reshape(-1, 3)
-
-
-def _line(
-    found: Chain, normals: Array, T: Array, stated: Attach | None, clear: Callable[[Array, float], bool]
-) -> tuple[Attach, bool]:
-    """The line on which the part arrives, and whether it is free."""
-    if stated is not None:
-        return stated, clear(-(T[:3, :3] @ stated.direction), stated.travel_m)
-    if found.way is not None:
-        return Attach(_own(-found.way.direction, T), _length(found.way.length_m)), found.way.free
-    ways = list(_admissible(found, normals, T))
-    way = next((way for way in ways if clear(way, TRAVEL_M)), None)
-    return Attach(_own(-(ways[0] if way is None else way), T), TRAVEL_M), way is not None
 
 
 def _admissible(found: Chain, normals: Array, T: Array) -> Iterator[Array]:
@@ -171,7 +170,7 @@ def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Arr
 
 def _length(exit_m: float) -> float:
     """How long the line of attach is for a part that is free after a way, in whole millimetres, [m]."""
-    return max(TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + ROOM_M) - 0.2)))
+    return max(TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + ROOM_M) - 1e-3)))
 
 
 def _normals(touched: Sequence[Touching], angle_rad: float = ANGLE_RAD) -> Array:

@@ -46,7 +46,7 @@ class Macro:
     """How far it goes; None: until contact is felt."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", frozen(self.direction, 3))
+        object.__setattr__(self, "direction", frozen(np.asarray(self.direction) + 0.0, 3))
 
     @property
     def inserts(self) -> bool:

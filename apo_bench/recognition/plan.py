@@ -16,9 +16,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.placement import placed
 from apo_bench.program import Poses
-from apo_bench.recognition.arrival import Arrival, arrive
+from apo_bench.recognition.arrival import ANY, Arrival, arrive
 from apo_bench.recognition.states import ANGLE_RAD
-from apo_bench.scenario import Attach, Scenario
+from apo_bench.scenario import Preference, Scenario
 
 
 @final
@@ -47,7 +47,7 @@ def understand(
     assembly: Assembly,
     start: Poses,
     goals: Array,
-    stated: Sequence[Attach | None] = (),
+    stated: Sequence[Preference] = (),
     angle_rad: float = ANGLE_RAD,
 ) -> tuple[Understood, ...]:
     """Every operation.
@@ -56,18 +56,20 @@ def understand(
         start: Poses before the first operation, z upwards, [m].
         goals: (n, 4, 4), in the same frame, [m].
         stated: Lines of attach to be preferred, each in the frame of its main part; one that leads through a contact
-            is not followed.
+            is not.
         angle_rad: Faces this near to parallel are; more than rounding where goals were only seen.
     """
     stages = (start, *placed(assembly, start, goals))
-    lines = tuple(stated) or (None,) * len(assembly)
+    lines = tuple(stated) or (ANY,) * len(assembly)
     understood: list[Understood] = []
     put: dict[str, int] = {}
     for k, operation in enumerate(assembly.operations):
         was = put.get(operation.main)
-        back = lines[was] if was is not None else None
-        if back is None and was is not None and understood[was].after.free:
-            back = understood[was].after.line
+        back = (
+            ANY
+            if was is None
+            else Preference(understood[was].after.line.direction, understood[was].after.line.travel_m)
+        )
         before = arrive(assembly, operation.moves, lost_at(assembly, k), stages[k], back, angle_rad)
         after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
         understood.append(Understood(k, operation.main, operation.carries, before, after, was))
@@ -83,7 +85,8 @@ def lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:
 @lru_cache(maxsize=32)
 def understood(scenario: Scenario) -> tuple[Understood, ...]:
     """The operations of a scenario at its nominal goals."""
-    return understand(scenario.assembly, waiting(scenario), scenario.goals, scenario.attach)
+    lines = [attach.stated for attach in scenario.attach]
+    return understand(scenario.assembly, waiting(scenario), scenario.goals, lines)
 
 
 def waiting(scenario: Scenario) -> Poses:

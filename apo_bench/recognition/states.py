@@ -8,6 +8,7 @@ for translations the three numbers add up to 3, which leaves ten states. Rows of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple, final
 
 import numpy as np
@@ -46,7 +47,7 @@ class State(NamedTuple):
     @property
     def letter(self) -> str:
         """Of a state of translation; empty for screws."""
-        return LETTERS.get(tuple(self), "")
+        return LETTERS.get((self.maintaining, self.detaching, self.constraining), "")
 
     def __str__(self) -> str:
         """`D (1,1,1)`."""
@@ -81,23 +82,32 @@ def classify(rows: Array) -> Cone:
     The programme asks for a motion that opens as many contacts as it can: max sum s, N x >= s, 0 <= s <= 1. Motions
     that open single contacts add up to one that opens all that can be opened, so every s is 0 or 1.
     """
+    n = rows.shape[1]
+    if not len(rows):
+        return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), State(n, 0, 0))
+    different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
+    opens, x = _opened(different.tobytes(), *different.shape)
+    detachable = opens[which.ravel()]
+    maintaining, constraining = n - rank(rows), rank(rows[~detachable])
+    return Cone(rows, detachable, x, State(maintaining, n - maintaining - constraining, constraining))
+
+
+@lru_cache(maxsize=1024)
+def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
+    """The programme for rows (k, n): which are opened, (k,), by what unit motion, (n,)."""
     from scipy.optimize import linprog
 
-    k, n = rows.shape
-    if k == 0:
-        return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), State(n, 0, 0))
+    N = np.frombuffer(rows).reshape(k, n)
     found = linprog(
         np.concatenate([np.zeros(n), -np.ones(k)]),
-        A_ub=np.hstack([-rows, np.eye(k)]),
+        A_ub=np.hstack([-N, np.eye(k)]),
         b_ub=np.zeros(k),
         bounds=[(-FASTEST, FASTEST)] * n + [(0.0, 1.0)] * k,
         method="highs",
     )
-    detachable = found.x[n:] > 0.5
-    x = found.x[:n] if detachable.any() else np.zeros(n)
-    x = x / max(float(np.linalg.norm(x)), 1e-300)
-    maintaining, constraining = n - rank(rows), rank(rows[~detachable])
-    return Cone(rows, detachable, x, State(maintaining, n - maintaining - constraining, constraining))
+    opens = found.x[n:] > 0.5
+    x = found.x[:n] if opens.any() else np.zeros(n)
+    return opens, x / max(float(np.linalg.norm(x)), 1e-300)
 
 
 def rank(rows: Array) -> int:

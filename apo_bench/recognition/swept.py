@@ -7,6 +7,7 @@ so each pair of boxes meets in one interval of the way.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -45,8 +46,12 @@ def meetings(moving: Posed, way: Array, resting: Posed, slack_m: float = SLACK_M
 
 def free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
     """Whether parts can be moved so far as one without coming into any other."""
-    spans = [meetings(m, way, r) for m in moving for r in resting]
-    return not any(((span[:, 1] > 0.0) & (span[:, 0] < length_m)).any() for span in spans)
+    for m, r in product(moving, resting):
+        if _near(m, way, length_m, r):
+            spans = meetings(m, way, r)
+            if ((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any():
+                return False
+    return True
 
 
 def exit_after(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
@@ -56,7 +61,21 @@ def exit_after(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) ->
     at = 0.0
     while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):
         at = float(on[:, 1].max())
-    return at
+    return max(0.0, at - SLACK_M)
+
+
+def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:
+    """Whether balls around two parts come near each other on the way; most parts are far away."""
+    (a, r_a), (b, r_b) = _ball(moving), _ball(resting)
+    passed = float(np.clip((b - a) @ way, 0.0, length_m))
+    return bool(np.linalg.norm(a + passed * way - b) < r_a + r_b)
+
+
+def _ball(posed: Posed) -> tuple[Array, float]:
+    """Middle and radius of a ball around a part."""
+    low = np.min([box.center - box.half for box in posed.boxes], axis=0)
+    high = np.max([box.center + box.half for box in posed.boxes], axis=0)
+    return posed.T[:3, :3] @ (low + high) / 2 + posed.T[:3, 3], float(np.linalg.norm(high - low)) / 2
 
 
 def _intervals(at: Array, speed: Array, reach: Array) -> Array:
