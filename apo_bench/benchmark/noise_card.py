@@ -14,6 +14,7 @@ from apo_bench.names import resolve
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.observation.noise_file import noise_of_file, presets, read_noise
 from apo_bench.observation.observe import observe
 from apo_bench.placement import placed
 from apo_bench.program import Demonstration
@@ -41,12 +42,15 @@ class Drawn(NamedTuple):
 
 def listed() -> Mapping[str, str]:
     """Name -> what it is, of every model that has a name."""
-    return {name: facts(name).title for name in NOISES}
+    return {name: facts(name).title for name in NOISES} | {
+        name: f"measured: {read_noise(path)[0].source}" for name, path in presets().items()
+    }
 
 
 def facts(given: Any) -> Facts:
     """What a model says of itself; of one that says nothing, its docstring."""
-    model = resolve(given, NOISES, "noise model")
+    measured = noise_of_file(given, Level(1.0, 1.0)) if isinstance(given, str) else None
+    model = measured or resolve(given, NOISES, "noise model")
     own = getattr(model, "FACTS", None)
     if isinstance(own, Facts):
         return own

@@ -45,7 +45,8 @@ def make_noise(given: Any, level: Level) -> Noise:
     """The noise model that a name stands for.
 
     Args:
-        given: A name out of `NOISES`, `"package.module:name"`, or the object: a class is made with the level, a
+        given: A name out of `NOISES`, `"package.module:name"`, a noise file (`.toml`, the name of one that comes with
+            the package, or `"empirical:"` and a file of residuals), or the object: a class is made with the level, a
             function `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(goals, rng) -> goals`
             that has attributes `deviation_mm` and `deviation_deg`.
         level: How much noise.
@@ -57,6 +58,11 @@ def make_noise(given: Any, level: Level) -> Noise:
     for value, unit in zip(level, ("mm", "degrees"), strict=True):
         if not (math.isfinite(value) and value >= 0.0):
             raise InputError(f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.")
+    if isinstance(given, str):
+        from apo_bench.observation.noise_file import noise_of_file
+
+        if (measured := noise_of_file(given, level)) is not None:
+            return measured
     model = resolve(given, NOISES, "noise model")
     name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
     if isinstance(model, type):

@@ -72,8 +72,8 @@ class Residuals:
         return np.asarray(np.linalg.norm(self.turn_deg, axis=1))
 
 
-def compare(estimates: Located, truth: Located) -> Residuals:
-    """Match estimates to the truth and say how far off they are.
+def compare(estimates: Located, truth: Located, scene: int | None = None) -> Residuals:
+    """Match estimates to the truth and say how far off they are; of one scene, estimates of others do not count.
 
     Per image and object, every part that was there gets an estimate of its own so that the distances add up to the
     least (the Hungarian method), however far off: what is gross is told afterwards by `INLIER_MM`. Scores do not count.
@@ -83,6 +83,7 @@ def compare(estimates: Located, truth: Located) -> Residuals:
 
     partner = matched(estimates, truth)
     found, n = partner >= 0, len(partner)
+    asked = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
     there = np.zeros((n, 4, 4))
     there[:] = np.eye(4)
     there[:, :3, 3] = truth.t_mm * 1e-3
@@ -99,7 +100,7 @@ def compare(estimates: Located, truth: Located) -> Residuals:
         shift_mm=shift,
         turn_deg=turned,
         trace_deg=trace,
-        surplus=len(estimates.where) - int(found.sum()),
+        surplus=asked - int(found.sum()),
         distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
     )
 

@@ -1,0 +1,148 @@
+"""Noise files: what was measured of a pose estimator, as TOML; and those that come with the package."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from apo_bench.errors import InputError
+from apo_bench.observation.camera import Camera
+from apo_bench.observation.empirical import PREFIX, Empirical, empirical_noise
+from apo_bench.observation.fitted import LEAST_FREEDOM, SMALLEST, Fitted, Measured
+from apo_bench.observation.noise import Level
+from apo_bench.observation.tails import Split, Tail
+from apo_bench.resources import folder
+from apo_bench.scenario_keys import read_pose
+from apo_bench.strict_json import Node
+
+SCHEMA = "apo-bench/noise/1"
+LARGEST_BYTES = 100_000
+FARTHEST_MM = 1e5
+
+
+def presets() -> Mapping[str, Path]:
+    """The noise files that come with the package, by the names they go by."""
+    return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
+
+
+def noise_path(name: str) -> Path | None:
+    """The file behind the name of a noise model, None if there is none.
+
+    A path that ends in .toml, a name that comes with the package, or `empirical:` and the path of a file of residuals.
+    """
+    if name.startswith(PREFIX):
+        return Path(name.removeprefix(PREFIX))
+    if name.endswith(".toml"):
+        return Path(name)
+    return presets().get(name)
+
+
+def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
+    """The noise model of such a name, None if it is no such name.
+
+    Raises:
+        InputError: Anything in the file that is not as described, naming file and place.
+    """
+    path = noise_path(name)
+    if path is None:
+        return None
+    if name.startswith(PREFIX):
+        return empirical_noise(path, level)
+    measured, camera = read_noise(path)
+    return Fitted(measured, level, camera)
+
+
+def read_noise(path: str | Path) -> tuple[Measured, Camera]:
+    """What a noise file states, and the camera it names, else the default one."""
+    root = _document(Path(path))
+    if isinstance(root.value, dict) and root.value.get("schema", SCHEMA) != SCHEMA:
+        root.child(root.value["schema"], "schema").fail(f'"{SCHEMA}" is needed')
+    required = ("schema", "source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
+    top = root.fields(required, ("camera",))
+    shift, turn = _split(top["shift"], "mm", 1000.0), _split(top["turn"], "deg", 180.0)
+    measured = Measured(
+        source=top["source"].text(),
+        shift_mm=shift,
+        turn_deg=turn,
+        missed=_number(top["missed_rate"], 0.0, 1.0),
+        outliers=_number(top["outlier_rate"], 0.0, 1.0),
+        farthest_mm=_number(top["outlier_farthest_mm"], shift.limit, FARTHEST_MM),
+    )
+    return measured, Camera(read_pose(top["camera"])) if "camera" in top else Camera()
+
+
+def noise_text(measured: Measured, notes: tuple[str, ...] = ()) -> str:
+    """A noise file, with notes at its head."""
+    source = measured.source.replace("\\", "\\\\").replace('"', '\\"')
+    head = (
+        [f"# {note}" for note in notes],
+        [f'schema = "{SCHEMA}"', f'source = "{source}"'],
+        [f"missed_rate = {measured.missed:.5g}  # of the parts that are there"],
+        [f"outlier_rate = {measured.outliers:.5g}  # of the parts that are found"],
+        [f"outlier_farthest_mm = {measured.farthest_mm:.5g}"],
+        _split_lines("shift", measured.shift_mm, "mm"),
+        _split_lines("turn", measured.turn_deg, "deg"),
+    )
+    return "\n".join(line for lines in head for line in lines) + "\n"
+
+
+def _split_lines(name: str, split: Split, unit: str) -> list[str]:
+    lines = ["", f"[{name}]", f"limit_{unit} = {split.limit:.5g}"]
+    for direction, tail in (("across", split.across), ("along", split.along)):
+        lines.append(f"{direction}_scale_{unit} = {tail.scale:.5g}")
+        lines.append(f"{direction}_degrees_of_freedom = {tail.freedom:.5g}")
+    return lines
+
+
+def _split(node: Node, unit: str, largest: float) -> Split:
+    tails = [(f"{d}_scale_{unit}", f"{d}_degrees_of_freedom") for d in ("across", "along")]
+    keys = node.fields((f"limit_{unit}", *(key for pair in tails for key in pair)))
+    limit = _number(keys[f"limit_{unit}"], 1e-3, largest)
+    across, along = (
+        Tail(_number(keys[scale], SMALLEST * limit, limit), _number(keys[freedom], LEAST_FREEDOM, math.inf))
+        for scale, freedom in tails
+    )
+    return Split(across, along, limit)
+
+
+def _number(node: Node, low: float, high: float) -> float:
+    """A number within bounds; infinity only where that is the bound."""
+    infinite = isinstance(node.value, float) and node.value == math.inf == high
+    x = math.inf if infinite else node.number(low)
+    if x > high:
+        node.fail(f"a number from {low:g} to {high:g} is needed")
+    return x
+
+
+def _document(path: Path) -> Node:
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: a folder was given; give a noise file, which ends in .toml.")
+        with path.open("rb") as stream:
+            raw = stream.read(LARGEST_BYTES + 1)
+        if len(raw) > LARGEST_BYTES:
+            raise InputError(f"{path}: the file is larger than {LARGEST_BYTES // 1000} kB; give a noise file.")
+        return Node(_plain(tomllib.loads(raw.decode("utf-8-sig")), path), str(path))
+    except OSError as error:
+        raise InputError(f"{path}: the noise file cannot be read ({error.strerror}); check the path.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a noise file.") from error
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        what = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "nested too deep, or a huge number"
+        raise InputError(f"{path}: this is not TOML: {what}; mend the file at that place.") from error
+
+
+def _plain(value: Any, path: Path) -> Any:
+    """The same, without dates and times, which no key of a noise file takes."""
+    if isinstance(value, dict):
+        return {key: _plain(entry, path) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_plain(entry, path) for entry in value]
+    if not isinstance(value, str | int | float | bool):
+        raise InputError(f"{path}: the date or time {value} was given, which no key takes; put a text into quotes.")
+    return value

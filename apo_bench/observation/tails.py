@@ -1,0 +1,145 @@
+"""Errors across a ray and along it: independent Student t, and none larger than a limit.
+
+Across there are two directions alike, along there is one. The same form serves for shifts [mm] and for turns [deg]
+(about axes across the ray, and about the ray). All integrals over the limited region are taken along the ray, by Gauss
+and Legendre in y with x = s sinh(y), which is dense where the density is high, however long its tail; across, they have
+a closed form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from apo_bench.geometry.arrays import Array
+
+NODES = 160
+GAUSS = 200.0
+"""Student t with more degrees of freedom counts as Gaussian, infinitely many."""
+_X, _W = np.polynomial.legendre.leggauss(NODES)
+
+
+class Tail(NamedTuple):
+    """Student t about zero: its scale, and its degrees of freedom, infinite for a Gaussian."""
+
+    scale: float
+    freedom: float = float("inf")
+
+    @property
+    def heaviness(self) -> float:
+        """1 / degrees of freedom: 0 for a Gaussian."""
+        return 1.0 / self.freedom if self.freedom < GAUSS else 0.0
+
+
+@final
+@dataclass(frozen=True)
+class Split:
+    """The distribution of errors (x, y, along)."""
+
+    across: Tail
+    along: Tail
+    limit: float
+    """No error is longer."""
+
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Places along the ray and what each stands for: density times weight, before the limit across."""
+        s, top = self.along.scale, np.arcsinh(self.limit / self.along.scale)
+        y = top * _X
+        x = s * np.sinh(y)
+        return x, top * _W * s * np.cosh(y) * np.exp(log_density_along(self.along, x))
+
+    @cached_property
+    def inside(self) -> float:
+        """The part of the unlimited distribution that is within the limit."""
+        x, w = self._nodes
+        return float(w @ below_across(self.across, self._left(x, self.limit)))
+
+    @cached_property
+    def variances(self) -> tuple[float, float]:
+        """Of one direction across and of the one along, within the limit."""
+        x, w = self._nodes
+        left = self._left(x, self.limit)
+        across = float(w @ _square_below(self.across, left)) / self.inside / 2.0
+        return across, float(w @ (x * x * below_across(self.across, left))) / self.inside
+
+    def cdf_across(self, r: ArrayLike) -> Array:
+        """Of the length of the error across."""
+        r, (x, w) = np.asarray(r, dtype=np.float64), self._nodes
+        return below_across(self.across, np.minimum(r[..., None], self._left(x, self.limit))) @ w / self.inside
+
+    def cdf_along(self, a: ArrayLike) -> Array:
+        """Of the size of the error along."""
+        a = np.minimum(np.asarray(a, dtype=np.float64), self.limit)[..., None]
+        top = np.arcsinh(a / self.along.scale)
+        x = self.along.scale * np.sinh(top * _X)
+        w = top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x))
+        return np.sum(w * below_across(self.across, self._left(x, self.limit)), axis=-1) / self.inside
+
+    def cdf_length(self, r: ArrayLike) -> Array:
+        """Of the length of the whole error."""
+        r = np.minimum(np.asarray(r, dtype=np.float64), self.limit)[..., None]
+        top = np.arcsinh(r / self.along.scale)
+        x = self.along.scale * np.sinh(top * _X)
+        w = top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x))
+        return np.sum(w * below_across(self.across, self._left(x, r)), axis=-1) / self.inside
+
+    def draw(self, n: int, rng: np.random.Generator) -> Array:
+        """Errors (n, 3); what falls outside the limit is drawn anew."""
+        kept = np.zeros((0, 3))
+        while len(kept) < n:
+            unit = rng.standard_normal((n, 3))
+            error = unit * [self.across.scale, self.across.scale, self.along.scale]
+            error[:, :2] /= _root_chi(self.across, n, rng)[:, None]
+            error[:, 2] /= _root_chi(self.along, n, rng)
+            kept = np.concatenate([kept, error[np.linalg.norm(error, axis=1) < self.limit]])
+        return kept[:n]
+
+    @staticmethod
+    def _left(x: Array, limit: ArrayLike) -> Array:
+        """How much is left across at a place along."""
+        return np.sqrt(np.maximum(np.asarray(limit) ** 2 - x * x, 0.0))
+
+
+def log_density_along(tail: Tail, x: Array) -> Array:
+    """Of Student t in one direction."""
+    from scipy.special import gammaln
+
+    h, u = tail.heaviness, (x / tail.scale) ** 2
+    if h == 0.0:
+        return -u / 2.0 - np.log(tail.scale * np.sqrt(2.0 * np.pi))
+    n = 1.0 / h
+    norm = gammaln((n + 1.0) / 2.0) - gammaln(n / 2.0) - 0.5 * np.log(np.pi * n) - np.log(tail.scale)
+    return np.asarray(norm - (n + 1.0) / 2.0 * np.log1p(h * u))
+
+
+def log_density_across(tail: Tail, r: Array) -> Array:
+    """Of Student t in two directions, per area, at a distance r."""
+    h, u = tail.heaviness, (r / tail.scale) ** 2
+    falls = u / 2.0 if h == 0.0 else (0.5 / h + 1.0) * np.log1p(h * u)
+    return np.asarray(-falls - np.log(2.0 * np.pi * tail.scale**2))
+
+
+def below_across(tail: Tail, r: Array) -> Array:
+    """The chance that Student t in two directions is nearer than r."""
+    h, u = tail.heaviness, (r / tail.scale) ** 2
+    return np.asarray(-np.expm1(-u / 2.0 if h == 0.0 else -0.5 / h * np.log1p(h * u)))
+
+
+def _square_below(tail: Tail, r: Array) -> Array:
+    """Integral of the squared distance times the density up to r: that of 2 r (1 - F) less r^2 (1 - F)."""
+    h, u, s2 = tail.heaviness, (r / tail.scale) ** 2, tail.scale**2
+    if h == 0.0:
+        return np.asarray(-2.0 * s2 * np.expm1(-u / 2.0) - r * r * np.exp(-u / 2.0))
+    grown, power = np.log1p(h * u), 1.0 - 0.5 / h
+    whole = grown if abs(power) < 1e-9 else np.expm1(power * grown) / power
+    return np.asarray(s2 / h * whole - r * r * np.exp(-0.5 / h * grown))
+
+
+def _root_chi(tail: Tail, n: int, rng: np.random.Generator) -> Array:
+    """What a Gaussian is divided by to make it Student t, (n,)."""
+    return np.sqrt(rng.chisquare(tail.freedom, n) / tail.freedom) if tail.heaviness > 0.0 else np.ones(n)
