@@ -12,6 +12,7 @@ import numpy as np
 
 from apo_bench import __version__, files
 from apo_bench.benchmark.spec import ROW, TrialSpec
+from apo_bench.observation.noise_file import noise_path
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import scenario_names
@@ -43,6 +44,8 @@ def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Pat
 def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
     """16 hexadecimal digits over the content and every setting but method, seed and the scenario's path.
 
+    A noise model that is a file counts by what stands in it as well.
+
     Rows with the same hash differ in method and seed alone, so they may be counted together or paired.
 
     Args:
@@ -50,8 +53,14 @@ def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
         observation: The text of the observation's file, when it was not drawn.
     """
     settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario")}
-    text = json.dumps([content, settings, observation], sort_keys=True)
+    text = json.dumps([content, settings, observation, *noise_content(spec.noise).values()], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def noise_content(*names: str) -> dict[str, str]:
+    """Of the noise models that are files: `noise NAME` -> 16 hexadecimal digits over the bytes of the file."""
+    files = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
+    return {name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for name, path in files.items()}
 
 
 def _scenario_bytes(scenario: Scenario, given: str | Path | Scenario) -> bytes:

@@ -43,7 +43,7 @@ class Drawn(NamedTuple):
 def listed() -> Mapping[str, str]:
     """Name -> what it is, of every model that has a name."""
     return {name: facts(name).title for name in NOISES} | {
-        name: f"measured: {read_noise(path)[0].source}" for name, path in presets().items()
+        name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in presets().items()
     }
 
 

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, final
 
-from apo_bench.benchmark.fingerprint import content_hash
+from apo_bench.benchmark.fingerprint import content_hash, noise_content
 from apo_bench.benchmark.grid import SweepSpec, Unit, described, load_all, trial_key, units
 from apo_bench.benchmark.journal import Journal, run_record
 from apo_bench.benchmark.spec import TrialSpec
@@ -66,7 +66,7 @@ def sweep(spec: SweepSpec, out: str | Path, *, workers: int = 1, command: str = 
         if method not in ("oracle", "none"):
             resolve(method, CORRECTORS, "corrector")
     content = {given: content_hash(scenario, given, arm.mjcf) for given, scenario in loaded.items()}
-    by_name = {loaded[given].name: hashed for given, hashed in content.items()}
+    by_name = {loaded[given].name: hashed for given, hashed in content.items()} | noise_content(*spec.noises)
     with Journal(Path(out), run_record(described(spec, loaded), by_name, command)) as journal:
         finished = journal.finished
         work = [

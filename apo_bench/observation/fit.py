@@ -11,7 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.fitted import LEAST_FREEDOM, SMALLEST, Measured
 from apo_bench.observation.residuals import INLIER_MM, TURNED_DEG, Residuals
-from apo_bench.observation.tails import GAUSS, Split, Tail, log_density_across, log_density_along
+from apo_bench.observation.tails import Split, log_density_across, log_density_along, of_numbers
 
 FEWEST = 30
 """Four numbers are not fitted to fewer errors."""
@@ -71,7 +71,7 @@ def fit_split(errors: Array, limit: float) -> Split:
         )
 
     def surprise(at: Array) -> float:
-        split = _split(at, limit)
+        split = of_numbers(at, limit)
         seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
         return float(np.log(max(split.inside, 1e-300)) - seen)
 
@@ -84,7 +84,7 @@ def fit_split(errors: Array, limit: float) -> Split:
         method="L-BFGS-B",
         options={"ftol": 1e-13, "gtol": 1e-7},
     )
-    return _split(best.x, limit)
+    return of_numbers(best.x, limit)
 
 
 def compared(residuals: Residuals, measured: Measured) -> tuple[Figures, ...]:
@@ -111,9 +111,3 @@ def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], 
         fitted=np.interp(np.array(PERCENTILES) / 100.0, chance, grid),
         distance=float(max((step[1:] - at).max(), (at - step[:-1]).max())),
     )
-
-
-def _split(at: Array, limit: float) -> Split:
-    """From the logarithms of the scales and the inverses of the degrees of freedom, each across and along."""
-    tails = [Tail(float(np.exp(s)), float(1.0 / h) if h > 1.0 / GAUSS else float("inf")) for s, h in (at[:2], at[2:])]
-    return Split(tails[0], tails[1], limit)

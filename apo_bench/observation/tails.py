@@ -105,6 +105,12 @@ class Split:
         return np.sqrt(np.maximum(np.asarray(limit) ** 2 - x * x, 0.0))
 
 
+def of_numbers(at: Array, limit: float) -> Split:
+    """From four numbers to fit: logarithm of the scale and inverse of the degrees of freedom, across, then along."""
+    tails = [Tail(float(np.exp(s)), float(1.0 / h) if h > 1.0 / GAUSS else float("inf")) for s, h in (at[:2], at[2:])]
+    return Split(tails[0], tails[1], limit)
+
+
 def log_density_along(tail: Tail, x: Array) -> Array:
     """Of Student t in one direction."""
     from scipy.special import gammaln
