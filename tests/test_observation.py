@@ -144,7 +144,7 @@ def test_make_noise_by_name_class_function_and_object() -> None:
         ("isotropc", Level(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
         ("isotropic", Level(-1, 1), "noise level -1 mm is not possible"),
         ("isotropic", Level(1, float("nan")), "noise level nan degrees is not possible"),
-        (lambda goals, rng: goals, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
+        (lambda goals: goals, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
         (7, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
         (object, Level(1, 1), "cannot be made with one argument, the level"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import permutations, product
 
 import numpy as np
@@ -26,6 +27,7 @@ def quarter_turns() -> Array:
     return np.array(found)
 
 
+@lru_cache(maxsize=64)
 def symmetries(solid: Solid) -> Array:
     """The displacements g of a solid that leave the space it fills as it is, (m, 4, 4), the identity first.
 
@@ -39,6 +41,7 @@ def symmetries(solid: Solid) -> Array:
     g = np.tile(np.eye(4), (len(turned), 1, 1))
     g[:, :3, :3] = turned
     g[:, :3, 3] = c - np.array(turned) @ c
+    g.flags.writeable = False
     return g
 
 
