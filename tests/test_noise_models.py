@@ -28,6 +28,8 @@ from tests import scenes
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
 MODELS = [Anisotropic, PerPart]
 LEVEL = Level(3.0, 6.0)
+SEPARATE = ["isotropic", "anisotropic", "per-part", "camera", "heavy-tailed", "bias", "correlated"]
+"""Models whose positions do not depend on the level of turns."""
 
 
 def see(noise: Noise, seed: int) -> Observation:
@@ -110,7 +112,9 @@ def test_factors_are_log_uniform() -> None:
     assert kstest(drawn, "uniform", (np.log(LEAST), np.log(MOST) - np.log(LEAST))).pvalue > 1e-3
 
 
-@pytest.mark.parametrize("name", "isotropic anisotropic per-part camera heavy-tailed bias correlated".split())
+@pytest.mark.parametrize(
+    "name", ["isotropic", "anisotropic", "per-part", "camera", "heavy-tailed", "bias", "correlated"]
+)
 def test_levels_in_mm_and_in_degrees_scale_alone(name: str) -> None:
     """Positions by the one, turns by the other, whatever frame they are drawn in."""
     sizes = []

@@ -68,7 +68,7 @@ def make_noise(given: Any, level: Level) -> Noise:
     if isinstance(model, type):
         _check(model, 1, f"the noise model '{name}' is a class that cannot be made with one argument, the level")
         model = model(level)
-    if _takes(model, 2) and not _takes(model, 3):
+    if _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3)):
         from apo_bench.observation.plain import declared
 
         return declared(model, name)
