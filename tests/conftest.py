@@ -6,10 +6,16 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+from pathlib import Path
+
 import pytest
 
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--bop-dir", type=Path, help="Folder of published estimates and truth, BOP results format.")
 
 
 @pytest.fixture(scope="session")

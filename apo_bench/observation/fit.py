@@ -52,7 +52,7 @@ def fit(residuals: Residuals, source: str) -> Measured:
         turn_deg=fit_split(residuals.turn_deg[upright], TURNED_DEG),
         missed=float(1.0 - found.mean()),
         outliers=float(1.0 - inlier.sum() / found.sum()),
-        farthest_mm=max(2.0 * INLIER_MM, float(np.median(far)) ** 2 / INLIER_MM) if len(far) else 2.0 * INLIER_MM,
+        farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
     )
 
 
