@@ -35,7 +35,10 @@ Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that
 GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
 ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
 NOISE = "A name out of `apo-bench noise list`, or package.module:name"
-RELATIONS = "What correctors are told of the contacts: given (right), missed, false, shifted:3 (mm)"
+RELATIONS = (
+    "What correctors are told of the contacts: given (right), recognised, recognised-fixed (thresholds), "
+    "recognised-twice, missed, false, shifted:3 (mm)"
+)
 EYE = "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)"
 Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
 

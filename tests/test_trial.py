@@ -356,7 +356,7 @@ def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown
         ({"seed": -1}, "seed of -1"),
         ({"seed": LARGEST_SEED + 1}, "whole numbers from 0"),
         ({"method": "papr"}, "did you mean 'paper'"),
-        ({"relations": "recognised"}, "unknown kind of relations"),
+        ({"relations": "recognized"}, "unknown kind of relations"),
     ],
 )
 def test_a_specification_is_checked_at_the_door(changes: dict[str, Any], words: str) -> None:

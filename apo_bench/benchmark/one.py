@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
+from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import Row, run_measured, run_trial
@@ -134,9 +135,10 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
 
 
 def _refuse_contradictions(request: Request) -> None:
-    """Nothing is drawn for an observation that comes from a file."""
+    """Nothing is drawn for an observation that comes from a file, but its contacts may be recognised."""
     for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "eye", "seed", "save_observation"):
-        if getattr(request, name) is not None:
+        allowed = name == "relations" and request.relations in ("given", *RECOGNISED)
+        if getattr(request, name) is not None and not allowed:
             option = "--" + name.replace("_", "-")
             raise InputError(
                 f"{option} was given together with --observation, which draws nothing; leave one of them out."

@@ -39,7 +39,8 @@ class TrialSpec:
     seed: int = 0
     timestep_s: float = 0.001
     relations: str = "given"
-    """What a corrector is told of the contacts: `given`, `missed`, `false`, `shifted:3` (mm), or `module:name`."""
+    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`, or wrong
+    ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
     eye: str = "noise"
     """`noise`, or `range`: poses are measured in depth images; `level_mm` is the noise of a ray then, `level_deg` is
     zero and `noise` is `range`."""
@@ -107,11 +108,12 @@ def check_method(method: str) -> None:
 
 def checked_relations(given: str) -> str:
     """The relations as rows spell them; raise an `InputError` unless there are such."""
+    from apo_bench.benchmark.recognised import KINDS as RECOGNISED
     from apo_bench.observation.relations import KINDS, relations_name
 
-    name = relations_name(given)
-    if ":" not in name and name not in KINDS:
-        raise InputError(unknown("kind of relations", given, KINDS) + " Or give your own as 'package.module:name'.")
+    name, known = relations_name(given), (*KINDS, *RECOGNISED)
+    if ":" not in name and name not in known:
+        raise InputError(unknown("kind of relations", given, known) + " Or give your own as 'package.module:name'.")
     return name
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from apo_bench.benchmark.confidence import UNKNOWN, confidence
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import Planned, plan
+from apo_bench.benchmark.recognised import KINDS as RECOGNISED
+from apo_bench.benchmark.recognised import UNCOUNTED, counted, understood
 from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec, knows_relations
 from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, misshown, see, show, tell
 from apo_bench.errors import InputError
@@ -48,11 +50,11 @@ def run_trial(
         return head | _result(misshown(shown.demonstration), success=None)
     noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
     seen = see(scene, shown, noise, spec.seed)
-    told = tell(seen, make_relations(spec.relations), shown.layout.goals, spec.seed)
+    told = _told(spec, seen, shown.layout.goals)
     truth = shown.layout.goals
     planned = plan(spec.method, seen, truth, told)
-    said = confidence(planned, seen, told if knows_relations(spec.method) else seen, truth)
-    return head | _carry_out(planned, scene, truth, truth, watch) | said
+    said = confidence(planned, seen, told, truth)
+    return head | _carry_out(planned, scene, truth, truth, watch) | said | _contacts(spec, seen, told)
 
 
 def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, watch: Any = None) -> Row:
@@ -79,8 +81,9 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
         "noise": "measured",
         "demonstration": "ok",
     }
-    planned = plan(spec.method, seen, None)
-    said = confidence(planned, seen, seen, None)
+    told = _told(spec, seen, None)
+    planned = plan(spec.method, seen, None, told)
+    said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
     return head | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch) | said
 
 
@@ -91,6 +94,20 @@ def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
     flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
     flat[:2, 3] = (seen.goals[k] - flat @ nominal[k])[:2, 3]
     return np.asarray(flat @ nominal)
+
+
+def _told(spec: TrialSpec, seen: Observation, truth: Array | None) -> Observation:
+    """The observation as a corrector gets it: with the relations as given, as recognised, or wrong ones."""
+    if not knows_relations(spec.method):
+        return seen
+    if spec.relations in RECOGNISED:
+        return understood(seen, spec.relations)
+    return seen if truth is None else tell(seen, make_relations(spec.relations), truth, spec.seed)
+
+
+def _contacts(spec: TrialSpec, seen: Observation, told: Observation) -> Row:
+    """How many of the contacts that a method was told are right."""
+    return counted(seen.assembly, told.assembly) if knows_relations(spec.method) else {}
 
 
 def _carry_out(planned: Planned, scene: Scene, reference: Array, truth: Array | None, watch: Any) -> Row:
@@ -166,6 +183,7 @@ def _result(end: Ending, *, success: bool | None) -> Row:
         "gap_before_mm": None,
         "gap_after_mm": None,
         **UNKNOWN,
+        **UNCOUNTED,
         "reached": None,
         "pose_error_fixed_mm": None,
         "pose_error_free_mm": None,
