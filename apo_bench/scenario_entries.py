@@ -16,13 +16,11 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.mjcf import NAME
-from apo_bench.scenario import Attach, Grasp, Shift
+from apo_bench.scenario import Grasp, Preference, Shift
 from apo_bench.scenario_contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
 from apo_bench.strict_json import Node
 
-TRAVEL_M = 0.03
-"""How far before its goal the line of attach begins, where the file does not say."""
 RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
 LEVEL = 1e-6
@@ -50,7 +48,7 @@ class Entry(NamedTuple):
     asked: Asked
     goal: Array
     """(4, 4), frame of the assembly, [m]."""
-    attach: Attach
+    attach: Preference
     grasp: Grasp
     shifts: tuple[Shift, ...]
 
@@ -136,7 +134,7 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
         Operation(main, tuple(asked), carries),
         asked,
         goal,
-        _attach(keys.get("attach"), goal),
+        _attach(keys["attach"]) if "attach" in keys else Preference(),
         _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
         _shifts(keys["vary"], k) if "vary" in keys else (),
     )
@@ -156,14 +154,14 @@ def _movable(node: Node, parts: Mapping[str, Part]) -> str:
     return name
 
 
-def _attach(node: Node | None, goal: Array) -> Attach:
-    """The line to the goal; from straight above unless the file says otherwise."""
-    keys = node.fields((), ("along", "travel_mm")) if node else {}
-    direction = read_axis(keys["along"]) if "along" in keys else goal[:3, :3].T @ np.array([0.0, 0.0, -1.0])
-    travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else TRAVEL_M
-    if travel_m > 1e-3 * LARGEST_MM:
+def _attach(node: Node) -> Preference:
+    """What is stated of the line to the goal."""
+    keys = node.fields((), ("along", "travel_mm"))
+    direction = read_axis(keys["along"]) if "along" in keys else None
+    travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else None
+    if travel_m is not None and travel_m > 1e-3 * LARGEST_MM:
         keys["travel_mm"].fail(f"a length of at most {LARGEST_MM:g} mm is needed")
-    return Attach(direction, travel_m)
+    return Preference(direction, travel_m)
 
 
 def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp:

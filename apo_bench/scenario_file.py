@@ -16,7 +16,8 @@ import numpy as np
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import InputError, unknown
 from apo_bench.resources import folder
-from apo_bench.scenario import Carelessness, Scenario, Site
+from apo_bench.scenario import Carelessness, Preference, Scenario, Site
+from apo_bench.scenario_attach import with_lines
 from apo_bench.scenario_checks import check_scenario
 from apo_bench.scenario_entries import Entry, read_operations, read_parts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_span, refuse
@@ -45,9 +46,9 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     if isinstance(given, Scenario):
         return given
     path = _path(given)
-    scenario = _scenario(Node(_document(path), str(path)), path)
+    scenario, stated = _scenario(Node(_document(path), str(path)), path)
     check_scenario(scenario, str(path))
-    return scenario
+    return with_lines(scenario, stated, str(path))
 
 
 def _path(given: str | Path) -> Path:
@@ -98,7 +99,8 @@ def _refuse_dates(node: Node) -> None:
         _refuse_dates(node.child(value, f"entry {i}"))
 
 
-def _scenario(root: Node, path: Path) -> Scenario:
+def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
+    """The scenario without lines of attach, and what the file states of them."""
     schema = root.value.get("schema", SCHEMA)
     if isinstance(schema, bool) or schema != SCHEMA:
         root.child(schema, "schema").fail(f"schema = {SCHEMA} is needed", "no other format is known to this version")
@@ -117,7 +119,7 @@ def _scenario(root: Node, path: Path) -> Scenario:
     for name in parts:
         if name not in assembly.fixed and not any(name in operation.moves for operation in assembly.operations):
             refuse(top["parts"], f"no operation moves '{name}'; give it one, or say fixed = true")
-    return Scenario(
+    scenario = Scenario(
         name=path.stem,
         **{key: top[key].text() if key in top else "" for key in ("title", "paper", "human", "success")},
         assembly=assembly,
@@ -125,7 +127,7 @@ def _scenario(root: Node, path: Path) -> Scenario:
         colors={name: part.color for name, part in parts.items() if part.color is not None},
         start={name: part.start for name, part in parts.items()},
         goals=np.array([entry.goal for entry in entries]),
-        attach=tuple(entry.attach for entry in entries),
+        attach=(),
         grasps=tuple(entry.grasp for entry in entries),
         site=_site(top["site"]) if "site" in top else Site(),
         shifts=tuple(shift for entry in entries for shift in entry.shifts),
@@ -135,6 +137,7 @@ def _scenario(root: Node, path: Path) -> Scenario:
         gap_mm=_number(top["gap_mm"], LARGEST_CLEARANCE_MM, above=True) if "gap_mm" in top else 0.1,
         follows_site=frozenset(name for name, part in parts.items() if part.follows_site),
     )
+    return scenario, tuple(entry.attach for entry in entries)
 
 
 def _site(node: Node) -> Site:

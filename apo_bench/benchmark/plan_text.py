@@ -163,9 +163,8 @@ def _chain(line: Line) -> Iterator[str]:
 def _until(line: Line) -> str:
     if line.goal is None:
         return f"back at {line.back_to}"
-    x, y, z = line.goal[:3, 3] * 1e3 + 0.0
-    numbers = [*(f"{v:9.3f}" for v in (x, y, z)), *(f"{v:9.3f}" for v in _turns(line.goal))]
-    return f"{' '.join(line.relations):11} {' '.join(numbers)}"
+    numbers = np.round([*(1e3 * line.goal[:3, 3]), *_turns(line.goal)], 3) + 0.0
+    return f"{' '.join(line.relations):11} {' '.join(f'{x:9.3f}' for x in numbers)}"
 
 
 def _turns(T: Array) -> Array:
@@ -176,7 +175,7 @@ def _turns(T: Array) -> Array:
         turns = [np.arctan2(-R[1, 2], R[1, 1]), np.arctan2(-R[2, 0], level), 0.0]
     else:
         turns = [np.arctan2(R[2, 1], R[2, 2]), np.arctan2(-R[2, 0], level), np.arctan2(R[1, 0], R[0, 0])]
-    return np.asarray(np.round(np.degrees(turns), 9) + 0.0)
+    return np.degrees(turns)
 
 
 def _listed(words: Iterator[str]) -> str:

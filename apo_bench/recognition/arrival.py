@@ -33,8 +33,9 @@ ANY = Preference()
 class Arrival:
     """A part at a place, and how it comes there."""
 
+    main: str
     T: Array
-    """(4, 4), where it then is; directions below are in the frame of the same world."""
+    """(4, 4), where the main part then is; directions below are in the frame of the same world."""
     touched: tuple[Touching, ...]
     chain: Chain
     """Its macros, contacts by their number in `touched`."""
@@ -125,7 +126,7 @@ def arrive(
     if direction is not None:
         line = Attach(direction, line.travel_m)
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > 0.5)
-    return Arrival(T, touched, found, departs(found, supports), line, is_free and not found.locked)
+    return Arrival(moves[0], T, touched, found, departs(found, supports), line, is_free and not found.locked)
 
 
 def turning(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:

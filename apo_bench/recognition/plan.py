@@ -34,8 +34,6 @@ class Understood:
     """How the part would come to where it is taken from: undoing the operation does that."""
     after: Arrival
     """How it comes to its goal."""
-    came_by: int | None
-    """The operation that had put the main part where it is taken from; None if it was never moved by itself."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -64,7 +62,7 @@ def understand(
     understood: list[Understood] = []
     put: dict[str, int] = {}
     for k, operation in enumerate(assembly.operations):
-        was = put.get(operation.main)
+        was = _held_by(assembly, put.get(operation.main), operation.moves)
         back = (
             ANY
             if was is None
@@ -72,9 +70,16 @@ def understand(
         )
         before = arrive(assembly, operation.moves, lost_at(assembly, k), stages[k], back, angle_rad)
         after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
-        understood.append(Understood(k, operation.main, operation.carries, before, after, was))
+        understood.append(Understood(k, operation.main, operation.carries, before, after))
         put[operation.main] = k
     return tuple(understood)
+
+
+def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
+    """The operation `was`, out of whose contacts a part must be brought; None if all of them move along."""
+    if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
+        return None
+    return was
 
 
 def lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:

@@ -10,8 +10,10 @@ import numpy as np
 from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
+from apo_bench.recognition.arrival import Arrival
+from apo_bench.recognition.plan import understood
 from apo_bench.scenario import Scenario
-from apo_bench.simulation.touch import OVER_M, ends_of, held_by, sides_of
+from apo_bench.simulation.touch import OVER_M, ends_of, slides
 
 SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
@@ -55,16 +57,16 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         stages: Where every part should be before the first operation and after each.
         late: Displaced parts that the other hand corrects.
     """
-    operation, attach = scenario.assembly.operations[k], scenario.attach[k]
-    way = target[:3, :3] @ attach.direction
-    beside = _off(sides_of(scenario.assembly, operation.contacts, operation.moves, stages[k + 1]))
+    operation, what = scenario.assembly.operations[k], understood(scenario)[k]
+    way = target[:3, :3] @ what.after.line.direction
+    beside = _off(slides(scenario.assembly, what.after, stages[k + 1]))
     return Act(
         part=operation.main,
         carries=operation.carries,
         target=target,
         way=way,
-        travel=attach.travel_m,
-        out=_out(scenario, k, stages[k]),
+        travel=what.after.line.travel_m,
+        out=_out(scenario.assembly, what.before, stages[k]),
         aside=SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
@@ -78,18 +80,12 @@ def _over(assembly: Assembly, main: str, moves: tuple[str, ...], poses: Poses) -
     return top + (float(poses[main][2, 3]) - bottom) + OVER_M
 
 
-def _out(scenario: Scenario, k: int, poses: Poses) -> Array:
-    """The motion, (3,) [m], that frees what operation k moves: back out of where it sticks, or off what is beside."""
-    operations = scenario.assembly.operations
-    main, moves = operations[k].main, operations[k].moves
-    last = max((j for j in range(k) if operations[j].main == main), default=None)
-    put = held_by(scenario.assembly, last, moves)
-    if put is not None:
-        way = poses[main][:3, :3] @ scenario.attach[put].direction
-        if abs(way[2]) < 0.5:
-            return np.asarray(-scenario.attach[put].travel_m * way)
-    standing = (relation.contact for relation in scenario.assembly.first(k).relations() if relation.lost is None)
-    return SIDE_M * _off(sides_of(scenario.assembly, standing, moves, poses))
+def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
+    """The motion, (3,) [m], that frees what moves: back out of where it sticks, or off what is beside."""
+    way = poses[before.main][:3, :3] @ before.line.direction
+    if before.touched and abs(way[2]) < 0.5:
+        return np.asarray(-before.line.travel_m * way)
+    return SIDE_M * _off(slides(assembly, before, poses))
 
 
 def _off(sides: tuple[Array, ...]) -> Array:

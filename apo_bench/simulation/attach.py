@@ -1,4 +1,4 @@
-"""The last stretch to a goal, and the first one out of it: guarded lines, from above, level, and onto a side."""
+"""The macros of the plan in force: guarded where contacts close, by position along those that stay closed."""
 
 from __future__ import annotations
 
@@ -20,6 +20,21 @@ BEYOND_M, OFF_M = 0.004, 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
 
 
+def attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
+    """Carry out the macros one after the other; returns what is left of an insertion that force stopped, and the grip.
+
+    Those that lead along the line of attach are one motion, which ends where the last of them does.
+    """
+    if t.into.level:
+        left, grip = insert(robot, t, grip, second)
+    else:
+        left = come_down(robot, t, grip)
+    for macro in t.macros:
+        if macro.name == "slide-to-contact" and left <= ARRIVED_M:
+            _slide(robot, t, macro.way)
+    return left, grip
+
+
 def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
     """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
     robot.stage = "attach"
@@ -32,15 +47,17 @@ def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
         change(robot, t, grip, second, moved(there, UP, -rise) @ second.T_part_tip)
         grip, rise = second, t.clearance
         robot.follow(smooth(robot.T, moved(robot.T, UP, rise), 0.01))
-    left = robot.follow(steady(robot.T, moved(t.T_world_goal @ grip.T_part_tip, UP, rise), INSERT), guard)
+    left = robot.follow(steady(robot.T, moved(aim(t) @ grip.T_part_tip, UP, rise), INSERT), guard)
+    if left == 0.0 and any(macro.name == "move-to-bottom" for macro in t.macros):
+        robot.follow(steady(robot.T, moved(robot.T, t.into.way, OVERTRAVEL_M), TOUCH), guard)
     lower = moved(robot.T, UP, -rise - OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
     return left, grip
 
 
-def come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
-    """From above, slowly where contact may come any moment, until the part stands; then onto its sides."""
+def come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
+    """From above, slowly where contact may come any moment, until the part stands; nothing of the line is left then."""
     robot.stage = "attach"
     down = Guard(t.into.way, t.place_n)
     goal = aim(t) @ grip.T_part_tip
@@ -48,8 +65,7 @@ def come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
     if left == 0.0:
         robot.follow(steady(robot.T, moved(goal, t.into.way, OVERTRAVEL_M), TOUCH), down)
     robot.wait(0.05)
-    for side in t.sides:
-        _slide(robot, t, side)
+    return 0.0
 
 
 def _slide(robot: Robot, t: Transfer, side: Array) -> None:

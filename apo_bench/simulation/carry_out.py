@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from apo_bench.simulation.attach import ARRIVED_M, come_down, insert, leave, pull_out
+from apo_bench.simulation.attach import ARRIVED_M, attach, leave, pull_out
 from apo_bench.simulation.fingers import centre, check_grasp, depart, grasp, release
 from apo_bench.simulation.paths import at_height, moved, smooth
 from apo_bench.simulation.robot import Halt, Robot
@@ -27,11 +27,7 @@ def carry_out(robot: Robot, t: Transfer) -> None:
         grip = pull_out(robot, t, grip, next(grips) if t.out.left is not None else None)
     _lift(robot, t)
     _carry(robot, t, grip)
-    if t.into.level:
-        left, grip = insert(robot, t, grip, next(grips) if t.into.left is not None else None)
-    else:
-        come_down(robot, t, grip)
-        left = 0.0
+    left, grip = attach(robot, t, grip, next(grips) if t.into.left is not None else None)
     release(robot, t, grip)
     depart(robot, t)
     if left > ARRIVED_M:

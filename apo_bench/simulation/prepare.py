@@ -12,6 +12,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import extent
 from apo_bench.program import Plan, Poses, Step
+from apo_bench.recognition.arrival import Arrival
+from apo_bench.recognition.plan import understood
 from apo_bench.scenario import Attach, Grasp
 from apo_bench.simulation.grasping import (
     Grips,
@@ -28,14 +30,12 @@ from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.touch import (
     OVER_M,
     ends_of,
-    held_by,
     later_walls,
     neighbours,
-    restored,
-    sides_of,
+    slides,
     slow_before,
 )
-from apo_bench.simulation.transfer import SAFE_M, Grip, Line, Transfer, key_poses
+from apo_bench.simulation.transfer import SAFE_M, Grip, Line, Motion, Transfer, key_poses
 
 GRAVITY = 9.81
 PLACE_WEIGHTS, INSERT_WEIGHTS, SLIDE_WEIGHTS = 6.0, 2.5, 0.5
@@ -123,13 +123,15 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     part, start, target = operation.main, believed[operation.main], task.target
     T = target @ pose.inverse(start)
     after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
-    contacts = restored(plan.assembly, k) if undo else operation.contacts
-    out = _line(scene, held_by(plan.assembly, task.was, operation.moves), start)
-    into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m) if undo else _line(scene, k, target)
-    grips, out, into = _grips(scene, task, part, out, into, believed, after)
-    sides = () if into.level else sides_of(plan.assembly, contacts, operation.moves, after)
-    leaves = operation.contacts if undo or task.was == k else restored(plan.assembly, k)
-    away = () if out.level else tuple(-side for side in sides_of(plan.assembly, leaves, operation.moves, believed))
+    what = understood(scene.scenario)[k]
+    leaves = what.after if undo or task.was == k else what.before
+    comes = what.before if undo else what.after
+    contacts = tuple(each.contact for each in comes.touched)
+    into = _line(comes, target)
+    if undo and not into.level:
+        into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
+    grips, out, into = _grips(scene, task, part, _line(leaves, start), into, believed, after)
+    macros = _motions(comes, target, slides(plan.assembly, comes, after))
     top, bottom = ends_of(plan.assembly, operation.moves, believed)
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
@@ -141,14 +143,14 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         T_world_start=start,
         T_world_goal=target,
         grips=grips,
-        centring=() if undo or into.level else _centring(plan.assembly, scene, k, grips[-1], sides, after),
+        centring=() if undo or into.level else _centring(plan.assembly, scene, k, grips[-1], macros, after),
         out=out,
         into=into,
-        sides=sides,
-        away=away,
+        departs=_departing(leaves, start, slides(plan.assembly, leaves, believed)),
+        macros=macros,
         over=top + OVER_M + FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
-        slow=slow_before(plan.assembly, contacts, after, into.way),
+        slow=slow_before(plan.assembly, comes, after, into.way),
         weight_n=held,
         place_n=PLACE_WEIGHTS * held,
         insert_n=INSERT_WEIGHTS * min(near, default=held),
@@ -157,16 +159,29 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     )
 
 
-def _line(scene: Scene, k: int | None, T: Array) -> Line:
-    """The line of attach of an operation whose part stands at T; straight down if none put it there."""
-    if k is None:
+def _line(found: Arrival, T: Array) -> Line:
+    """The line on which a part arrives at T; straight down if it touches nothing there that is known of."""
+    if not found.touched:
         return Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
-    attach = scene.scenario.attach[k]
-    return Line(T[:3, :3] @ attach.direction, attach.travel_m)
+    return Line(T[:3, :3] @ found.line.direction, found.line.travel_m)
+
+
+def _motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
+    """The macros in the world, for a part that arrives at T; slides as they are believed to be."""
+    straight = [macro for macro in found.macros if macro.name != "slide-to-contact"]
+    made = [Motion(macro.name, T[:3, :3] @ found.own(macro.direction)) for macro in straight]
+    return (*made, *(Motion("slide-to-contact", side) for side in sides))
+
+
+def _departing(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
+    """The same backwards, for a part that leaves T: off its sides, then out of what encloses it."""
+    out = [macro for macro in found.departs if macro.length_m is not None]
+    drawn = [Motion(macro.name, T[:3, :3] @ found.own(macro.direction)) for macro in out]
+    return (*(Motion("depart", -side) for side in sides), *drawn)
 
 
 def _is_level(plan: Plan, scene: Scene, k: int) -> bool:
-    return _line(scene, k, plan.goals[k]).level
+    return _line(understood(scene.scenario)[k].after, plan.goals[k]).level
 
 
 def _grips(
@@ -204,7 +219,7 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
 
 
 def _centring(
-    assembly: Assembly, scene: Scene, k: int, grip: Grip, sides: tuple[Array, ...], after: Poses
+    assembly: Assembly, scene: Scene, k: int, grip: Grip, macros: tuple[Motion, ...], after: Poses
 ) -> tuple[Grip, ...]:
     """Grips across the level directions in which the part's place will matter and nothing has settled it.
 
@@ -212,6 +227,7 @@ def _centring(
     or onto the part later needs it in its place across the walls of that fit.
     """
     part, T = assembly.operations[k].main, after[assembly.operations[k].main]
+    sides = [macro.way for macro in macros if macro.name == "slide-to-contact"]
     settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
     place = Place(T, obstacles(assembly.solids, after, (part,)))
     grips = []

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact
@@ -11,49 +9,42 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Solid, extent
 from apo_bench.program import Poses
+from apo_bench.recognition.arrival import Arrival
 
 SLOW_M = 0.003
+STRAIGHT = 1e-9
 WALL_MARGIN_M = 0.002
 OVER_M = 0.02
 """Room between what is carried and what it is carried over."""
 
 
-def restored(assembly: Assembly, k: int) -> tuple[Contact, ...]:
-    """The contacts that operation k broke: undoing it makes them again."""
-    return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)
-
-
-def held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int | None:
-    """The operation `was`, out of whose contacts a part must be brought; None if all of them move along."""
-    if was is None or all(contact.environment.part in moved for contact in assembly.operations[was].contacts):
-        return None
-    return was
-
-
-def sides_of(
-    assembly: Assembly, contacts: Iterable[Contact], moved: tuple[str, ...], poses: Poses
-) -> tuple[Array, ...]:
-    """The level directions in which what moves comes to lie against what rests, fits left out, none twice."""
+def slides(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[Array, ...]:
+    """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are believed to be."""
     sides: list[Array] = []
-    for contact in contacts:
-        rests = [of for of in contact if of.part not in moved]
-        if len(rests) == 1 and not assembly.is_fit(contact):
-            side = -poses[rests[0].part][:3, :3] @ assembly.face(rests[0]).normal
-            if abs(side[2]) < 0.5 and not any(side @ other > 0.99 for other in sides):
+    for macro in found.macros:
+        if macro.name == "slide-to-contact":
+            first = found.touched[macro.makes[0]]
+            (rests,) = (of for of in first.contact if of.part == first.rests)
+            side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
+            if first.normal @ macro.direction > -1.0 + STRAIGHT:
+                side = poses[found.main][:3, :3] @ found.own(macro.direction)
+            if abs(side[2]) < 0.5:
                 sides.append(side)
     return tuple(sides)
 
 
-def slow_before(assembly: Assembly, contacts: tuple[Contact, ...], poses: Poses, way: Array) -> float:
-    """How far before the goal a motion from above turns slow: where the first wall begins, or just above the floor."""
+def walls(found: Arrival) -> tuple[Contact, ...]:
+    """The contacts between which the part is inserted."""
+    return tuple(contact for macro in found.macros if macro.inserts for contact in found.contacts(macro))
+
+
+def slow_before(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> float:
+    """How far before the goal a motion from above turns slow: where an insertion begins, or just above the floor."""
     depth = SLOW_M
-    for contact in contacts:
-        m, e = contact
-        wall = assembly.face(e)
-        if assembly.is_fit(contact) and abs(poses[e.part][:3, :3] @ wall.normal @ way) < 0.5:
-            corners = overlap(assembly.face(m), poses[m.part], wall, poses[e.part]).corners
-            if len(corners):
-                depth = max(depth, float(np.ptp(corners @ way)) + WALL_MARGIN_M)
+    for m, e in walls(found):
+        corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+        if len(corners):
+            depth = max(depth, float(np.ptp(corners @ way)) + WALL_MARGIN_M)
     return depth
 
 

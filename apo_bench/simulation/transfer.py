@@ -8,6 +8,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.recognition.macros import Name
 from apo_bench.simulation.paths import at_height, moved
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -44,6 +45,14 @@ class Line:
         return bool(abs(self.way[2]) < 0.5)
 
 
+class Motion(NamedTuple):
+    """A macro of the plan, as the robot carries it out."""
+
+    name: Name
+    way: Array
+    """Unit vector, (3,), world."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Transfer:
@@ -60,10 +69,10 @@ class Transfer:
     into: Line
     centring: tuple[Grip, ...]
     """After it was put down, the fingers close and open again here: closing, they centre the part between them."""
-    sides: tuple[Array, ...]
-    """Directions in which the part is slid onto another one at its side, (3,) each."""
-    away: tuple[Array, ...]
-    """Directions in which the part is first moved off another one at its side, (3,) each."""
+    departs: tuple[Motion, ...]
+    """The macros by which it leaves its contacts, apart from being lifted."""
+    macros: tuple[Motion, ...]
+    """The macros by which it comes into its contacts; the first of them goes along `into`."""
     over: float
     """Height of the tip at which the empty hand passes over everything that stands, [m]."""
     safe: float
@@ -80,6 +89,16 @@ class Transfer:
     """Guard of a slide, below the force at which what is touched would slide, [N]."""
     clearance: float
     """What lay free falls by this onto the floor of its slot, [m]."""
+
+    @property
+    def sides(self) -> tuple[Array, ...]:
+        """Directions in which the part is slid onto another one at its side, (3,) each."""
+        return tuple(macro.way for macro in self.macros if macro.name == "slide-to-contact")
+
+    @property
+    def away(self) -> tuple[Array, ...]:
+        """Directions in which the part is first moved off another one at its side, (3,) each."""
+        return () if self.out.level else tuple(macro.way for macro in self.departs if abs(macro.way[2]) < 0.5)
 
     @property
     def floats(self) -> float:
