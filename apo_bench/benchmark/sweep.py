@@ -18,6 +18,7 @@ from typing import Any, final
 from apo_bench.benchmark.fingerprint import content_hash, noise_content
 from apo_bench.benchmark.grid import SweepSpec, Unit, described, load_all, trial_key, units
 from apo_bench.benchmark.journal import Journal, run_record
+from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stages import Shown, show
 from apo_bench.benchmark.trial import Row, run_trial
@@ -60,7 +61,8 @@ def sweep(spec: SweepSpec, out: str | Path, *, workers: int = 1, command: str = 
     for noise in spec.noises:
         make_noise(noise, Level(0.0, 0.0))
     for relations in spec.relations:
-        make_relations(relations)
+        if relations not in RECOGNISED:
+            make_relations(relations)
     arm = find_arm(spec.arm)
     for method in spec.methods:
         if method not in ("oracle", "none"):
