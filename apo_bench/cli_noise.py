@@ -44,17 +44,18 @@ def card(
     out: Annotated[Path | None, typer.Option(help="Draw the histogram into this file: .png.")] = None,
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
-    from apo_bench.benchmark.noise_card import noise_card
+    from apo_bench.benchmark.noise_card import draw, noise_card
     from apo_bench.benchmark.noise_picture import draw_histogram
     from apo_bench.observation.noise import Level
 
     if out is not None:
         check_writable(out, "--out", (".png",))
-    typer.echo(noise_card(name, Level(level, level)), nl=False)
+    drawn = draw(name, Level(level, level))
+    typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
     if out is None:
         return
     try:
-        draw_histogram(name, Level(level, level), out)
+        draw_histogram(drawn, out)
     except OSError as error:
         raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
     typer.echo(f"\nWrote {out}")

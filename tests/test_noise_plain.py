@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.benchmark.noise_card import facts, listed, noise_card
+from apo_bench.benchmark.noise_card import described, facts, listed, noise_card
 from apo_bench.cli import main
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -163,7 +163,14 @@ def test_a_card_prints_what_the_model_does(name: str, capsys: pytest.CaptureFixt
         assert line in text
     stated = next(line for line in text.splitlines() if line.strip().startswith("stated") and "mm" in line)
     assert stated.split()[1:3] == (["1", "mm"] if name == "camera" else ["2", "mm"])
-    assert ("Not seen: " in text) == (name == "outliers")
+    assert ("were not seen" in text) == (name == "outliers")
+
+
+@pytest.mark.parametrize("name", sorted(NOISES))
+def test_the_page_of_cards_is_up_to_date(name: str) -> None:
+    """Written by `python docs/noise.py`."""
+    page = (Path(__file__).parent.parent / "docs" / "noise.md").read_text(encoding="utf-8")
+    assert described(name, 2) in page
 
 
 def test_the_histogram_is_of_errors_that_were_drawn() -> None:

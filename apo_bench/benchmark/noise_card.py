@@ -85,11 +85,17 @@ def demonstrated() -> Demonstration:
     return Demonstration(scenario.assembly, scenario.start, goals, final, np.zeros((len(goals), 6, 6)))
 
 
-def noise_card(given: Any, level: Level, heading: int = 1) -> str:
-    """The card of a model under a heading of that depth, in Markdown."""
+def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
+    """The card of a model in Markdown, with a histogram in text of what was drawn, which `draw` does if nothing was."""
+    drawn = drawn or draw(given, level)
+    bars = "\n".join(f"    {line}".rstrip() for line in histogram(drawn))
+    return f"{described(given)}\n{measured(drawn, level)}:\n\n{bars}\n"
+
+
+def described(given: Any, heading: int = 1) -> str:
+    """What a model says of itself, without a histogram."""
     said, name = facts(given), given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
-    mark = "#" * heading
-    parts = [f"{mark} {name}: {said.title}"]
+    parts = [f"{'#' * heading} {name}: {said.title}"]
     if said.formula:
         parts.append("\n".join(f"    {line}" for line in said.formula))
     lines = [f"Frame: {said.frame}."] * bool(said.frame)
@@ -98,12 +104,14 @@ def noise_card(given: Any, level: Level, heading: int = 1) -> str:
     lines += [f"{note}." for note in said.notes]
     if lines:
         parts.append("\n".join(f"- {line}" for line in lines))
-    drawn = draw(given, level)
-    parts.append(f"Errors at {level.mm:g} mm and {level.deg:g} deg, {len(drawn.errors)} operations of {SCENARIO}:")
-    parts.append("\n".join(f"    {line}".rstrip() for line in histogram(drawn)))
-    if drawn.missed:
-        parts.append(f"Not seen: {100 * drawn.missed:.1f} % of operations.")
     return "\n\n".join(parts) + "\n"
+
+
+def measured(drawn: Drawn, level: Level) -> str:
+    """One sentence on what was drawn, without its full stop."""
+    missed = f"; {100 * drawn.missed:.1f} % were not seen" if drawn.missed else ""
+    n = f"{len(drawn.errors)} operations of {SCENARIO}"
+    return f"Errors at {level.mm:g} mm and {level.deg:g} deg, {n}{missed}"
 
 
 def histogram(drawn: Drawn) -> list[str]:

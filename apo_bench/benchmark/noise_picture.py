@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.noise_card import COLUMNS, UNITS, draw
+from apo_bench.benchmark.noise_card import COLUMNS, UNITS, Drawn
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.noise import Level
 
 SIZE_INCH, BINS = (9.0, 2.3), 49
 REACH = 6.0
@@ -17,12 +16,11 @@ REACH = 6.0
 COLOR = "#4477aa"
 
 
-def draw_histogram(given: Any, level: Level, path: Path) -> None:
+def draw_histogram(drawn: Drawn, path: Path) -> None:
     """Write the four panels as PNG: error across and along the ray, tilt, turn about the ray; densities are log."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    drawn = draw(given, level)
     figure = Figure(figsize=SIZE_INCH, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, len(COLUMNS))
@@ -30,7 +28,7 @@ def draw_histogram(given: Any, level: Level, path: Path) -> None:
         _panel(axis, drawn.errors[:, i], float(drawn.stated[i]))
         axis.set_xlabel(f"{name} [{unit}]", fontsize=9)
     axes[0].set_ylabel("density", fontsize=9)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=90)
 
 
 def _panel(axis: Any, errors: Array, stated: float) -> None:
