@@ -9,10 +9,9 @@ from typing import Any, final
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
-from apo_bench.benchmark.trial import Row, run_measured, run_trial
+from apo_bench.benchmark.trial import Row, eye_of, run_measured, run_trial
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
-from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observed import read_observation, read_stated
 from apo_bench.program import Observation
 from apo_bench.scenario_file import load_scenario
@@ -80,7 +79,7 @@ def watched(request: Request) -> Observation:
     if request.observation:
         return read_observation(request.observation, scenario)
     scene = build_scene(scenario, clearance_mm=spec.clearance_mm, grasp=spec.grasp, arm=spec.arm)
-    shown = show(scene, spec.careless, spec.seed)
+    shown = show(scene, spec.careless, spec.seed, spec.eye)
     if shown.demonstration.code != "ok":
         raise RuntimeError(f"{misshown(shown.demonstration).sentence}; try another seed")
     return look(spec, scene, shown)
@@ -88,12 +87,11 @@ def watched(request: Request) -> Observation:
 
 def look(spec: TrialSpec, scene: Scene, shown: Shown) -> Observation:
     """The demonstration of a trial through its eye."""
-    noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
-    return see(scene, shown, noise, spec.seed)
+    return see(scene, shown, eye_of(spec, scene, shown), spec.seed)
 
 
 def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
-    shown = show(scene, spec.careless, spec.seed)
+    shown = show(scene, spec.careless, spec.seed, spec.eye)
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, shown), name), request.save_observation)

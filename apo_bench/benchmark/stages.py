@@ -7,6 +7,8 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
+from apo_bench.benchmark.spec import RANGE
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judge import Verdict, judge
 from apo_bench.layout import draw_layout
@@ -16,11 +18,13 @@ from apo_bench.observation.relations import Relations, told
 from apo_bench.outcomes import sentence
 from apo_bench.prediction import predict
 from apo_bench.program import Demonstration, Layout, Observation, Plan, ReplayResult
+from apo_bench.recognition.range_eye import RangeEye
 from apo_bench.simulation.demonstrate import demonstrate
+from apo_bench.simulation.eye.watch import Watched, Watcher
 from apo_bench.simulation.replay import replay
 from apo_bench.simulation.scene import Scene
 
-LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS = range(5)
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV = range(6)
 """Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
 
 
@@ -31,6 +35,8 @@ class Shown:
 
     layout: Layout
     demonstration: Demonstration
+    watched: Watched | None = None
+    """What the range finder saw of it; None if only poses are asked for."""
 
 
 @final
@@ -61,10 +67,21 @@ def stream(seed: int, which: int) -> np.random.Generator:
     return np.random.default_rng([seed, which])
 
 
-def show(scene: Scene, careless: float, seed: int) -> Shown:
-    """Draw the truth of a trial and let the human demonstrate it."""
+def show(scene: Scene, careless: float, seed: int, eye: str = "noise") -> Shown:
+    """Draw the truth of a trial and let the human demonstrate it; with the eye `range` it is watched meanwhile."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT), scene.clearance_mm)
-    return Shown(layout, demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION)))
+    watcher = Watcher(scene.shown, stream(seed, TV)) if eye == RANGE else None
+    demonstration = demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION), watcher)
+    return Shown(layout, demonstration, watcher.watched() if watcher else None)
+
+
+def through(scene: Scene, shown: Shown, level_mm: float) -> RangeEye:
+    """The range finder that watched a demonstration, to be passed to `see`; `level_mm` is the noise of a ray."""
+    assert shown.watched is not None, "watch the demonstration: show(..., eye='range')"
+    yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
+    turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
+    seen = shown.watched
+    return RangeEye(seen.finder, seen.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
 
 
 def see(scene: Scene, shown: Shown, noise: Noise, seed: int) -> Observation:

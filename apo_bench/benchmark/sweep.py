@@ -101,17 +101,18 @@ class Worker:
 
     def run(self, unit: Unit, emit: Emit, stopped: Callable[[], bool] = lambda: False) -> None:
         """Run the trials of a unit, demonstrations shared, and emit each row with its timing."""
-        demonstrations: dict[float, Shown] = {}
+        demonstrations: dict[tuple[float, str], Shown] = {}
         for spec in unit.trials:
             if stopped():
                 return
             began = time.perf_counter()
             scene, content = self._scene(spec)
             ready = time.perf_counter()
-            if spec.careless not in demonstrations:
-                demonstrations[spec.careless] = show(scene, spec.careless, spec.seed)
+            key = (spec.careless, spec.eye)
+            if key not in demonstrations:
+                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
             shown = time.perf_counter()
-            row = run_trial(spec, scene, shown=demonstrations[spec.careless], content=content)
+            row = run_trial(spec, scene, shown=demonstrations[key], content=content)
             emit(row, self._timing(row, began, ready, shown, time.perf_counter()))
 
     def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:

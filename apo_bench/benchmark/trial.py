@@ -14,12 +14,24 @@ from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.recognised import UNCOUNTED, counted, understood
-from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec, knows_relations
-from apo_bench.benchmark.stages import Ending, Shown, Tried, attempt, ending, foretold, misshown, see, show, tell
+from apo_bench.benchmark.spec import ENV_ID, RANGE, ROW, TrialSpec, knows_relations
+from apo_bench.benchmark.stages import (
+    Ending,
+    Shown,
+    Tried,
+    attempt,
+    ending,
+    foretold,
+    misshown,
+    see,
+    show,
+    tell,
+    through,
+)
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations
 from apo_bench.pose_error import pose_errors
 from apo_bench.program import Observation, Plan, Snapshot
@@ -43,18 +55,24 @@ def run_trial(
     Raises:
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
-    shown = shown or show(scene, spec.careless, spec.seed)
+    shown = shown or show(scene, spec.careless, spec.seed, spec.eye)
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     head = _head(spec, scene, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
     if shown.demonstration.code != "ok":
         return head | _result(misshown(shown.demonstration), success=None)
-    noise = make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
-    seen = see(scene, shown, noise, spec.seed)
+    seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed)
     told = _told(spec, seen, shown.layout.goals)
     truth = shown.layout.goals
     planned = plan(spec.method, seen, truth, told)
     said = confidence(planned, seen, told, truth)
     return head | _carry_out(planned, scene, truth, truth, watch) | said | _contacts(spec, seen, told)
+
+
+def eye_of(spec: TrialSpec, scene: Scene, shown: Shown) -> Noise:
+    """The noise model of a trial, or the range finder that watched its demonstration."""
+    if spec.eye == RANGE:
+        return through(scene, shown, spec.level_mm)
+    return make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
 
 
 def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, watch: Any = None) -> Row:

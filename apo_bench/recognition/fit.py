@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, final
 from dataclasses import dataclass
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -15,8 +15,6 @@ ARM_M = 0.04
 """Length by which turns are weighed against shifts: half a part."""
 LEAST_NOISE_M = 0.0001
 """What one point is worth at best, [m]: the shape is not known better than to a tenth of a millimetre."""
-LOOSE_M = (0.0005, 0.1)
-"""Smallest and largest damping, in units of ..."""
 PRIOR = np.array([0.05] * 3 + [0.5] * 3)
 """Standard deviation of what is known without any point, [m, rad]: it keeps directions finite of which points say
 nothing, and states for them how little that is."""
@@ -94,7 +92,8 @@ def covariance(shape: Shape, points: Points, T: Array, width_m: float, noise_m: 
     d, J = (a[0] for a in _rows(shape, points, T[None]))
     weight = 1.0 / (1.0 + (d / width_m) ** 2) ** 2
     WJ = J * weight[:, None]
-    inverse = np.linalg.inv(J.T @ WJ + np.diag(float(weight.mean()) * (max(noise_m, LEAST_NOISE_M) / PRIOR) ** 2))
+    loose = float(weight.mean()) * (max(noise_m, LEAST_NOISE_M) / PRIOR) ** 2
+    inverse = np.linalg.inv(J.T @ WJ + np.diag(loose))
     gradient = -J[:, :3]
     slope = np.einsum("ni,ni->n", gradient @ T[:3, :3].T, points.ray)
     variance = (noise_m * slope) ** 2 + LEAST_NOISE_M**2
@@ -102,10 +101,8 @@ def covariance(shape: Shape, points: Points, T: Array, width_m: float, noise_m: 
     for v in np.unique(points.view):
         common = WJ.T @ np.where(points.view == v, bias_m * slope, 0.0)
         middle += np.outer(common, common)
-    known = inverse @ middle @ inverse
-    loose = float(weight.mean()) * (max(noise_m, LEAST_NOISE_M) / PRIOR) ** 2
-    unknown = inverse @ np.diag(loose**2 * PRIOR**2) @ inverse
-    return np.asarray((known + known.T) / 2 + (unknown + unknown.T) / 2)
+    both = inverse @ (middle + np.diag((loose * PRIOR) ** 2)) @ inverse
+    return np.asarray((both + both.T) / 2)
 
 
 def _rows(shape: Shape, points: Points, T: Array) -> tuple[Array, Array]:

@@ -30,9 +30,9 @@ def two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
     either side. At 0.95 m a pixel is 3 mm wide.
     """
     reach, height_m = 0.67, 0.67
-    ways = ((0.707, 0.707), (-0.707, -0.707))
     at = np.array(MIDDLE_M)
-    return tuple(View(looking(at + (reach * x, reach * y, height_m), at), width, height, 48.0) for x, y in ways)
+    ways = (np.array([side * 0.707 * reach, side * 0.707 * reach, height_m]) for side in (1.0, -1.0))
+    return tuple(View(looking(at + way, at), width, height, 48.0) for way in ways)
 
 
 @final

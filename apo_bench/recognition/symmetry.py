@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import permutations, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box, Solid
@@ -14,6 +16,7 @@ SAME_M = 1e-6
 """Planes that are closer together are one plane."""
 
 
+@lru_cache(maxsize=1)
 def quarter_turns() -> Array:
     """The 24 rotations that take coordinate axes to coordinate axes, (24, 3, 3); the identity first."""
     turns = []
@@ -23,9 +26,12 @@ def quarter_turns() -> Array:
             R[range(3), order] = signs
             if np.linalg.det(R) > 0:
                 turns.append(R)
-    return np.array(turns)
+    found = np.array(turns)
+    found.flags.writeable = False
+    return found
 
 
+@lru_cache(maxsize=256)
 def symmetries(solid: Solid) -> Array:
     """The rigid displacements (m, 4, 4) that take a solid of boxes into itself; the identity first.
 
@@ -38,7 +44,9 @@ def symmetries(solid: Solid) -> Array:
         T[:3, :3], T[:3, 3] = R, solid.centroid - R @ solid.centroid
         if _same(solid.boxes, [_turned(box, T) for box in solid.boxes]):
             found.append(T)
-    return np.array(found)
+    same = np.array(found)
+    same.flags.writeable = False
+    return same
 
 
 def nearest(T: Array, same: Array, expected: Array) -> Array:
@@ -63,7 +71,7 @@ def _same(a: Sequence[Box], b: Sequence[Box]) -> bool:
     return bool((_inside(a, cells) == _inside(b, cells))[counts].all())
 
 
-def _inside(boxes: Sequence[Box], points: Array) -> Array:
+def _inside(boxes: Sequence[Box], points: Array) -> NDArray[np.bool_]:
     inside = np.zeros(points.shape[:-1], dtype=np.bool_)
     for box in boxes:
         inside |= (np.abs(points - box.center) < box.half).all(axis=-1)

@@ -13,13 +13,15 @@ from apo_bench.placement import placed
 from apo_bench.program import Demonstration, Layout, Reached, Snapshot
 from apo_bench.scenario import Carelessness
 from apo_bench.simulation.acts import act
-from apo_bench.simulation.hands import Hands
+from apo_bench.simulation.hands import Hands, Watch
 from apo_bench.simulation.perform import REST_S, perform
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import snapshot, unstable
 
 
-def demonstrate(scene: Scene, layout: Layout, careless: float, rng: np.random.Generator) -> Demonstration:
+def demonstrate(
+    scene: Scene, layout: Layout, careless: float, rng: np.random.Generator, watch: Watch | None = None
+) -> Demonstration:
     """Assemble by hand, with an error of `careless` times the scenario's carelessness.
 
     The error is put into the operation that the scenario names, and parts that are put against a displaced one follow
@@ -29,11 +31,12 @@ def demonstrate(scene: Scene, layout: Layout, careless: float, rng: np.random.Ge
     Args:
         careless: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
         rng: Drawn from in the same way whatever `careless` is, so that hands of one seed differ in size only.
+        watch: Looks on; the demonstration is the same with and without it.
     """
     scenario = scene.scenario
     error = spread(scenario, layout, _draw(scenario.careless, careless, rng))
     stages = (layout.start, *placed(scenario.assembly, layout.start, layout.goals))
-    hands = Hands(scene.shown, layout.start)
+    hands = Hands(scene.shown, layout.start, watch)
     hands.wait(0.05)
     goals, after = [], []
     for k, operation in enumerate(scenario.assembly.operations):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -15,12 +15,24 @@ from apo_bench.simulation.scene import HANDS
 from apo_bench.simulation.world import World, fresh, part_pose
 
 
+class Watch(Protocol):
+    """Looks on: called with the `MjData` at the start and every `period_s` of simulated time, it changes nothing."""
+
+    period_s: float
+
+    def __call__(self, data: Any) -> None: ...
+
+
 class Hands:
     """Two hands and the parts before them; one demonstration long."""
 
-    def __init__(self, world: World, start: Poses) -> None:
+    def __init__(self, world: World, start: Poses, watch: Watch | None = None) -> None:
         self.world = world
         self.data: Any = fresh(world, start)
+        self._watch, self._steps = watch, 0
+        self._every = max(1, round(watch.period_s / world.model.opt.timestep)) if watch else 0
+        if watch:
+            watch(self.data)
         self._mocap = [int(world.model.body(hand).mocapid[0]) for hand in HANDS]
         self._at = [np.eye(4) for _ in HANDS]
 
@@ -54,12 +66,22 @@ class Hands:
                 j = min(i, len(positions) - 1)
                 self.data.mocap_pos[self._mocap[hand]] = positions[j]
                 self.data.mocap_quat[self._mocap[hand]] = quaternions[j]
-            mujoco.mj_step(self.world.model, self.data)
+            self._step(1)
         for (hand, _), path in zip(moves, paths, strict=True):
             self._at[hand] = path[-1]
 
     def wait(self, seconds: float) -> None:
-        mujoco.mj_step(self.world.model, self.data, round(seconds / self.world.model.opt.timestep))
+        self._step(round(seconds / self.world.model.opt.timestep))
+
+    def _step(self, n: int) -> None:
+        """Step, and let who watches look whenever it is time."""
+        while self._watch and n >= (left := self._every - self._steps):
+            mujoco.mj_step(self.world.model, self.data, left)
+            self._watch(self.data)
+            n, self._steps = n - left, 0
+        if n:
+            mujoco.mj_step(self.world.model, self.data, n)
+            self._steps += n
 
     def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
         weld = self._weld(hand, part)

@@ -1,0 +1,118 @@
+"""Recognise what appeared among the models, and locate it: fit every model, keep the one that explains most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from scipy.ndimage import binary_erosion
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.recognition.distance import Shape
+from apo_bench.recognition.explained import explained
+from apo_bench.recognition.fit import Fits, Points, covariance, refined
+from apo_bench.recognition.regions import Mask
+from apo_bench.recognition.starts import starts
+from apo_bench.recognition.view import View
+
+COARSE, MIDDLE, FINE = 150, 500, 3000
+"""Points of a first fit from every start, of the best of these, and of the last fit."""
+BEST = 4
+"""Starts that are followed further: one fit in some ends beside the true place, so never only one."""
+WIDTH_M = 0.0015
+"""Points this far away from a surface are half doubted; three standard deviations if that is more."""
+LEAST_EXPLAINED = 0.6
+"""A model that explains less was not recognised."""
+ALIKE = 0.03
+"""Models that explain this much less than the best one cannot be told from it."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A part, or several that move as one, as the range finder looks for them."""
+
+    shape: Shape
+    """In the frame of its main part."""
+    same: Array
+    """(m, 4, 4), displacements after which it looks the same; the identity first."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """What appeared between two firings."""
+
+    views: Sequence[View]
+    images: Array
+    """(views, height, width), the later images, [m]."""
+    masks: Sequence[Mask]
+    """Per view, where something is nearer than before."""
+    noise_m: float
+    bias_m: float
+
+    def points(self) -> Points:
+        """The measured points; the outermost pixels of the regions are left out."""
+        at, rays, number = [], [], []
+        for v, (view, image, mask) in enumerate(zip(self.views, self.images, self.masks, strict=True)):
+            pixels = np.flatnonzero(binary_erosion(mask) & np.isfinite(image))
+            ray = view.rays[pixels]
+            at.append(view.origin + image.ravel()[pixels, None] * ray)
+            rays.append(ray)
+            number.append(np.full(len(pixels), v))
+        return Points(np.concatenate(at), np.concatenate(rays), np.concatenate(number))
+
+    @property
+    def width_m(self) -> float:
+        return max(WIDTH_M, 3.0 * self.noise_m)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Located:
+    """A model where it was found."""
+
+    T: Array
+    """(4, 4), of the frame of the model, world, [m]; one of those that look the same."""
+    covariance: Array
+    """(6, 6), of the body twist by which it is wrong, [m, rad]."""
+    explained: float
+    """0 to 1."""
+
+
+def located(model: Model, seen: Appearance, points: Points) -> Located | None:
+    """Fit a model to what appeared; None if there are too few points, or they are not explained by it."""
+    if len(points) < 6:
+        return None
+    coarse = _coarse(model, seen, points)
+    best = coarse.T[_explaining(model, seen, coarse.T)[0]]
+    fine = points.thinned(FINE)
+    T = refined(model.shape, fine, best[None], seen.width_m, 20).T[0]
+    C = covariance(model.shape, fine, T, seen.width_m, seen.noise_m, seen.bias_m)
+    share = explained(model.shape, T, seen.views, seen.images, seen.masks, seen.noise_m)
+    return Located(T, C, share) if share >= LEAST_EXPLAINED else None
+
+
+def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Mapping[str, float]:
+    """How much of what appeared each model explains where it fits best, 0 to 1."""
+    if len(points) < 6:
+        return dict.fromkeys(models, 0.0)
+    return {name: _explaining(model, seen, _coarse(model, seen, points).T)[1] for name, model in models.items()}
+
+
+def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
+    """The best few of the fits from all starts."""
+    begun = starts(model.shape, points.at, model.same)
+    wide = 4.0 * seen.width_m
+    first = refined(model.shape, points.thinned(COARSE), begun, wide, 10)
+    best = first.T[np.argsort(first.cost, kind="stable")[:BEST]]
+    return refined(model.shape, points.thinned(MIDDLE), best, seen.width_m, 12)
+
+
+def _explaining(model: Model, seen: Appearance, T: Array) -> tuple[int, float]:
+    """Which pose of (s, 4, 4) explains most, and how much."""
+    shares = [explained(model.shape, pose, seen.views, seen.images, seen.masks, seen.noise_m) for pose in T]
+    best = int(np.argmax(shares))
+    return best, shares[best]
