@@ -298,6 +298,8 @@ def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep -
     print_prediction(rows)
     figures = " ".join(str(path) for path in (made.figure, made.tightness) if path is not None)
     typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nPairs:  {made.paired}")
+    if made.recognised is not None:
+        typer.echo(f"Recognised contacts: {made.recognised[0]} {made.recognised[1]}")
     typer.echo(f"Figure: {figures}\nReport: {made.page}")
 
 

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO, final
 
 from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.grid import Key, row_key
+from apo_bench.benchmark.recognised import UNCOUNTED
 from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
 
@@ -24,7 +25,7 @@ RUN = "apo-bench/run/2"
 OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3")
 """Rows that say less: nothing about the test of a correction and its posterior, nothing about the eye. Reports still
 read them."""
-UNSAID = {**UNKNOWN, "eye": "noise"}
+UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise"}
 """What stands in place of what older rows do not say."""
 PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),

@@ -19,6 +19,9 @@ from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.paired import paired
 from apo_bench.benchmark.paired_table import WORDS as PAIRED
 from apo_bench.benchmark.paired_table import paired_lines, write_paired
+from apo_bench.benchmark.recognised_picture import draw_recognitions
+from apo_bench.benchmark.recognised_table import WORDS as RECOGNISED
+from apo_bench.benchmark.recognised_table import recognition_lines, recognitions, write_recognitions
 from apo_bench.benchmark.spec import knows_relations
 from apo_bench.benchmark.statistics import Cell, tally
 from apo_bench.errors import InputError
@@ -39,6 +42,8 @@ class Report(NamedTuple):
     paired: Path
     tightness: Path | None
     """The figure over tightness; None where a sweep has one clearance per scenario."""
+    recognised: tuple[Path, Path] | None = None
+    """Table and figure of recognised contacts; None where a sweep was given all of them."""
 
 
 def report(folder: str | Path) -> Report:
@@ -59,6 +64,7 @@ def report(folder: str | Path) -> Report:
         confusion=folder / "confusion.csv",
         paired=folder / "paired.csv",
         tightness=folder / "success_over_tightness.png" if varies(cells) else None,
+        recognised=(folder / "recognised.csv", folder / "recognised.png") if recognitions(rows) else None,
     )
     try:
         _write_table(cells, made.table)
@@ -67,6 +73,9 @@ def report(folder: str | Path) -> Report:
         draw(cells, made.figure)
         if made.tightness is not None:
             draw_tightness(cells, made.tightness)
+        if made.recognised is not None:
+            write_recognitions(recognitions(rows), made.recognised[0])
+            draw_recognitions(recognitions(rows), made.recognised[1])
         made.page.write_text(_page(rows, cells, made), encoding="utf-8")
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
@@ -159,8 +168,19 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
         CALIBRATION,
         "",
         *calibration_lines(calibrations(rows)),
+        *_recognised(rows, made),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _recognised(rows: Sequence[Mapping[str, Any]], made: Report) -> list[str]:
+    """The section on recognised contacts; nothing where all were given."""
+    if made.recognised is None:
+        return []
+    table, figure = (path.name for path in made.recognised)
+    words = f"{RECOGNISED} The same numbers stand in [{table}]({table})."
+    lines = recognition_lines(recognitions(rows))
+    return ["", "## Recognised contacts", "", words, "", f"![Recognised contacts]({figure})", "", *lines]
 
 
 def _line(c: Cell) -> str:

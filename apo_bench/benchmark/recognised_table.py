@@ -1,0 +1,126 @@
+"""Precision and recall of recognised contacts over the noise: counted, as a table, as a file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, final
+
+from apo_bench.benchmark.recognised import KINDS
+from apo_bench.benchmark.statistics import wilson
+
+ALL = "all"
+"""Stands for every scenario."""
+COLUMNS = (
+    *("scenario", "noise", "eye", "relations", "careless", "level_mm", "level_deg", "demonstrations", "complete"),
+    *("rate", "low_95", "high_95", "right", "missed", "false", "precision", "recall"),
+)
+HEADER = (
+    "| scenario | noise | relations | careless | level | all right | 95 % interval | precision | recall | missed "
+    "| false |",
+    "|---|---|---|---|---|---|---|---|---|---|---|",
+)
+WORDS = (
+    "Contacts that were recognised, against those of the scenario: how many demonstrations had all right and none too "
+    "many; how many of the recognised contacts are right (precision), and of the right ones were recognised (recall)."
+)
+NONE = "No method was told relations that were recognised."
+
+
+class Place(NamedTuple):
+    """What the observations that are counted together have in common."""
+
+    scenario: str
+    noise: str
+    eye: str
+    relations: str
+    careless: float
+    level: float
+    level_deg: float
+
+
+@final
+@dataclass(frozen=True)
+class Recognition:
+    """Contacts of the observations that differ in nothing but the seed."""
+
+    place: Place
+    demonstrations: int
+    complete: int
+    """Demonstrations of which every contact was recognised, and no other."""
+    right: int
+    missed: int
+    false: int
+
+    @property
+    def precision(self) -> float | None:
+        """Share of the recognised contacts that are right; None if there are none."""
+        return self.right / (self.right + self.false) if self.right + self.false else None
+
+    @property
+    def recall(self) -> float | None:
+        """Share of the right contacts that were recognised."""
+        return self.right / (self.right + self.missed) if self.right + self.missed else None
+
+
+def recognitions(rows: Iterable[Mapping[str, Any]]) -> tuple[Recognition, ...]:
+    """One per scenario, noise, eye, way of recognising, carelessness and level; and over all scenarios, where several.
+
+    Methods of one seed were told the same, so each observation counts once.
+    """
+    seen: dict[tuple[Any, ...], tuple[Place, Mapping[str, Any]]] = {}
+    for row in rows:
+        if row["relations"] in KINDS and row["contacts_right"] is not None and row["level"] is not None:
+            place = Place(*(row[name] for name in Place._fields))
+            seen.setdefault((place, row["seed"], row["clearance_mm"]), (place, row))
+    several = len({place.scenario for place, _ in seen.values()}) > 1
+    groups: dict[Place, list[Mapping[str, Any]]] = {}
+    for place, row in seen.values():
+        for where in (place, place._replace(scenario=ALL)) if several else (place,):
+            groups.setdefault(where, []).append(row)
+    return tuple(_counted(place, groups[place]) for place in sorted(groups, key=_order))
+
+
+def recognition_lines(found: Sequence[Recognition]) -> list[str]:
+    """A Markdown table, or a sentence where nothing was recognised."""
+    return [*HEADER, *map(_line, found)] if found else [NONE]
+
+
+def write_recognitions(found: Sequence[Recognition], path: Path) -> None:
+    """One line per place."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for r in found:
+            rates = (r.complete / r.demonstrations, *wilson(r.complete, r.demonstrations))
+            counts = (r.right, r.missed, r.false, r.precision, r.recall)
+            writer.writerow([*r.place, r.demonstrations, r.complete, *rates, *counts])
+
+
+def _counted(place: Place, rows: Sequence[Mapping[str, Any]]) -> Recognition:
+    right, missed, false = (sum(row[f"contacts_{of}"] for row in rows) for of in ("right", "missed", "false"))
+    complete = sum(row["contacts_missed"] == row["contacts_false"] == 0 for row in rows)
+    return Recognition(place, len(rows), complete, right, missed, false)
+
+
+def _order(place: Place) -> tuple[Any, ...]:
+    """All scenarios last; the ways of recognising in their own order."""
+    kind = KINDS.index(place.relations)
+    return (place.scenario == ALL, place.scenario, place.noise, place.eye, kind, place.careless, *place[-2:])
+
+
+def _line(r: Recognition) -> str:
+    p, interval = r.place, wilson(r.complete, r.demonstrations)
+    noise = p.noise if p.eye == "noise" else p.eye
+    level = f"{p.level:g}" if p.level == p.level_deg else f"{p.level:g} mm, {p.level_deg:g} deg"
+    return (
+        f"| {p.scenario} | {noise} | {p.relations} | {p.careless:g} | {level} | {r.complete} of {r.demonstrations} "
+        f"| {100 * interval.low:.1f} to {100 * interval.high:.1f} % | {_share(r.precision)} | {_share(r.recall)} "
+        f"| {r.missed} | {r.false} |"
+    )
+
+
+def _share(x: float | None) -> str:
+    return "–" if x is None else f"{100 * x:.2f} %"
