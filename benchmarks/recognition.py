@@ -1,0 +1,121 @@
+"""How many contacts are recognised? `python benchmarks/recognition.py [WORKERS [SEEDS [TWICE]]]` (100 seeds, 30 of them
+twice: some 20 minutes on two cores).
+
+Every scenario, level and carelessness; no robot. Each demonstration is simulated once and seen at every level; a
+scenario without carelessness is shown by a careful human only. Seeds come first, and results are written after each,
+so the run may be stopped: `benchmarks/results/recognition.csv` counts, `recognition.json` says which contacts were
+wrong, `recognition.png` draws, and the table in `docs/recognition.md` is written anew.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+import sys
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from apo_bench.assembly import Assembly
+from apo_bench.benchmark.recognised import KINDS, counted, recognised
+from apo_bench.benchmark.recognised_picture import draw_recognitions
+from apo_bench.benchmark.recognised_table import ALL, Recognition, recognition_lines, recognitions, write_recognitions
+from apo_bench.benchmark.stages import see, show
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.scenario_file import load_scenario, scenario_names
+from apo_bench.simulation.scene import Scene, build_scene
+
+LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+HERE = Path(__file__).parent
+RESULTS, PAGE = HERE / "results", HERE.parent / "docs" / "recognition.md"
+BEGIN, END = "<!-- table: python benchmarks/recognition.py -->", "<!-- end of table -->"
+
+
+@cache
+def scene(scenario: str) -> Scene:
+    return build_scene(load_scenario(scenario))
+
+
+def rows_of(scenario: str, seed: int, kinds: tuple[str, ...]) -> list[dict[str, Any]]:
+    """One row for each carelessness, level and way of recognising, as far as a sweep's row says it."""
+    made, here = [], scene(scenario)
+    for careless in (0.0,) if here.scenario.careless is None else (0.0, 1.0):
+        shown = show(here, careless, seed)
+        for level, kind in product(LEVELS, kinds) if shown.demonstration.code == "ok" else ():
+            seen = see(here, shown, make_noise("isotropic", Level(level, level)), seed)
+            told = recognised(seen, kind).assembly
+            where = {"scenario": scenario, "noise": "isotropic", "eye": "noise", "relations": kind, "seed": seed}
+            size = {"careless": careless, "level": level, "level_deg": level, "clearance_mm": here.clearance_mm}
+            made.append(where | size | counted(seen.assembly, told) | wrong(seen.assembly, told))
+    return made
+
+
+def wrong(right: Assembly, told: Assembly) -> dict[str, list[str]]:
+    """The contacts that were missed and those that are false, with the number of their operation."""
+    there, named = ({f"{r.made + 1}: {r.contact}" for r in of.relations()} for of in (right, told))
+    return {"missed": sorted(there - named), "false": sorted(named - there)}
+
+
+def main(workers: int = 2, seeds: int = 100, twice: int = 30) -> None:
+    rows: list[dict[str, Any]] = []
+    with ProcessPoolExecutor(workers) as pool:
+        for seed in range(seeds):
+            kinds = KINDS if seed < twice else KINDS[:2]
+            work = [pool.submit(rows_of, scenario, seed, kinds) for scenario in scenario_names()]
+            rows += [row for unit in work for row in unit.result()]
+            written(rows)
+            print(f"seed {seed}: {len(rows)} observations", flush=True)
+    print("\n".join(table(recognitions(rows))))
+
+
+def written(rows: list[dict[str, Any]]) -> None:
+    """Files, figure and page of what is known so far."""
+    found = recognitions(rows)
+    write_recognitions(found, RESULTS / "recognition.csv")
+    draw_recognitions(found, RESULTS / "recognition.png")
+    wrongs = {
+        f"{kind}, careless {careless:g}, level {level:g}": {
+            what: Counter(f"{row['scenario']} {contact}" for row in rows if place(row) == (kind, careless, level)
+                          for contact in row[what])
+            for what in ("missed", "false")
+        }
+        for kind, careless, level in sorted({place(row) for row in rows})
+    }  # fmt: skip
+    form = json.dumps({"seeds": len({row["seed"] for row in rows}), "wrong": wrongs}, indent=1)
+    (RESULTS / "recognition.json").write_text(form + "\n", encoding="utf-8")
+    if PAGE.exists() and BEGIN in (text := PAGE.read_text(encoding="utf-8")):
+        before, rest = text.split(BEGIN)
+        middle = "\n".join(table(found))
+        PAGE.write_text(f"{before}{BEGIN}\n\n{middle}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
+def place(row: dict[str, Any]) -> tuple[str, float, float]:
+    return row["relations"], row["careless"], row["level"]
+
+
+def table(found: tuple[Recognition, ...]) -> list[str]:
+    """All scenarios over the levels, then each scenario with thresholds from the noise."""
+    overall = [r for r in found if r.place.scenario == ALL]
+    each = [r for r in found if r.place.scenario != ALL and r.place.relations == KINDS[0] and r.place.careless == 0.0]
+    return [*recognition_lines(overall), "", *matrix(each)]
+
+
+def matrix(found: list[Recognition]) -> list[str]:
+    """Demonstrations all right, scenarios down and levels across."""
+    levels = sorted({r.place.level for r in found})
+    head = f"| `recognised`, careless 0: all right | {' | '.join(f'level {level:g}' for level in levels)} |"
+    lines = [head, "|---" * (len(levels) + 1) + "|"]
+    for name in dict.fromkeys(r.place.scenario for r in found):
+        mine = {r.place.level: f"{r.complete} of {r.demonstrations}" for r in found if r.place.scenario == name}
+        lines.append(f"| {name} | {' | '.join(mine.get(level, '') for level in levels)} |")
+    return lines
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
