@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -35,6 +36,10 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.at)
+
+    def only(self, kept: NDArray[np.bool_]) -> Points:
+        """Some of them."""
+        return Points(self.at[kept], self.ray[kept], self.view[kept])
 
     def thinned(self, n: int) -> Points:
         """About n of them, evenly out of their order."""

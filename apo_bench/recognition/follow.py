@@ -161,7 +161,8 @@ def _recognised(
     group = Model(shapes[operation.main], symmetries(assembly.solids[operation.main]))
     if operation.carries:
         back = pose.inverse(believed[operation.main])
-        group = Model(joined(_posed(shapes[part], back @ believed[part]) for part in operation.moves), np.eye(4)[None])
+        together = joined(_posed(shapes[part], back @ believed[part]) for part in operation.moves)
+        group = Model(together, np.eye(4)[None], main=len(group.shape.center))
     found = located(group, seen, points)
     if found is None or found.explained < max(shares.values()) - ALIKE:
         return shares, None

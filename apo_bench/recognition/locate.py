@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import binary_erosion
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.recognition.distance import Shape
+from apo_bench.recognition.distance import Shape, signed_distance
 from apo_bench.recognition.explained import explained
 from apo_bench.recognition.fit import Fits, Points, covariance, refined
 from apo_bench.recognition.regions import Mask
@@ -23,6 +23,9 @@ BEST = 4
 """Starts that are followed further: one fit in some ends beside the true place, so never only one."""
 WIDTH_M = 0.0015
 """Points this far away from a surface are half doubted; three standard deviations if that is more."""
+WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
+"""A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
+WELL_SEEN.flags.writeable = False
 LEAST_EXPLAINED = 0.6
 """A model that explains less was not recognised."""
 ALIKE = 0.03
@@ -38,6 +41,8 @@ class Model:
     """In the frame of its main part."""
     same: Array
     """(m, 4, 4), displacements after which it looks the same; the identity first."""
+    main: int | None = None
+    """How many of the boxes, the first ones, are those of the main part, if it carries others."""
 
 
 @final
@@ -83,16 +88,29 @@ class Located:
 
 
 def located(model: Model, seen: Appearance, points: Points) -> Located | None:
-    """Fit a model to what appeared; None if there are too few points, or they are not explained by it."""
+    """Fit a model to what appeared; None if there are too few points, or they are not explained by it.
+
+    A main part with what it carries is found as one rigid thing. As a carried part may have been shifted in the hand,
+    the last fit is that of the main part alone, if enough of it can be seen.
+    """
     if len(points) < 6:
         return None
     coarse = _coarse(model, seen, points)
     best = coarse.T[_explaining(model, seen, coarse.T)[0]]
-    fine = points.thinned(FINE)
-    T = refined(model.shape, fine, best[None], seen.width_m, 20).T[0]
-    C = covariance(model.shape, fine, T, seen.width_m, seen.noise_m, seen.bias_m)
+    T, C = _fine(model.shape, seen, points.thinned(FINE), best)
     share = explained(model.shape, T, seen.views, seen.images, seen.masks, seen.noise_m)
-    return Located(T, C, share) if share >= LEAST_EXPLAINED else None
+    if share < LEAST_EXPLAINED:
+        return None
+    if model.main is not None:
+        main, rest = (Shape(*(a[part] for a in model.shape)) for part in (slice(model.main), slice(model.main, None)))
+        local = (points.at - T[:3, 3]) @ T[:3, :3]
+        d = np.abs(signed_distance(main, local)[0])
+        own = points.only((d < 2.0 * seen.width_m) & (d < np.abs(signed_distance(rest, local)[0])))
+        if len(own) >= 6:
+            alone = _fine(main, seen, own.thinned(FINE), T)
+            if (np.sqrt(np.diag(alone[1])) < WELL_SEEN).all():
+                T, C = alone
+    return Located(T, C, share)
 
 
 def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Mapping[str, float]:
@@ -100,6 +118,12 @@ def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Map
     if len(points) < 6:
         return dict.fromkeys(models, 0.0)
     return {name: _explaining(model, seen, _coarse(model, seen, points).T)[1] for name, model in models.items()}
+
+
+def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
+    """The last fit, from a good start, and its covariance."""
+    T = refined(shape, points, T[None], seen.width_m, 20).T[0]
+    return T, covariance(shape, points, T, seen.width_m, seen.noise_m, seen.bias_m)
 
 
 def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
