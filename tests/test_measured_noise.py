@@ -1,4 +1,4 @@
-"""Noise out of files, fitted or drawn anew from residuals, obeys the laws of all noise models; bad files are refused."""
+"""Noise out of files, fitted or drawn from residuals, obeys the laws of all noise models; bad files are refused."""
 
 from __future__ import annotations
 
@@ -49,10 +49,12 @@ def residuals_of(folder: Path, known: Known, n: int = 400) -> Residuals:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Files of residuals: `whole.csv`, and `inliers.csv` without outliers and misses."""
+    """Files of residuals: `whole.csv`, and `inliers.csv` of an estimator with a bias, without outliers and misses."""
     path = tmp_path_factory.mktemp("residuals")
-    for name, known in (("whole", WHOLE), ("inliers", INLIERS)):
-        (path / f"{name}.csv").write_text(residuals_text(residuals_of(path, known)), encoding="utf-8")
+    for name, known, bias in (("whole", WHOLE, (0.0, 0.0, 0.0)), ("inliers", INLIERS, (0.0, 2.0, 5.0))):
+        made = residuals_of(path, known)
+        made = replace(made, shift_mm=0.85 * made.shift_mm + bias)
+        (path / f"{name}.csv").write_text(residuals_text(made), encoding="utf-8")
     return path
 
 
@@ -148,6 +150,19 @@ def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]
             assert planned.plan.goals.tobytes() == seen.goals.tobytes()
         again = see(names[0], seed)
         assert again.goals.tobytes() + again.covariance.tobytes() == seen.goals.tobytes() + seen.covariance.tobytes()
+
+
+def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
+    """Its pose is the one at which the part started or was seen last, and what is stated says that it is not known."""
+    noise, shown, missed = make_noise(names[0], LEVEL), scenes.shown(TOWER), 0
+    for seed in range(60):
+        seen = observe(shown, noise, np.random.default_rng(seed))
+        for k in np.flatnonzero(~seen.seen):
+            missed += 1
+            start = TOWER.start[TOWER.assembly.operations[k].main]
+            assert_array_equal(seen.goals[k], start)
+            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), np.repeat([1.0, np.pi / 2], 3))
+    assert missed > 5
 
 
 def test_empirical_noise_gives_the_measured_poses_back(folder: Path) -> None:
