@@ -1,0 +1,87 @@
+"""The command `apo-bench recognise`: which face touches which, from what was seen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM
+from apo_bench.errors import InputError, unknown
+from apo_bench.program import Observation
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(recognise)
+
+
+def recognise(
+    scenario: ScenarioArgument,
+    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees; default 1.")] = None,
+    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
+    noise: Annotated[str | None, typer.Option(help="A noise model; default: isotropic.")] = None,
+    eye: Annotated[str | None, typer.Option(help="noise or range; default: noise.")] = None,
+    observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,
+    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
+    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+    relations: Annotated[
+        str, typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), or recognised-twice.")
+    ] = "recognised",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Find the contacts of what was seen, and say how they differ from those of the scenario."""
+    from apo_bench.benchmark.recognised import KINDS, recognised
+    from apo_bench.benchmark.recognised_text import difference_lines, evidence_table, recognition_form
+    from apo_bench.scenario_file import load_scenario
+
+    if relations not in KINDS:
+        raise InputError(unknown("way of recognising", relations, KINDS))
+    asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
+    deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    name = load_scenario(scenario).name
+    seen, assumed = _seen(scenario, observation, asked, deviations)
+    found = recognised(seen, relations)
+    if as_json:
+        typer.echo(json.dumps(recognition_form(name, relations, seen, found, assumed), allow_nan=False))
+        return
+    _print(evidence_table(found, seen.assembly))
+    if assumed:
+        mm, deg = deviation_mm or DEVIATION_MM, deviation_deg or DEVIATION_DEG
+        typer.echo(f"\na standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none")
+    typer.echo("\n" + "\n".join(difference_lines(seen, found)))
+    if not seen.seen.all():
+        missing = ", ".join(str(k + 1) for k, was in enumerate(seen.seen) if not was)
+        typer.echo(f"not seen, so nothing is recognised there: operation {missing}")
+
+
+def _seen(
+    scenario: str, observation: Path | None, asked: dict[str, Any], deviations: dict[str, float | None]
+) -> tuple[Observation, bool]:
+    """The observation of a trial or of a file, and whether its deviations had to be assumed."""
+    from apo_bench.benchmark.one import Request, watched
+    from apo_bench.observed import observed
+
+    refused, reason = (deviations, "is for files") if observation is None else (asked, "draws a trial")
+    for name, value in refused.items():
+        if value is not None:
+            option, where = "--" + name.replace("_", "-"), "without" if observation is None else "together with"
+            raise InputError(f"{option}, which {reason}, was given {where} --observation; leave one of them out.")
+    if observation is None:
+        return watched(Request(scenario=scenario, **asked)), False
+    stated = {name: value for name, value in deviations.items() if value is not None}
+    seen, _, assumed = observed(observation, scenario, **stated)
+    return seen, assumed
+
+
+def _print(table: Any) -> None:
+    """As wide as it is."""
+    from rich.console import Console
+
+    console = Console(width=max(140, Console().width), highlight=False, markup=False)
+    console.print(table)
