@@ -19,7 +19,6 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Face
@@ -27,6 +26,7 @@ from apo_bench.graph import relation_graph
 from apo_bench.names import resolve
 from apo_bench.placement import placed
 from apo_bench.program import Observation, Poses
+from apo_bench.recognition.facing import height, opposed
 
 Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
@@ -42,8 +42,8 @@ WRONG = MappingProxyType(
 )
 KINDS = (GIVEN, *WRONG)
 SHIFT_MM, LARGEST_SHIFT_MM = 2.0, 50.0
-OPPOSED = math.cos(math.radians(10.0))
-"""Normals whose cosine is below minus this look at each other."""
+OPPOSED_RAD = math.radians(10.0)
+"""Faces look at each other if one normal is this near to the opposite of the other."""
 TOUCHING_M, NEAR_M = 0.5e-3, 15e-3
 """Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
 COVERED_M2 = 25e-6
@@ -200,10 +200,9 @@ def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
 
 def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
     """How far face a stands in front of face b, [m]; None if they do not look at each other, or touch."""
-    n = T_b[:3, :3] @ b.normal
-    if (T_a[:3, :3] @ a.normal) @ n > -OPPOSED:
+    if not opposed(a, T_a, b, T_b, OPPOSED_RAD):
         return None
-    apart = float((pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]) @ n)
+    apart = height(a, T_a, b, T_b)
     return apart if apart > TOUCHING_M else None
 
 
