@@ -14,6 +14,8 @@ PULL, LEAVE = 0.1, 0.03
 """Peak speeds [m/s] of a part that is pulled out, and of one that is moved off a side."""
 OVERTRAVEL_M = 0.002
 """Contact is sought this far beyond the goal."""
+BOTTOM_M = 0.003
+"""From this far before a bottom it is felt for."""
 ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
 BEYOND_M, OFF_M = 0.004, 0.0003
@@ -47,9 +49,13 @@ def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
         change(robot, t, grip, second, moved(there, UP, -rise) @ second.T_part_tip)
         grip, rise = second, t.clearance
         robot.follow(smooth(robot.T, moved(robot.T, UP, rise), 0.01))
-    left = robot.follow(steady(robot.T, moved(aim(t) @ grip.T_part_tip, UP, rise), INSERT), guard)
-    if left == 0.0 and any(macro.name == "move-to-bottom" for macro in t.macros):
-        robot.follow(steady(robot.T, moved(robot.T, t.into.way, OVERTRAVEL_M), TOUCH), guard)
+    goal = moved(aim(t) @ grip.T_part_tip, UP, rise)
+    if any(macro.name == "move-to-bottom" for macro in t.macros):
+        left = robot.follow(steady(robot.T, moved(goal, t.into.way, -BOTTOM_M), INSERT), guard)
+        if left == 0.0:
+            robot.follow(steady(robot.T, moved(goal, t.into.way, OVERTRAVEL_M), TOUCH), guard)
+    else:
+        left = robot.follow(steady(robot.T, goal, INSERT), guard)
     lower = moved(robot.T, UP, -rise - OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
