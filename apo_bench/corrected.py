@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any, final
 
 import gymnasium
-import numpy as np
 
-from apo_bench.env import Action, APOReplay, Seen
+from apo_bench.env import Action, APOReplay, Seen, packed
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
 
@@ -55,8 +53,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
             self._base.aim(made.goals, made.schedule, made.targets)
         else:
             self._base.refuse(made.status, made.sentence)
-        self._goals = pose.pack(made.goals)
-        self._goals[:, 3:] = np.clip(self._goals[:, 3:], -1.0, 1.0)
+        self._goals = packed(made.goals)
         return self._with_goals(seen), {**info, "correction": made.status}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:

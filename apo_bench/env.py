@@ -27,7 +27,7 @@ from apo_bench.simulation.arm import Arm
 from apo_bench.simulation.scene import build_scene
 
 ROOM_M = 2.0
-"""Every goal that can be seen lies within this of the origin, per axis."""
+"""Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""
 LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
 """No stated standard deviation is larger, [m, rad]."""
 LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
@@ -248,9 +248,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return int(self.np_random.integers(2**31))
 
     def _observation(self) -> Seen:
-        """Fresh copies of what was seen; rounding must not push a quaternion out of its bounds."""
-        goals = pose.pack(self.seen.goals)
-        goals[:, 3:] = np.clip(goals[:, 3:], -1.0, 1.0)
+        """Fresh copies of what was seen."""
+        goals = packed(self.seen.goals)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
     def _replayed(self, shown: Shown, plan: Plan) -> tuple[bool, bool, Ending, dict[str, Any] | None]:
@@ -276,6 +275,12 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def _remember(self, data: Any) -> None:
         self._state = np.array(data.qpos)
+
+
+def packed(goals: Array) -> Array:
+    """Goals (n, 4, 4) as observations hold them, (n, 7), within the bounds of their space."""
+    far = [ROOM_M] * 3 + [1.0] * 4  # of a quaternion, rounding alone could be beyond
+    return np.clip(pose.pack(goals), np.negative(far), far)
 
 
 def _moved(plan: Plan, twists: Array) -> Plan:

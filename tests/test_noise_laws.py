@@ -15,6 +15,7 @@ from apo_bench.benchmark import trial
 from apo_bench.benchmark.planning import plan
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stages import Shown, see, stream
+from apo_bench.env import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.layout import draw_layout
@@ -242,3 +243,16 @@ def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
             assert planned.refused.code == "not_seen"
             assert planned.refused.operation == int(np.argmin(seen.seen))
             assert not plan("contact", seen, CYCLE.goals).plan
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_large_errors_stay_within_the_observations_of_the_environment(name: str) -> None:
+    """At level 40; positions of gross outliers are given at the wall of the room."""
+    widest = np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)
+    for seed in range(60):
+        seen = observe(scenes.shown(CYCLE), make_noise(name, Level(40.0, 40.0)), np.random.default_rng(seed))
+        assert (np.abs(seen.covariance) <= widest).all()
+        goals = packed(seen.goals)
+        assert np.abs(goals[:, :3]).max() <= ROOM_M
+        near = np.abs(seen.goals[:, :3, 3]).max(axis=1) <= ROOM_M
+        assert_allclose(goals[near], pose.pack(seen.goals[near]), atol=1e-15)

@@ -20,7 +20,7 @@ OUTLIERS, MISSES = 0.1, 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
 TIMES = 10.0
 """An outlier errs by so many times the level."""
-UNKNOWN = np.repeat([1.0, np.pi / 2.0], 3)
+UNKNOWN = np.repeat([0.5, np.pi / 2.0], 3)
 """Standard deviation that is stated of what was not seen, [m, rad]."""
 UNKNOWN.flags.writeable = False
 
