@@ -16,6 +16,7 @@ from apo_bench.benchmark.fingerprint import noise_content, spec_hash
 from apo_bench.benchmark.planning import plan
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.cli import main
+from apo_bench.env import LARGEST_DEVIATION
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -28,6 +29,7 @@ from apo_bench.observation.isotropic import FLOOR
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.observation.observe import observe
+from apo_bench.observation.outliers import UNKNOWN
 from apo_bench.observation.residuals import Residuals, compare
 from apo_bench.program import Observation
 from tests import bop_made as made_of
@@ -142,6 +144,17 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
         assert_allclose(none.covariance, np.tile(np.diag(FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
 
 
+def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
+    """What is stated stays within the observations of the environment."""
+    for level, unit in ((Level(900.0, 0.0), "mm"), (Level(0.0, 900.0), "degrees")):
+        with pytest.raises(InputError, match=rf"a level of 900 {unit} .*; at most \d") as raised:
+            make_noise(names[0], level)
+        most = float(str(raised.value).split("at most ")[1].split()[0])
+        seen = see(names[1], 0, Level(*(min(x, most) for x in level)))
+        assert (np.abs(seen.covariance) <= np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)).all()
+        assert np.sqrt(seen.covariance.max()) > 0.7 * (0.4 if unit == "mm" else 2.0)
+
+
 def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]) -> None:
     for seed in range(30):
         seen = see(names[0], seed)
@@ -162,7 +175,7 @@ def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> N
             missed += 1
             start = TOWER.start[TOWER.assembly.operations[k].main]
             assert_array_equal(seen.goals[k], start)
-            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), np.repeat([1.0, np.pi / 2], 3))
+            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNKNOWN)
     assert missed > 5
 
 

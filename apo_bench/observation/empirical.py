@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.facts import Facts
-from apo_bench.observation.fitted import UNITS, reported
+from apo_bench.observation.fitted import UNITS, check_level, reported
 from apo_bench.observation.noise import Level
 from apo_bench.observation.residuals import Residuals
 from apo_bench.program import Demonstration, Observation
@@ -76,6 +76,9 @@ class Empirical:
         states="the mean square of the residuals of what is no outlier, turned into the part that is seen",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
     )
+
+    def __post_init__(self) -> None:
+        check_level(self.level, self.sample.covariance)
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         n, sample = len(assembly), self.sample

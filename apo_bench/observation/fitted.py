@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.camera import Camera
@@ -21,6 +22,12 @@ from apo_bench.program import Demonstration, Observation
 
 SMALLEST, LEAST_FREEDOM = 1e-4, 0.5
 """Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
+
+
+UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
+"""[m] per mm and [rad] per degree."""
+LARGEST_M, LARGEST_RAD = 0.4, 2.0
+"""A standard deviation per axis beyond which a level makes no sense."""
 
 
 @final
@@ -69,20 +76,37 @@ class Fitted:
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
     )
 
+    def __post_init__(self) -> None:
+        check_level(self.level, self.covariance)
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), of inliers at level 1 in the frame of the ray, [m, rad]."""
+        (across, along), (out, about) = self.measured.shift_mm.variances, self.measured.turn_deg.variances
+        return np.diag(np.array([across, across, along, out, out, about]) * UNITS**2)
+
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         n, measured = len(assembly), self.measured
         errors = np.concatenate([measured.shift_mm.draw(n, rng), measured.turn_deg.draw(n, rng)], axis=1)
         gross, chance = _gross(measured, n, rng), rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
-        across, along = measured.shift_mm.variances
-        out, about = measured.turn_deg.variances
-        covariance = np.diag([across, across, along, out, out, about])
         missed = chance[:, 1] < measured.missed
-        return reported(self.camera, self.level, shown, assembly, errors * UNITS, covariance * UNITS**2, missed)
+        return reported(self.camera, self.level, shown, assembly, errors * UNITS, self.covariance, missed)
 
 
-UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
-"""[m] per mm and [rad] per degree."""
+def check_level(level: Level, covariance: Array) -> None:
+    """Refuse a level at which what is measured would be worse than `LARGEST_M`, `LARGEST_RAD`.
+
+    Args:
+        covariance: (6, 6), at level 1, [m, rad].
+    """
+    worst = np.sqrt(np.diagonal(covariance).reshape(2, 3).max(axis=1))
+    for given, deviation, largest, unit in zip(level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True):
+        if given * deviation > largest:
+            raise InputError(
+                f"a level of {given:g} {unit} was given for noise that is measured, where 1 is as measured; at most "
+                f"{np.floor(10.0 * largest / deviation) / 10.0:g} is allowed, else parts are seen outside the room."
+            )
 
 
 def reported(
