@@ -163,6 +163,31 @@ def test_the_printed_plan(capsys: pytest.CaptureFixture[str]) -> None:
         assert word in rows[3]
 
 
+def test_the_page_on_plans_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
+    assert run(capsys, "plan", "pocket_table")[1] in page
+
+
+def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A stick in a hole with a block before each end: it cannot be there, or no way leads there."""
+    block = '[parts.{0}]\nfile = "block"\nfixed = true\nstart = {{ at_mm = [{1}, 0, 25] }}\n'
+    text = 'schema = 1\ntitle = "own"\n[parts.stick]\nfile = "stick"\nstart = { at_mm = [0, 320, 10] }\n'
+    text += '[parts.cube]\nfile = "cube"\nfixed = true\nstart = { at_mm = [0, 0, 25] }\n'
+    hole = '["py", "cube.hpy"], ["ny", "cube.hny"], ["pz", "cube.hpz"], ["nz", "cube.hnz"]'
+    for at, more, words in (
+        (135, ', ["px", "a.nx"], ["nx", "b.px"]', "operation 1 (stick): locked"),
+        (180, "", "operation 1 (stick): no free way in"),
+    ):
+        path = tmp_path / "own.toml"
+        operation = f'[[operations]]\nmove = "stick"\ngoal = {{ at_mm = [0, 0, 25] }}\ncontacts = [{hole}{more}]\n'
+        path.write_text(text + block.format("a", at) + block.format("b", -at) + operation, encoding="utf-8")
+        code, out, err = run(capsys, "plan", str(path))
+        assert (code, err) == (0, "")
+        assert words in out
+        code, out, _ = run(capsys, "plan", str(path), "--json")
+        assert json.loads(out)["steps"][0]["trouble"] in out
+
+
 def test_a_cell_of_a_file_changes_a_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """What was seen, as it is: castle 2 aside changes the line of operation 2; corrected, what hangs on it follows."""
     lines = SEEN.read_text(encoding="utf-8").splitlines()

@@ -122,6 +122,7 @@ def plan_form(lines: Sequence[Line], scenario: Scenario) -> dict[str, Any]:
                     "travel_mm": round(1e3 * line.comes.line.travel_m, 6),
                     "free": line.comes.free,
                 },
+                "trouble": line.trouble or None,
                 "grasp": {"at_mm": (1e3 * line.grasp.point).tolist(), "across": line.grasp.across.tolist()},
             }
         )
@@ -143,7 +144,7 @@ def _cells(line: Line) -> tuple[str, ...]:
         str(line.operation + 1),
         f"undo: {name}" if line.undo else name,
         f"{line.leaves.state.letter} -> {line.comes.state.letter}",
-        ", ".join(_chain(line)) or "put down",
+        ", ".join(_chain(line)) or ("-" if line.trouble else "put down"),
         line.came_from,
         _listed(direction(v) for v in felt),
         _listed(direction(v).lstrip("+-") for v in position),
