@@ -59,7 +59,7 @@ def sweep(spec: SweepSpec, out: str | Path, *, workers: int = 1, command: str = 
         raise InputError(f"{workers} workers were given; a whole number from 1 to {LARGEST_WORKERS} is allowed.")
     loaded = load_all(spec)
     for noise in spec.noises:
-        make_noise(noise, Level(0.0, 0.0))
+        make_noise(noise, Level(max(spec.levels), max(spec.levels)))
     for relations in spec.relations:
         if relations not in RECOGNISED:
             make_relations(relations)

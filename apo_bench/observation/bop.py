@@ -108,6 +108,7 @@ def _refuse_twice(rows: Located) -> None:
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
     """Number and text of every line below the first that is not empty."""
+    line = 0
     try:
         if path.is_dir():
             raise InputError(f"{path}: a file is needed, a folder was given.")
@@ -124,7 +125,7 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
         raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a CSV file.") from error
-    if not path.stat().st_size:
+    if not line:
         raise InputError(f"{path}: the file is empty; {WANTED} in its first line.")
 
 
