@@ -60,6 +60,16 @@ def test_a_twist_acts_in_the_frame_of_the_body(seed: int) -> None:
     assert_allclose(T @ pose.exp(xi), pose.exp(seen_from_the_world) @ T, atol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_adjoint_takes_a_twist_to_another_frame(seed: int) -> None:
+    """T exp(xi) T^-1 = exp(Ad xi), for several T at once."""
+    rng = np.random.default_rng(seed)
+    T, xi = pose.exp(rng.standard_normal((4, 6))), rng.standard_normal((4, 6))
+    there = (pose.adjoint(T) @ xi[..., None])[..., 0]
+    assert_allclose(T @ pose.exp(xi) @ pose.inverse(T), pose.exp(there), atol=1e-12)
+    assert_allclose(pose.adjoint(T[0] @ T[1]), pose.adjoint(T[0]) @ pose.adjoint(T[1]), atol=1e-12)
+
+
 def test_a_zero_twist_is_exactly_the_identity() -> None:
     assert_array_equal(pose.exp(np.zeros((2, 6))), np.tile(np.eye(4), (2, 1, 1)))
 
