@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, final
@@ -50,7 +50,15 @@ def height(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
 
 
 def facing(
-    a: Solid, T_a: Array, b: Solid, T_b: Array, *, gap_m: float, angle_rad: float, share: float
+    a: Solid,
+    T_a: Array,
+    b: Solid,
+    T_b: Array,
+    *,
+    gap_m: float,
+    angle_rad: float,
+    share: float,
+    known: Collection[tuple[str, str]] = (),
 ) -> Iterator[Facing]:
     """All pairs of faces of two posed solids that might touch.
 
@@ -60,9 +68,12 @@ def facing(
         gap_m: Pairs whose planes are farther apart in the middle of the overlap are left out.
         angle_rad: Pairs whose normals are farther from opposite are left out.
         share: Pairs that cover less of the smaller face are left out.
+        known: Pairs, by name, that need not be measured again.
     """
     posed_a, posed_b = _posed(a, T_a), _posed(b, T_b)
     for i, j in np.argwhere(posed_a.normals @ posed_b.normals.T < -np.cos(angle_rad)):
+        if (posed_a.faces[i].name, posed_b.faces[j].name) in known:
+            continue
         heights = (posed_a.corners[i] - posed_b.corners[j][0]) @ posed_b.normals[j]
         if heights.min() > gap_m or heights.max() < -gap_m:
             continue

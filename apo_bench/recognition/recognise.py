@@ -10,7 +10,7 @@ mapping using the joint compatibility test", 2001).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
@@ -114,10 +114,10 @@ class _Around:
     k: int
     others: tuple[str, ...]
 
-    def candidates(self, belief: Belief) -> tuple[_Candidate, ...]:
-        """The pairs within the thresholds, the likeliest first."""
+    def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[_Candidate, ...]:
+        """The pairs within the thresholds that were not taken yet, the likeliest first."""
         now = belief.standing(self.k)
-        found = [c for a, b, pair in self._pairs(now) for c in self._judged(a, b, pair, now, belief)]
+        found = [c for a, b, pair in self._pairs(now, taken) for c in self._judged(a, b, pair, now, belief)]
         return tuple(sorted(found, key=lambda c: (c.distance, c.contact)))
 
     def fixed(self, belief: Belief) -> _Found:
@@ -157,18 +157,18 @@ class _Around:
             belief = belief.given(chosen.pair.residual, chosen.slope, chosen.noise)
             taken.append(chosen)
             total += chosen.distance - chosen.gain
-            have = {c.contact for c in taken}
-            at_hand = tuple(c for c in self.candidates(belief) if c.contact not in have)
+            at_hand = self.candidates(belief, [c.contact for c in taken])
         have = {c.contact for c in taken}
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
-    def _pairs(self, now: Standing) -> Iterator[tuple[str, str, Facing]]:
+    def _pairs(self, now: Standing, taken: Collection[Contact]) -> Iterator[tuple[str, str, Facing]]:
         """Faces of moved parts and of those that stand there, within the bounds, with the names of the parts."""
         solids, rules = self.seen.assembly.solids, self.rules
         bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
         for a in self.seen.assembly.operations[self.k].moves:
             for b in self.others:
-                for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds):
+                known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
+                for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
                     yield a, b, pair
 
     def _judged(self, a: str, b: str, pair: Facing, now: Standing, belief: Belief) -> Iterator[_Candidate]:
