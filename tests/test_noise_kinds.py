@@ -18,12 +18,12 @@ from apo_bench.observation.bias_view import BiasView
 from apo_bench.observation.camera import DISTANCE_M, MIDDLE_M, Camera
 from apo_bench.observation.correlated import CORRELATION, Correlated
 from apo_bench.observation.heavy_tailed import FREEDOM, HeavyTailed
-from apo_bench.observation.noise import Level, Noise
+from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
 from apo_bench.observation.observe import observe
 from apo_bench.observation.outliers import MISSES, OUTLIERS, TIMES, UNKNOWN, Outliers, last_seen
 from apo_bench.observation.sighted import Sighted
 from apo_bench.observation.symmetric import WORSE, AnyTurn, Symmetric
-from apo_bench.program import Observation
+from apo_bench.program import Demonstration, Observation
 from tests import scenes
 
 LEVEL = Level(2.0, 2.0)
@@ -258,7 +258,13 @@ def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: HeavyTailed(LEVEL, freedom=2.0), "with 2 degrees of freedom was given, which has no covariance"),
+        (lambda: HeavyTailed(LEVEL, freedom=2.0), "with 2 degrees of freedom was given; give a finite number above 2"),
+        (lambda: HeavyTailed(LEVEL, freedom=float("inf")), "with inf degrees of freedom was given"),
+        (lambda: Outliers(LEVEL, times=0.5), "outliers 0.5 times as large were given; give a finite number from 1"),
+        (lambda: Camera(np.eye(3)), "an array of shape (4, 4) is needed, (3, 3) was given"),
+        (lambda: Camera(np.full((4, 4), np.nan)), "every number must be finite"),
+        (lambda: Camera(np.diag([2.0, 1.0, 1.0, 1.0])), "the pose of a camera was given that is not rigid"),
+        (lambda: Camera("overview"), "the pose of a camera was given as something else"),
         (lambda: Outliers(LEVEL, outliers=1.5), "a share of outliers of 1.5 was given; give a number from 0 to 1"),
         (lambda: Outliers(LEVEL, misses=float("nan")), "a share of misses of nan was given"),
         (lambda: Correlated(LEVEL, correlation=-0.1), "a correlation of -0.1 was given; give a number from 0 to 1"),
@@ -269,6 +275,13 @@ def test_parameters_that_make_no_sense_are_refused(make, message: str) -> None:
     with pytest.raises(InputError) as refused:
         make()
     assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("name", sorted(NOISES))
+def test_a_demonstration_without_operations_is_seen_as_one(name: str) -> None:
+    empty = scenes.scene([scenes.table()], [], np.zeros((0, 4, 4)))
+    shown = Demonstration(empty.assembly, empty.start, empty.goals, empty.start, np.zeros((0, 6, 6)))
+    assert observe(shown, make_noise(name, LEVEL), np.random.default_rng(0)).goals.shape == (0, 4, 4)
 
 
 def test_everything_missed_is_an_observation_too() -> None:

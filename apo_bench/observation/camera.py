@@ -11,8 +11,10 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.rigid import rigid
 
 MIDDLE_M = np.array([0.12, 0.0, 0.03])
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
@@ -43,7 +45,13 @@ class Camera:
     """(4, 4), axes of OpenCV, [m]."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_world_camera", frozen(self.T_world_camera, 4, 4))
+        try:
+            T = frozen(self.T_world_camera, 4, 4)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the pose of a camera was given as something else: {error}.") from error
+        if not rigid(T[None])[0]:
+            raise InputError("the pose of a camera was given that is not rigid; give a rotation and a place in metres.")
+        object.__setattr__(self, "T_world_camera", T)
 
     def rays(self, goals: Array) -> Array:
         """Unit vectors (n, 3) from the camera to the origin of each part, world frame; on its very place, the axis."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar, final
 
 import numpy as np
@@ -38,10 +39,10 @@ class HeavyTailed:
     )
 
     def __post_init__(self) -> None:
-        if not self.freedom > 2.0:
+        if not 2.0 < self.freedom < inf:
             raise InputError(
-                f"a Student t with {self.freedom:g} degrees of freedom was given, which has no covariance; "
-                "give more than 2."
+                f"a Student t with {self.freedom:g} degrees of freedom was given; give a finite number above 2, below "
+                "which it has no covariance."
             )
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 from typing import ClassVar, final
 
 import numpy as np
@@ -64,6 +65,8 @@ class Outliers:
         for name, share in (("outliers", self.outliers), ("misses", self.misses)):
             if not 0.0 <= share <= 1.0:
                 raise InputError(f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
+        if not 1.0 <= self.times < inf:
+            raise InputError(f"outliers {self.times:g} times as large were given; give a finite number from 1.")
 
     @property
     def inflation(self) -> float:
