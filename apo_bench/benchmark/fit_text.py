@@ -85,20 +85,20 @@ def fit_lines(residuals: Residuals, measured: Measured, figures: Sequence[Figure
         ),
         ("along:across", f"{ratio(residuals):.2f}, medians of inliers"),
         (
-            "turn",
+            "angle",
             f"p25 {turns[0]:.2f}, p50 {turns[1]:.2f} deg of all inliers; "
             f"{by_trace[0]:.2f} and {by_trace[1]:.2f} by the traces of the matrices as written",
         ),
-        ("shift", _split_text(measured.shift_mm, "mm", "along the ray")),
-        ("turns", _split_text(measured.turn_deg, "deg", "about the ray")),
+        *_tail_facts("shift", ("across the ray", "along the ray"), measured.shift_mm, "mm"),
+        *_tail_facts("turn", ("across the ray", "about the ray"), measured.turn_deg, "deg"),
     ]
     width = max(len(name) for name, _ in facts)
     lines = [f"{name:{width}}  {text}" for name, text in facts]
-    lines += ["", " " * 27 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES) + "  largest difference"]
+    lines += ["", " " * 27 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES) + "  Kolmogorov-Smirnov"]
     for f in figures:
         for word, values, more in (
             ("seen", f.observed, ""),
-            ("fitted", f.fitted, f"{f.distance:10.3f} (Kolmogorov-Smirnov)"),
+            ("fitted", f.fitted, f"{f.distance:20.3f}"),
         ):
             name = f"{f.name} [{f.unit}]" if word == "seen" else ""
             lines.append(f"{name:20}{word:7}" + "".join(f"{v:8.2f}" for v in values) + more)
@@ -129,12 +129,11 @@ def _split_form(split: Split) -> dict[str, Any]:
     }
 
 
-def _split_text(split: Split, unit: str, direction: str) -> str:
-    """`3.34 mm across (Student t, 3.9 degrees of freedom), ...`, with the standard deviations that follow."""
-    words = []
-    for name, tail, variance in zip(
-        ("across the ray", direction), (split.across, split.along), split.variances, strict=True
-    ):
-        shape = f"t with {tail.freedom:.3g}" if np.isfinite(tail.freedom) else "Gaussian"
-        words.append(f"{name} scale {tail.scale:.3g} ({shape}), deviation {np.sqrt(variance):.3g} {unit}")
-    return "; ".join(words) + f"; below {split.limit:g} {unit}"
+def _tail_facts(name: str, directions: tuple[str, str], split: Split, unit: str) -> list[tuple[str, str]]:
+    """One line for each direction: the tail, and the standard deviation that follows within the limit."""
+    facts = []
+    for direction, tail, variance in zip(directions, (split.across, split.along), split.variances, strict=True):
+        shape = f"Student t with {tail.freedom:.3g} degrees of freedom" if np.isfinite(tail.freedom) else "Gaussian"
+        text = f"{direction}: scale {tail.scale:.3g} {unit}, {shape}; deviation {np.sqrt(variance):.3g} {unit} below "
+        facts.append((name, text + f"{split.limit:g} {unit}"))
+    return facts
