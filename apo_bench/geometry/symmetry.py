@@ -15,6 +15,7 @@ SAME_M = 1e-6
 """Corners of boxes that are nearer than this have the same coordinate."""
 
 
+@lru_cache(maxsize=1)
 def quarter_turns() -> Array:
     """The rotations that carry the axes of a frame onto each other, (24, 3, 3), the identity first."""
     found = []
@@ -24,10 +25,12 @@ def quarter_turns() -> Array:
             R[range(3), order] = signs
             if np.linalg.det(R) > 0.0:
                 found.append(R)
-    return np.array(found)
+    turns = np.array(found)
+    turns.flags.writeable = False
+    return turns
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def symmetries(solid: Solid) -> Array:
     """The displacements g of a solid that leave the space it fills as it is, (m, 4, 4), the identity first.
 
