@@ -95,3 +95,28 @@ def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:
     )
     assert names(scenario) == [["insert-into"], ["depart", "move-to-contact"]]
     assert done(scenario, schedule=(Step(0), Step(1), Step(1, True), Step(1))).verdict.success
+
+
+@pytest.mark.parametrize("off_mm", [0.0, 2.0])
+def test_a_corner_is_felt_from_both_sides(tmp_path: Path, off_mm: float) -> None:
+    """Into the corner, out of it sideways and away, back into it, and away again; planned 2 mm inside of the walls."""
+    text = 'schema = 1\ntitle = "own"\n[parts.table]\nfile = "table"\nfixed = true\n'
+    for name, x, y in (("left", 75, 0), ("back", 0, 50)):
+        text += f'[parts.{name}]\nfile = "bridge"\nfixed = true\nfollows_site = true\n'
+        text += f"start = {{ at_mm = [{x}, {y}, 10] }}\n"
+    text += '[parts.block]\nfile = "block"\nstart = { at_mm = [0, 320, 25] }\n'
+    text += '[[operations]]\nmove = "block"\ngoal = { at_mm = [0, 0, 25] }\n'
+    text += 'contacts = [["px", "left.nx"], ["py", "back.ny"], ["nz", "table.top"]]\n'
+    text += '[[operations]]\nmove = "block"\ngoal = { at_mm = [0, -150, 25] }\ncontacts = [["nz", "table.top"]]\n'
+    (tmp_path / "own.toml").write_text(text + SITE, encoding="utf-8")
+    scenario = load_scenario(tmp_path / "own.toml")
+    slides = ["slide-to-contact", "slide-to-contact"]
+    assert names(scenario) == [["move-to-contact", *slides], ["depart", "depart", "move-to-contact"]]
+    schedule = (Step(0), Step(1), Step(1, True), Step(1))
+    tried = done(scenario, (off_mm, off_mm, 0), schedule)
+    assert tried.result.outcome.code == "ok"
+    assert [c.contact.environment.part for c in tried.verdict.contacts if c.operation == 0 and c.strict] == [
+        "left",
+        "back",
+        "table",
+    ]
