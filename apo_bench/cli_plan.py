@@ -31,7 +31,8 @@ def plan(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
-    from apo_bench.benchmark.plan_text import plan_form, plan_lines, plan_text
+    from apo_bench.benchmark.plan_lines import plan_lines
+    from apo_bench.benchmark.plan_text import plan_form, plan_text
     from apo_bench.scenario_file import load_scenario
 
     if observation is None:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from apo_bench import cli
-from apo_bench.benchmark.plan_text import direction, plan_form, plan_lines, plan_text
+from apo_bench.benchmark.plan_lines import plan_lines
+from apo_bench.benchmark.plan_text import direction, plan_form, plan_text
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.layout import draw_layout

@@ -12,9 +12,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import extent
 from apo_bench.program import Plan, Poses, Step
-from apo_bench.recognition.arrival import Arrival
 from apo_bench.recognition.plan import understood
-from apo_bench.scenario import Attach, Grasp
+from apo_bench.scenario import Grasp
 from apo_bench.simulation.grasping import (
     Grips,
     Place,
@@ -25,6 +24,7 @@ from apo_bench.simulation.grasping import (
     obstacles,
     tip_frame,
 )
+from apo_bench.simulation.motions import PUT_DOWN, departing, line, motions
 from apo_bench.simulation.paths import turn_from
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.touch import (
@@ -43,8 +43,6 @@ PLACE_WEIGHTS, INSERT_WEIGHTS, SLIDE_WEIGHTS = 6.0, 2.5, 0.5
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
 FINGER_M = 0.01
 """So far fingers reach below their tip."""
-PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
-"""How a part that was taken off is put down, in the world."""
 
 
 class Move(NamedTuple):
@@ -127,11 +125,11 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     leaves = what.after if undo or task.was == k else what.before
     comes = what.before if undo else what.after
     contacts = tuple(each.contact for each in comes.touched)
-    into = _line(comes, target)
+    into = line(comes, target)
     if undo and not into.level:
         into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
-    grips, out, into = _grips(scene, task, part, _line(leaves, start), into, believed, after)
-    macros = _motions(comes, target, slides(plan.assembly, comes, after))
+    grips, out, into = _grips(scene, task, part, line(leaves, start), into, believed, after)
+    macros = motions(comes, target, slides(plan.assembly, comes, after))
     top, bottom = ends_of(plan.assembly, operation.moves, believed)
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
@@ -146,7 +144,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         centring=() if undo or into.level else _centring(plan.assembly, scene, k, grips[-1], macros, after),
         out=out,
         into=into,
-        departs=_departing(leaves, start, slides(plan.assembly, leaves, believed)),
+        departs=departing(leaves, start, slides(plan.assembly, leaves, believed)),
         macros=macros,
         over=top + OVER_M + FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
@@ -159,29 +157,8 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     )
 
 
-def _line(found: Arrival, T: Array) -> Line:
-    """The line on which a part arrives at T; straight down if it touches nothing there that is known of."""
-    if not found.touched:
-        return Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
-    return Line(T[:3, :3] @ found.line.direction, found.line.travel_m)
-
-
-def _motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The macros in the world, for a part that arrives at T; slides as they are believed to be."""
-    straight = [macro for macro in found.macros if macro.name != "slide-to-contact"]
-    made = [Motion(macro.name, T[:3, :3] @ found.own(macro.direction)) for macro in straight]
-    return (*made, *(Motion("slide-to-contact", side) for side in sides))
-
-
-def _departing(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The same backwards, for a part that leaves T: off its sides, then out of what encloses it."""
-    out = [macro for macro in found.departs if macro.length_m is not None]
-    drawn = [Motion(macro.name, T[:3, :3] @ found.own(macro.direction)) for macro in out]
-    return (*(Motion("depart", -side) for side in sides), *drawn)
-
-
 def _is_level(plan: Plan, scene: Scene, k: int) -> bool:
-    return _line(understood(scene.scenario)[k].after, plan.goals[k]).level
+    return line(understood(scene.scenario)[k].after, plan.goals[k]).level
 
 
 def _grips(
