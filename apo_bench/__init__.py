@@ -22,6 +22,7 @@ __all__ = [
     "explain",
     "load_scenario",
     "read_observation",
+    "recognise",
 ]
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.env:APOReplay")
@@ -35,6 +36,7 @@ _LATER = MappingProxyType(
         "explain": "apo_bench.correction.explain",
         "load_scenario": "apo_bench.scenario_file",
         "read_observation": "apo_bench.observed",
+        "recognise": "apo_bench.recognition.recognise",
     }
 )
 

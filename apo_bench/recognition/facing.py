@@ -70,6 +70,8 @@ def facing(
         share: Pairs that cover less of the smaller face are left out.
         known: Pairs, by name, that need not be measured again.
     """
+    if _far(a, T_a, b, T_b, gap_m):
+        return
     posed_a, posed_b = _posed(a, T_a), _posed(b, T_b)
     for i, j in np.argwhere(posed_a.normals @ posed_b.normals.T < -np.cos(angle_rad)):
         if (posed_a.faces[i].name, posed_b.faces[j].name) in known:
@@ -87,6 +89,20 @@ def gap(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
     common = overlap(a, T_a, b, T_b)
     middle = (common.corners if len(common.corners) else pose.apply(T_b, b.outline)).mean(axis=0)
     return float((T_a[:3, :3] @ a.normal) @ (middle - pose.apply(T_a, a.outline[:1])[0]))
+
+
+def _far(a: Solid, T_a: Array, b: Solid, T_b: Array, gap_m: float) -> bool:
+    """Whether the balls around two solids are farther apart than a gap."""
+    (middle_a, radius_a), (middle_b, radius_b) = _ball(a), _ball(b)
+    between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
+    return bool(np.sqrt(between @ between) > radius_a + radius_b + gap_m)
+
+
+@lru_cache(maxsize=4096)
+def _ball(solid: Solid) -> tuple[Array, float]:
+    """The middle of the box around a solid, in its frame, and half the diagonal, [m]."""
+    low, high = solid.bounds
+    return (low + high) / 2, float(np.linalg.norm(high - low)) / 2
 
 
 class _Posed(NamedTuple):
