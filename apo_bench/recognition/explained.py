@@ -14,7 +14,8 @@ from apo_bench.recognition.regions import Mask
 from apo_bench.recognition.view import View
 
 CLOSE_M = 0.005
-DEVIATIONS = 5.0
+DEVIATIONS = 2.5
+"""Of one ray, over a smoothed image in which noise is half of that."""
 AROUND = 12
 """Pixels around a region that a wrong model may cover."""
 
@@ -25,7 +26,7 @@ def explained(
     """Of the pixels that appeared, or that the model at T should cover, the share that agrees with it, 0 to 1.
 
     Args:
-        images: (views, height, width), measured distances, [m].
+        images: (views, height, width), measured distances, smoothed, [m].
         appeared: Per view.
     """
     close = max(CLOSE_M, DEVIATIONS * noise_m)

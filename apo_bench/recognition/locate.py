@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import final
 
 import numpy as np
@@ -13,7 +14,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.distance import Shape, signed_distance
 from apo_bench.recognition.explained import explained
 from apo_bench.recognition.fit import Fits, Points, covariance, refined
-from apo_bench.recognition.regions import Mask
+from apo_bench.recognition.regions import Mask, smoothed
 from apo_bench.recognition.starts import starts
 from apo_bench.recognition.view import View
 
@@ -26,10 +27,12 @@ WIDTH_M = 0.0015
 WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
 """A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
 WELL_SEEN.flags.writeable = False
+WIDE_M = 0.012
+"""The same at the beginning of a fit: from there the width is narrowed, so that no end of a part is left behind."""
 LEAST_EXPLAINED = 0.6
 """A model that explains less was not recognised."""
 ALIKE = 0.03
-"""Models that explain this much less than the best one cannot be told from it."""
+"""What explains this much less than the best cannot be told from it so."""
 
 
 @final
@@ -69,6 +72,11 @@ class Appearance:
             number.append(np.full(len(pixels), v))
         return Points(np.concatenate(at), np.concatenate(rays), np.concatenate(number))
 
+    @cached_property
+    def smooth(self) -> Array:
+        """The images with less noise, edges kept; NaN around what is missing."""
+        return np.array([smoothed(image) for image in self.images])
+
     @property
     def width_m(self) -> float:
         return max(WIDTH_M, 3.0 * self.noise_m)
@@ -95,10 +103,9 @@ def located(model: Model, seen: Appearance, points: Points) -> Located | None:
     """
     if len(points) < 6:
         return None
-    coarse = _coarse(model, seen, points)
-    best = coarse.T[_explaining(model, seen, coarse.T)[0]]
+    best, _ = _best(model, seen, points)
     T, C = _fine(model.shape, seen, points.thinned(FINE), best)
-    share = explained(model.shape, T, seen.views, seen.images, seen.masks, seen.noise_m)
+    share = _share(model, seen, T)
     if share < LEAST_EXPLAINED:
         return None
     if model.main is not None:
@@ -117,7 +124,7 @@ def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Map
     """How much of what appeared each model explains where it fits best, 0 to 1."""
     if len(points) < 6:
         return dict.fromkeys(models, 0.0)
-    return {name: _explaining(model, seen, _coarse(model, seen, points).T)[1] for name, model in models.items()}
+    return {name: _best(model, seen, points)[1] for name, model in models.items()}
 
 
 def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
@@ -129,14 +136,20 @@ def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Arr
 def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
     """The best few of the fits from all starts."""
     begun = starts(model.shape, points.at, model.same)
-    wide = 4.0 * seen.width_m
-    first = refined(model.shape, points.thinned(COARSE), begun, wide, 10)
+    first = refined(model.shape, points.thinned(COARSE), begun, max(WIDE_M, 3.0 * seen.width_m), 10)
     best = first.T[np.argsort(first.cost, kind="stable")[:BEST]]
-    return refined(model.shape, points.thinned(MIDDLE), best, seen.width_m, 12)
+    middle = points.thinned(MIDDLE)
+    nearer = refined(model.shape, middle, best, np.sqrt(seen.width_m * max(WIDE_M, 3.0 * seen.width_m)), 8)
+    return refined(model.shape, middle, nearer.T, seen.width_m, 8)
 
 
-def _explaining(model: Model, seen: Appearance, T: Array) -> tuple[int, float]:
-    """Which pose of (s, 4, 4) explains most, and how much."""
-    shares = [explained(model.shape, pose, seen.views, seen.images, seen.masks, seen.noise_m) for pose in T]
-    best = int(np.argmax(shares))
-    return best, shares[best]
+def _best(model: Model, seen: Appearance, points: Points) -> tuple[Array, float]:
+    """The pose (4, 4) that explains most, and how much, judged together with how close it is."""
+    fits = _coarse(model, seen, points)
+    shares = np.array([_share(model, seen, T) for T in fits.T])
+    best = int(np.argmax(shares - fits.cost))
+    return fits.T[best], float(shares[best])
+
+
+def _share(model: Model, seen: Appearance, T: Array) -> float:
+    return explained(model.shape, T, seen.views, seen.smooth, seen.masks, seen.noise_m)
