@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest
 
+from apo_bench.benchmark.fit_picture import draw_fit
 from apo_bench.benchmark.fit_text import fit_form, fit_lines
 from apo_bench.cli import main
 from apo_bench.errors import InputError
@@ -94,11 +95,28 @@ def test_the_distribution_is_what_is_drawn(split: Split) -> None:
 def test_too_few_estimates_and_perfect_ones_are_refused(tmp_path: Path) -> None:
     made = made_of.draw(100, Known(missed=0.0, outliers=0.0), np.random.default_rng(0))
     truth = made_of.results(tmp_path / "truth.csv", made.where, made.R, made.t)
-    with pytest.raises(InputError, match="the estimates are the truth itself"):
+    with pytest.raises(InputError, match="the places that were estimated are the true ones, or nearly"):
         fit(compared_files(truth, truth), "")
+    unturned = made_of.results(tmp_path / "unturned.csv", made.where, made.R, made.t_seen)
+    with pytest.raises(InputError, match="the rotations that were estimated are the true ones, or nearly"):
+        fit(compared_files(unturned, truth), "")
     few = made_of.results(tmp_path / "few.csv", made.where[:20], made.R_seen[:20], made.t_seen[:20])
     with pytest.raises(InputError, match="20 of 100 parts have an estimate within 50 mm; at least 30 are needed"):
         fit(compared_files(few, truth), "")
+
+
+def test_errors_in_one_direction_only_can_be_fitted_read_and_drawn(tmp_path: Path) -> None:
+    """A scale at its bound is written and read again."""
+    made = made_of.draw(200, Known(outliers=0.0), np.random.default_rng(0))
+    shift = made.shift * [0.0, 0.0, 1.0]
+    t = made.t + np.einsum("nij,nj->ni", made_of.ray_frames(made.t), shift)
+    found = compared_files(*made_of.files(tmp_path, made._replace(t_seen=t)))
+    measured = fit(found, "")
+    assert measured.shift_mm.across.scale < 0.006
+    path = tmp_path / "noise.toml"
+    path.write_text(noise_text(measured), encoding="utf-8")
+    assert_allclose([*read_noise(path)[0].shift_mm.along], [*measured.shift_mm.along], rtol=1e-4)
+    draw_fit(found, measured, tmp_path / "fit.png")
 
 
 @pytest.fixture(scope="module")

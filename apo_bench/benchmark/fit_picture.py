@@ -46,7 +46,7 @@ def draw_fit(residuals: Residuals, measured: Measured, path: Path) -> None:
 
 
 def _histogram(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
-    top = min(limit, float(np.quantile(sizes, SHOWN)) * 1.05)
+    top = min(limit, max(float(np.quantile(sizes, SHOWN)) * 1.05, 1e-3 * limit))
     edges = np.linspace(0.0, top, BINS + 1)
     axis.hist(sizes, edges, weights=np.full(len(sizes), BINS / (top * len(sizes))), color=SEEN, label="seen")
     fine = np.linspace(0.0, top, 401)

@@ -48,15 +48,15 @@ def fit(residuals: Residuals, source: str) -> Measured:
     far = residuals.off_mm[found & ~inlier]
     return Measured(
         source=source,
-        shift_mm=fit_split(residuals.shift_mm[inlier], INLIER_MM),
-        turn_deg=fit_split(residuals.turn_deg[upright], TURNED_DEG),
+        shift_mm=fit_split(residuals.shift_mm[inlier], INLIER_MM, "places"),
+        turn_deg=fit_split(residuals.turn_deg[upright], TURNED_DEG, "rotations"),
         missed=float(1.0 - found.mean()),
         outliers=float(1.0 - inlier.sum() / found.sum()),
         farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
     )
 
 
-def fit_split(errors: Array, limit: float) -> Split:
+def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
     """The scales and degrees of freedom under which errors (n, 3), all within the limit, are most likely.
 
     The likelihood is that of the limited distribution, so what is missing beyond the limit is no sign of short tails.
@@ -66,7 +66,7 @@ def fit_split(errors: Array, limit: float) -> Split:
     r, x = np.linalg.norm(errors[:, :2], axis=1), errors[:, 2]
     if max(np.median(r), np.median(np.abs(x))) <= SMALLEST * limit:
         raise InputError(
-            "the estimates are the truth itself, or nearly: half of the errors are below "
+            f"the {name} that were estimated are the true ones, or nearly: half of them are off by less than "
             f"{SMALLEST * limit:g}; give the estimates of an estimator."
         )
 
