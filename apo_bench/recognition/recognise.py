@@ -4,8 +4,8 @@ Operation by operation, faces of the parts that moved are held against faces of 
 candidate if its normals are opposite within an angle, its gap is small and its overlap large enough. Noise moves whole
 parts, so the contacts of an operation are not judged one by one: the likeliest is believed, the goals are put where
 that one closes, and the others are looked at from there. Where that leaves candidates over, other beginnings are tried
-and the set wins that holds most contacts (joint compatibility: Neira and Tardos, "Data association in stochastic
-mapping using the joint compatibility test", 2001).
+and the likeliest set wins (joint compatibility: Neira and Tardos, "Data association in stochastic mapping using the
+joint compatibility test", 2001).
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class _Around:
         return _Found(self.candidates(belief), belief, 0.0, ())
 
     def likeliest(self, belief: Belief) -> _Found:
-        """The set of contacts that go together and are most, then fit best."""
+        """The contacts that go together: of all beginnings, the set with the least score."""
         best = self._followed(belief, None)
         for first in best.left[:BEGINNINGS]:
             other = self._followed(belief, first)
