@@ -49,10 +49,10 @@ TABLE = """
 ## What `contact` makes of them
 
 {trials} observations of the nominal {scenario} at level 1, of measured noise as measured, without carelessness.
-*Whole*: every operation was seen, else nothing is corrected. *Test fails*: of those for which consistent goals were
-found near what was seen, how often the chi-square test, at a level of {level:g} %, says that the stated noise does not explain the
-correction. All relations are right, so that is a false alarm, or an outlier that was noticed. *Error*: root mean square
-of the positions of goals per axis, as seen and corrected, of the same observations.
+*Whole*: every operation was seen, else nothing is corrected. *Test fails*: of those for which consistent goals
+were found near what was seen, how often the chi-square test, at a level of {level:g} %, says that the stated noise
+does not explain the correction. All relations are right, so that is a false alarm, or an outlier that was noticed.
+*Error*: root mean square of the positions of goals per axis, as seen and corrected, of the same observations.
 
 | noise | whole | test fails | error seen | corrected |
 |---|---|---|---|---|
