@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from apo_bench import __version__, cli_correction, cli_noise, cli_plan, cli_recognition, cli_show
+from apo_bench import __version__, cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show
 from apo_bench.arguments import check_writable, cores, numbers, path_given, words
 from apo_bench.errors import InputError
 
@@ -139,7 +139,7 @@ def graph(
             typer.echo(f"\nWrote {out}")
 
 
-for commands in (cli_correction, cli_noise, cli_plan, cli_recognition, cli_show):
+for commands in (cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show):
     commands.register(app)
 
 

@@ -44,6 +44,8 @@ class Event:
     """How much of what appeared each model explains."""
     found: Located | None
     """Where the main part is now; None if nothing was recognised."""
+    shape: Shape | None
+    """What was fitted, in the frame of its main part; None if it is not known what moved."""
     operation: int | None
     """Which operation this was, counted from 0; None if none that was expected."""
 
@@ -79,7 +81,8 @@ def follow(images: Sequence[Array], finder: RangeFinder, level_m: float, expecte
             break
         last, which, compared, moved = spell
         seen = Appearance(finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m)
-        shares, found = _recognised(expected, shapes, believed, which, seen)
+        group = None if which is None else _moved(assembly, shapes, believed, which)
+        shares, found = _recognised(expected, shapes, group, which, seen)
         if which is not None and found is not None:
             operation = assembly.operations[which]
             T = nearest(found.T, symmetries(assembly.solids[operation.main]), frame @ expected.turns[which])
@@ -90,7 +93,7 @@ def follow(images: Sequence[Array], finder: RangeFinder, level_m: float, expecte
             step = T @ pose.inverse(believed[operation.main])
             believed |= {part: step @ believed[part] for part in operation.moves}
         k = k + 1 if which is None else which + 1
-        events.append(Event(first, last, compared, moved, shares, found, which))
+        events.append(Event(first, last, compared, moved, shares, found, group and group.shape, which))
         first = last
     return tuple(events)
 
@@ -145,7 +148,7 @@ def _posed(shape: Shape, T: Array) -> Shape:
 
 
 def _recognised(
-    expected: Expected, shapes: Mapping[str, Shape], believed: Poses, which: int | None, seen: Appearance
+    expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, seen: Appearance
 ) -> tuple[Mapping[str, float], Located | None]:
     """How much each model explains, and where the one that moved is, if none explains more."""
     assembly = expected.assembly
@@ -155,18 +158,25 @@ def _recognised(
             models[part] = Model(shapes[part], symmetries(solid))
     points = seen.points()
     shares = dict(rivals(models, seen, points))
-    if which is None:
+    if which is None or group is None:
         return shares, None
-    operation = assembly.operations[which]
-    group = Model(shapes[operation.main], symmetries(assembly.solids[operation.main]))
-    if operation.carries:
-        back = pose.inverse(believed[operation.main])
-        together = joined(_posed(shapes[part], back @ believed[part]) for part in operation.moves)
-        group = Model(together, np.eye(4)[None], main=len(group.shape.center))
     found = located(group, seen, points)
+    if found is not None and len(assembly.operations[which].moves) > 1:
+        shares["+".join(assembly.operations[which].moves)] = found.explained
     if found is None or found.explained < max(shares.values()) - ALIKE:
         return shares, None
     return shares, found
+
+
+def _moved(assembly: Assembly, shapes: Mapping[str, Shape], believed: Poses, which: int) -> Model:
+    """What an operation moves, as one rigid thing."""
+    operation = assembly.operations[which]
+    alone = shapes[operation.main]
+    if not operation.carries:
+        return Model(alone, symmetries(assembly.solids[operation.main]))
+    back = pose.inverse(believed[operation.main])
+    together = joined(_posed(shapes[part], back @ believed[part]) for part in operation.moves)
+    return Model(together, np.eye(4)[None], main=len(alone.center))
 
 
 def _alike(a: Shape, b: Shape) -> bool:

@@ -26,6 +26,8 @@ class Watched:
     images: tuple[RangeImage, ...]
     times_s: tuple[float, ...]
     """Simulated time of each firing."""
+    pictures: tuple[Array, ...]
+    """What the TV camera saw then, without noise, (height, width), black 0 to white 1."""
 
 
 @final
@@ -51,6 +53,7 @@ class Watcher:
         self._spell: list[tuple[float, Array]] = []
         self._images: list[RangeImage] = []
         self._times: list[float] = []
+        self._pictures: list[Array] = []
         self._drawn: tuple[Array, Array] | None = None
 
     def __call__(self, data: Any) -> None:
@@ -65,16 +68,18 @@ class Watcher:
     def watched(self) -> Watched:
         """What was kept, when the demonstration is over."""
         self._keep(np.inf)
-        return Watched(self.finder, tuple(self._images), tuple(self._times))
+        return Watched(self.finder, tuple(self._images), tuple(self._times), tuple(self._pictures))
 
     def _picture(self, qpos: Array) -> Array:
         """The next picture of the TV camera; where nothing moved only its noise is new."""
         if self._drawn is None or np.abs(qpos - self._drawn[0]).max() > STILL:
-            self._sight.look(qpos)
-            grey = self.camera.brightness(self._sight.strike(self.camera.view), self._rgba)
-            self._drawn = np.array(qpos), grey
+            self._drawn = np.array(qpos), self._grey(qpos)
         grey = self._drawn[1]
         return np.asarray(grey + self.camera.noise * self._rng.standard_normal(len(grey)))
+
+    def _grey(self, qpos: Array) -> Array:
+        self._sight.look(qpos)
+        return self.camera.brightness(self._sight.strike(self.camera.view), self._rgba)
 
     def _keep(self, until_s: float) -> None:
         """Of the firings of a quiet spell that is over, the last one before a motion could have begun counts."""
@@ -84,6 +89,7 @@ class Watcher:
         self._spell.clear()
 
     def _fire(self, time_s: float, qpos: Array) -> None:
-        self._sight.look(qpos)
+        view = self.camera.view
+        self._pictures.append(self._grey(qpos).reshape(view.height, view.width))
         self._images.append(self._sight.range_image(self.finder))
         self._times.append(time_s)
