@@ -42,13 +42,13 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["scene"] += 1
         return SimpleNamespace(scenario=scenario, arm=SimpleNamespace(mjcf=runner.find_arm("six_axis").mjcf))
 
-    def show(scene: Any, careless: float, seed: int) -> str:
+    def show(scene: Any, careless: float, seed: int, eye: str) -> str:
         did["demonstration"] += 1
-        return f"{scene.scenario.name} {careless} {seed}"
+        return f"{scene.scenario.name} {careless} {seed} {eye}"
 
     def run_trial(spec: Any, scene: Any, *, shown: str, content: str) -> dict[str, Any]:
         did["trial"] += 1
-        assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed}"
+        assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
         names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "noise", "relations", "method")
         return {"schema": ROW, **dict(zip(names, key, strict=True)), "success": spec.seed % 2 == 0}
@@ -283,3 +283,22 @@ def wait_for(true: Callable[[], bool], seconds: float = 60.0) -> None:
     while not true():
         assert time.monotonic() < end, "waited in vain"
         time.sleep(0.1)
+
+
+def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp_path: Path) -> None:
+    spec = replace(SPEC, eyes=("noise", "range"), noises=("isotropic", "camera"), methods=("oracle", "none"))
+    loaded = load_all(spec)
+    trials = [trial for unit in units(spec, loaded) for trial in unit.trials]
+    seen = Counter((t.eye, t.noise, t.level_deg > 0.0) for t in trials if t.method == "none" and t.level_mm > 0.0)
+    assert set(seen) == {("noise", "isotropic", True), ("noise", "camera", True), ("range", "range", False)}
+    assert len(set(seen.values())) == 1
+    assert {(t.eye, t.noise) for t in trials if t.method == "oracle"} == {("noise", "isotropic")}
+    rows = runner.sweep(spec, tmp_path / "eyes")
+    assert len(rows) == len(trials) == len({row_key(row) for row in rows})
+    per_careless = {(t.scenario, t.seed, t.careless, t.eye) for t in trials}
+    assert counted["demonstration"] == len(per_careless)
+
+
+def test_there_is_no_such_eye() -> None:
+    with pytest.raises(InputError, match="telescope"):
+        replace(SPEC, eyes=("noise", "telescope"))
