@@ -45,7 +45,7 @@ def draw_eye(seen: Seen, out: Path, view: int = 0) -> None:
     for axes in rows[:, 1:].ravel():
         _crop(axes, events, view)
     try:
-        figure.savefig(out, dpi=90)
+        figure.savefig(out, dpi=72)
     except OSError as error:
         raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
 
@@ -62,8 +62,8 @@ def _label(assembly: Assembly, event: Event) -> str:
 def _crop(axes: Any, events: Sequence[Event], view: int) -> None:
     """Show only where anything ever changed."""
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
-    v, u = np.nonzero(np.any(changed, axis=0)) if changed else ((), ())
-    if len(v):
+    if np.any(changed):
+        v, u = np.nonzero(np.any(changed, axis=0))
         axes.set_xlim(u.min() - AROUND, u.max() + AROUND)
         axes.set_ylim(v.max() + AROUND, v.min() - AROUND)
 
