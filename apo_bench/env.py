@@ -13,8 +13,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
-from apo_bench.benchmark.spec import check_careless, check_clearance, check_seed, level_pair
-from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, foretold, misshown, see, show, unseen
+from apo_bench.benchmark.spec import RANGE, check_careless, check_clearance, check_eye, check_seed, level_pair
+from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, foretold, misshown, see, show, through, unseen
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -83,6 +83,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
     - `careless`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
     - `noise`: a noise model by name, as `module:name`, or the object.
+    - `eye`: `noise`, or `range`: poses are measured in depth images; `level` is then the noise of a ray in mm, and
+      there is no noise model.
     - `grasp`: `friction`, or `weld` for an ideal gripper.
     - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
     - `arm`: by name, or an `Arm`.
@@ -106,6 +108,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         clearance_mm: float | None = None,
         arm: str | Arm = "six_axis",
         timestep_s: float = 0.001,
+        eye: str = "noise",
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -115,7 +118,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             check_clearance(clearance_mm)
         self.render_mode = render_mode
         self._careless = careless
-        self._noise: Noise = make_noise(noise, Level(*level_pair(level)))
+        check_eye(eye)
+        self._eye, self._level = eye, Level(*level_pair(level))
+        self._noise: Noise = make_noise(noise, self._level)
         self._scene = build_scene(
             load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
         )
@@ -166,7 +171,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             check_seed(int(seed))
         super().reset(seed=seed)
         trial, shown = self._watch_human(seed)
-        self._shown, self._seen = shown, see(self._scene, shown, self._noise, trial)
+        noise = through(self._scene, shown, self._level.mm) if self._eye == RANGE else self._noise
+        self._shown, self._seen = shown, see(self._scene, shown, noise, trial)
         self.aim(self._seen.goals)
         self._refused, self._over = unseen(self._seen), False
         self._poses, self._state = shown.layout.start, None
@@ -235,7 +241,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         """Trial `seed`, or the next one whose demonstration is right."""
         for _ in range(1 if seed is not None else MOST_TRIES):
             trial = int(seed) if seed is not None else self._next_trial()
-            shown = show(self._scene, self._careless, trial)
+            shown = show(self._scene, self._careless, trial, self._eye)
             if seed is not None or shown.demonstration.code == "ok":
                 return trial, shown
         raise InputError(

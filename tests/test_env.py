@@ -264,9 +264,9 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
 
     real, calls = module.show, []
 
-    def fails_at_first(scene: Any, careless: float, seed: int) -> Any:
+    def fails_at_first(scene: Any, careless: float, seed: int, eye: str) -> Any:
         calls.append(seed)
-        shown = real(scene, careless, seed)
+        shown = real(scene, careless, seed, eye)
         if len(calls) > 1:
             return shown
         return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
@@ -294,10 +294,24 @@ def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
         env.reset()
 
 
+def test_poses_may_be_measured_in_depth_images() -> None:
+    env = APOReplay(eye="range", level=1.0)
+    first, _ = env.reset(seed=SEED)
+    again, _ = env.reset(seed=SEED)
+    drawn, _ = APOReplay(level=1.0).reset(seed=SEED)
+    for key, x in first.items():
+        np.testing.assert_array_equal(x, again[key])
+    assert first["seen"].all()
+    off = np.linalg.norm(first["goals"][:, :3] - APOReplay(level=0.0).reset(seed=SEED)[0]["goals"][:, :3], axis=1)
+    assert (off < 2e-3).all()
+    assert not np.array_equal(first["goals"], drawn["goals"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ({"scenario": "stick_in_towr"}, "did you mean 'stick_in_tower'"),
+        ({"eye": "rang"}, "did you mean 'range'"),
         ({"level": -1}, "level in mm of -1"),
         ({"level": (1, 2, 3)}, "a pair of mm and degrees"),
         ({"careless": float("nan")}, "carelessness of nan"),
