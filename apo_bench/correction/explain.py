@@ -226,14 +226,6 @@ def _reach(word: ODL, stack: Array, constants: int, B: Array) -> Array:
     for k, inverse in reversed(word):
         behind = pose.inverse(stack[k]) @ behind if inverse else behind
         if k >= constants:
-            found[k - constants] += (-1.0 if inverse else 1.0) * _adjoint(pose.inverse(behind)) @ B[k - constants]
+            found[k - constants] += (-1.0 if inverse else 1.0) * pose.adjoint(pose.inverse(behind)) @ B[k - constants]
         behind = behind if inverse else stack[k] @ behind
     return np.concatenate(found, axis=1)
-
-
-def _adjoint(T: Array) -> Array:
-    """Ad(T), (6, 6): T exp(xi) T^-1 = exp(Ad(T) xi)."""
-    A = np.zeros((6, 6))
-    A[:3, :3] = A[3:, 3:] = T[:3, :3]
-    A[:3, 3:] = pose.hat(T[:3, 3]) @ T[:3, :3]
-    return A

@@ -48,11 +48,11 @@ class Belief:
         reach = {part: np.zeros((6, 6 * n)) for part in poses}
         for i, (operation, T) in enumerate(zip(self.assembly.operations[: k + 1], self.goals, strict=False)):
             own = np.zeros((6, 6 * n))
-            own[:, 6 * i : 6 * i + 6] = adjoint(T)
+            own[:, 6 * i : 6 * i + 6] = pose.adjoint(T)
             by = T @ pose.inverse(poses[operation.main])
             for part in operation.carries:
                 poses[part] = by @ poses[part]
-                reach[part] = own + adjoint(by) @ (reach[part] - reach[operation.main])
+                reach[part] = own + pose.adjoint(by) @ (reach[part] - reach[operation.main])
             poses[operation.main], reach[operation.main] = T, own
         return Standing(poses, reach)
 
@@ -75,11 +75,3 @@ def believed(seen: Observation) -> Belief:
     covariance = np.zeros((n, 6, n, 6))
     covariance[np.arange(n), :, np.arange(n)] = seen.covariance
     return Belief(seen.assembly, seen.start, seen.goals, covariance.reshape(6 * n, 6 * n))
-
-
-def adjoint(T: Array) -> Array:
-    """Ad(T), (6, 6): T exp(xi) = exp(Ad(T) xi) T."""
-    A = np.zeros((6, 6))
-    A[:3, :3] = A[3:, 3:] = T[:3, :3]
-    A[:3, 3:] = pose.hat(T[:3, 3]) @ T[:3, :3]
-    return A

@@ -23,7 +23,7 @@ class Rules:
     """What counts as a contact."""
 
     miss: float = 1e-4
-    """How often the noise may hide one face contact: 20 of them, tested three ways, are then all found 99.4 % of the time."""
+    """How often the noise may hide one face contact: 20, tested three ways, are then all found 99.4 % of the time."""
     gap_m: float = 10e-3
     """No gap beyond this is believed to be noise; with `fixed`, the threshold itself."""
     angle_rad: float = math.radians(20.0)
@@ -38,7 +38,7 @@ class Rules:
             given = getattr(self, name)
             if not (isinstance(given, int | float) and 0.0 < given < high):
                 raise InputError(
-                    f"{name}={given!r} was given as a rule of recognition; a number above 0 and below {high:g} is allowed."
+                    f"{name}={given!r} was given as a rule of recognition; above 0 and below {high:g} is allowed."
                 )
 
     @property
