@@ -1,7 +1,7 @@
 """Does a robot's replay of an observed assembly fit, with and without correction by face contacts?
 
 Importing the package registers `APOReplay-v0` with Gymnasium and does nothing else; what needs MuJoCo is imported
-by `gymnasium.make`. Without a simulator: `read_observation`, `correct`, `correct_many` and `explain`.
+by `gymnasium.make`. Without a simulator: `read_observation`, `recognise`, `correct`, `correct_many` and `explain`.
 """
 
 from __future__ import annotations
