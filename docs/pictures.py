@@ -9,15 +9,15 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
-import numpy as np
 
+from apo_bench.benchmark.believed_picture import belief, draw_beliefs
 from apo_bench.benchmark.stages import attempt, see, show
 from apo_bench.correction.correct import correct
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.program import Plan
 from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.render import Film, picture, view
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.simulation.render import Film, view
+from apo_bench.simulation.scene import build_scene
 
 HERE = Path(__file__).parent / "pictures"
 SEED, LEVEL = 7, 2.0
@@ -41,7 +41,8 @@ def main() -> None:
         _strip(
             HERE / f"{name}.png", film, f"{title}: {'right' if tried.verdict.success else tried.result.outcome.code}"
         )
-    _believed(HERE / "believed.png", scene, seen.goals, corrected, center)
+    panels = [belief("as seen", seen, seen.goals, 3), belief("corrected by paper", seen, corrected, 3)]
+    draw_beliefs(scene.scenario, 3, panels, HERE / "believed.png")
 
 
 def _strip(path: Path, film: Film, title: str) -> None:
@@ -54,19 +55,6 @@ def _strip(path: Path, film: Film, title: str) -> None:
         axis.set_title(caption, fontsize=11)
         axis.axis("off")
     figure.suptitle(title, fontsize=13)
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
-
-
-def _believed(path: Path, scene: Scene, seen: np.ndarray, corrected: np.ndarray, center: np.ndarray) -> None:
-    """What the numbers say, drawn: Fig. 9 of the paper."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
-    parts = [operation.main for operation in scene.scenario.assembly.operations]
-    for axis, goals, title in zip(axes, (seen, corrected), ("as seen", "corrected"), strict=True):
-        camera = view(center, 0.26, 196.0, -8.0)
-        axis.imshow(picture(scene, dict(zip(parts, goals, strict=True)), 560, 440, camera))
-        axis.set_title(f"What is believed: {title}")
-        axis.axis("off")
     figure.savefig(path, dpi=90)
     plt.close(figure)
 

@@ -18,7 +18,7 @@ from apo_bench.program import Observation, Poses
 from apo_bench.scenario import Scenario
 
 WIDTH, HEIGHT, LINE_PX = 620, 480, 20
-NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.06, 0.85, 38.0, -24.0
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
 MOST_LINES = 6
 
 
@@ -63,8 +63,9 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
     from apo_bench.simulation.scene import build_scene
 
     scene = build_scene(scenario)
-    moved = dict.fromkeys(part for o in scenario.assembly.operations[:step] for part in o.moves)
-    camera = _camera(scenario, beliefs[0].poses, tuple(moved))
+    last = scenario.assembly.operations[step - 1]
+    near = dict.fromkeys([*last.moves, *(c.environment.part for c in last.contacts)])
+    camera = _camera(scenario, beliefs[0].poses, tuple(part for part in near if part not in scenario.assembly.fixed))
     lines = min(MOST_LINES, max(len(b.open) for b in beliefs)) + 1
     below, width = LINE_PX * lines + 8, WIDTH * len(beliefs)
     height = HEIGHT + below + 56
@@ -97,7 +98,7 @@ def _below(one: Belief) -> list[str]:
 
 
 def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
-    """One that sees all parts that were moved, obliquely to the assembly."""
+    """One that sees what the last operation was about, obliquely to the assembly."""
     from apo_bench.simulation.render import view
 
     boxes = {part: scenario.assembly.solids[part].boxes for part in parts}
