@@ -67,9 +67,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
     everything = {}
-    print(
-        "| scenario | level | found | mm: median, 90 %, most | deg: median, 90 %, most | chi-square / 6 | moved, noticed |"
-    )
+    print("| scenario | level | found | mm: median, 90 %, most | deg: the same | chi-square / 6 | moved, noticed |")
     print("|---|---|---|---|---|---|---|")
     for name in args.scenarios:
         scene = build_scene(load_scenario(name))

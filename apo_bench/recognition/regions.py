@@ -17,8 +17,8 @@ DEVIATIONS = 6.0
 """So many standard deviations of the smoothed difference are no change either."""
 SMOOTHED = 0.46
 """Standard deviation of the median of three medians of three numbers over that of one."""
-LEAST_PIXELS = 40
-"""Regions that are smaller are edges of something that moved a little, or noise."""
+LEAST_PIXELS, LEAST_WIDTH = 40, 5
+"""Regions that are smaller, or hold no square of so many pixels, 14 mm, are edges of something that moved a little."""
 
 
 class Regions(NamedTuple):
@@ -35,15 +35,16 @@ class Regions(NamedTuple):
 def regions(before: Array, after: Array, noise_m: float) -> Regions:
     """Compare two range images (height, width) of one view, NaN where nothing was measured, [m].
 
-    Lines that are one or two pixels wide are opened away: they are the edges of parts that were moved by less than a
-    pixel or two, which go unnoticed, as they did for the range finder of the paper.
+    Lines that are few pixels wide are dropped: they are the edges of parts that were moved a little, which go
+    unnoticed, as they did for the range finder of the paper.
 
     Args:
         noise_m: Standard deviation of one value of one image.
     """
     from scipy.ndimage import binary_opening
 
-    difference = after - before
+    with np.errstate(invalid="ignore"):
+        difference = after - before
     change = smoothed(np.where(np.isfinite(difference), difference, 0.0))
     least = max(LEAST_M, DEVIATIONS * SMOOTHED * np.sqrt(2.0) * noise_m)
     square = np.ones((3, 3), dtype=np.bool_)
@@ -62,11 +63,14 @@ def _median(a: Array, b: Array, c: Array) -> Array:
     return np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
 
 
-def large(mask: Mask, least: int = LEAST_PIXELS) -> Mask:
-    """A mask without its small components."""
-    from scipy.ndimage import label
+def large(mask: Mask) -> Mask:
+    """A mask without its small and its thin components."""
+    from scipy.ndimage import binary_erosion, label
 
     names, n = label(mask)
     size = np.bincount(names.ravel(), minlength=n + 1)
-    size[0] = 0
-    return np.asarray(size[names] >= least)
+    thick = np.zeros(n + 1, dtype=np.bool_)
+    thick[names[binary_erosion(mask, np.ones((LEAST_WIDTH, LEAST_WIDTH), dtype=np.bool_))]] = True
+    kept = thick & (size >= LEAST_PIXELS)
+    kept[0] = False
+    return np.asarray(kept[names])

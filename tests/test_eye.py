@@ -1,0 +1,214 @@
+"""The range finder in the simulation: it changes nothing, sees no hands, waits for quiet, recognises, locates."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.benchmark.spec import TrialSpec
+from apo_bench.benchmark.stages import OBSERVATION, Shown, see, show, stream, through
+from apo_bench.benchmark.trial import run_trial
+from apo_bench.cli import main
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.program import Observation
+from apo_bench.recognition.distance import joined, shape_of, struck
+from apo_bench.recognition.range_eye import RangeEye
+from apo_bench.recognition.range_finder import RangeFinder
+from apo_bench.recognition.symmetry import symmetries
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.eye.rays import Sight
+from apo_bench.simulation.eye.tv import Change, TvCamera
+from apo_bench.simulation.hands import Hands
+from apo_bench.simulation.scene import Scene, build_scene
+
+TWO = ("stick_in_tower", "carried_bridge")
+
+
+@cache
+def scene(name: str) -> Scene:
+    return build_scene(load_scenario(name))
+
+
+@cache
+def watched(name: str, seed: int = 3) -> Shown:
+    return show(scene(name), 1.0, seed, "range")
+
+
+def observed(name: str, level_mm: float, seed: int = 3) -> Observation:
+    shown = watched(name, seed)
+    return see(scene(name), shown, through(scene(name), shown, level_mm), seed)
+
+
+def errors(name: str, seen: Observation, seed: int = 3) -> Array:
+    """Body twists, (n, 6), by which seen goals are away from shown ones, [mm, deg]."""
+    xi = pose.log(pose.inverse(seen.goals) @ watched(name, seed).demonstration.goals)
+    return np.hstack([1e3 * xi[:, :3], np.degrees(xi[:, 3:])])
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_being_watched_changes_nothing(name: str) -> None:
+    alone, seen = show(scene(name), 1.0, 3).demonstration, watched(name).demonstration
+    assert alone.goals.tobytes() == seen.goals.tobytes()
+    assert {part: T.tobytes() for part, T in alone.final.items()} == {
+        part: T.tobytes() for part, T in seen.final.items()
+    }
+
+
+def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
+    built = scene("stick_in_tower")
+    start = watched("stick_in_tower").layout.start
+    hands, finder = Hands(built.shown, start), RangeFinder()
+    hands.grab(0, "castle1")
+    sight = Sight(built.shown)
+    sight.look(hands.data.qpos)
+    image = sight.range_image(finder)
+    solids, play = built.scenario.assembly.solids, 1e-3 * built.clearance_mm
+    whole = joined(shape_of(physical_boxes(solids[part], play), start[part]) for part in solids)
+    for view, distance in zip(finder.views, image.distance, strict=True):
+        expected = struck(whole, view.origin, view.rays)[0].reshape(distance.shape)
+        both = np.isfinite(expected)
+        assert (np.isfinite(distance) == both).mean() > 0.9999
+        both &= np.isfinite(distance)
+        assert (np.abs(distance[both] - expected[both]) < 1e-9).mean() > 0.999  # rays along an edge may go either way
+    assert (image.cosine >= 0.0).all()
+    assert image.cosine.max() <= 1.0 + 1e-12
+
+
+def test_it_is_quiet_only_when_nothing_changes_for_a_while() -> None:
+    camera = TvCamera()
+    change, rng = Change(camera), np.random.default_rng(0)
+    plain = np.full(camera.view.width * camera.view.height, 0.5)
+    moved = np.array(plain)
+    moved[:40] += 0.2
+    nudged = np.array(plain)
+    nudged[:4] += 0.2
+
+    def quiet(picture: Array, k: int) -> bool:
+        return change.quiet(picture + camera.noise * rng.standard_normal(len(picture)), k * camera.period_s)
+
+    pictures = [plain] * 6 + [moved] * 6 + [moved + nudged - plain] * 3
+    assert [quiet(picture, k) for k, picture in enumerate(pictures)] == [False] * 3 + [True] * 3 + [False] * 3 + [
+        True
+    ] * 6
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_images_are_of_parts_at_rest(name: str) -> None:
+    """Without noise every pose is that at which the hand had let go, so firings are neither early nor late."""
+    seen = observed(name, 0.0)
+    assert seen.seen.all()
+    off = errors(name, seen)
+    assert np.abs(off[:, :3]).max() < 0.02
+    assert np.abs(off[:, 3:]).max() < 0.02
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> None:
+    seen = observed(name, 1.0)
+    off = errors(name, seen)
+    assert seen.seen.all()
+    assert np.median(np.linalg.norm(off[:, :3], axis=1)) < 0.5
+    assert np.median(np.linalg.norm(off[:, 3:], axis=1)) < 1.0
+    eigenvalues = np.linalg.eigvalsh(seen.covariance)
+    assert (eigenvalues > 0.0).all()
+
+
+def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
+    one, again, two = (observed("stick_in_tower", level) for level in (1.0, 1.0, 2.0))
+    assert one.goals.tobytes() == again.goals.tobytes()
+    assert one.covariance.tobytes() == again.covariance.tobytes()
+    assert (one.goals != two.goals).any()
+    assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
+    fresh = show(scene("stick_in_tower"), 1.0, 3, "range").watched
+    known = watched("stick_in_tower").watched
+    assert fresh is not None
+    assert known is not None
+    assert fresh.times_s == known.times_s
+    for a, b in zip(fresh.images, known.images, strict=True):
+        assert a.distance.tobytes() == b.distance.tobytes()
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_small_motion_of_castle_2_stays_unnoticed(seed: int) -> None:
+    shown = watched("stick_in_tower", seed)
+    moved = (shown.demonstration.final["castle2"] - shown.demonstration.goals[1])[:3, 3]
+    assert 1.4 < 1e3 * np.linalg.norm(moved) < 4.1
+    eye = through(scene("stick_in_tower"), shown, 1.0)
+    events = eye.events(shown.demonstration, eye.sensed(stream(seed, OBSERVATION)))
+    assert [event.moved for event in events] == [{"castle1"}, {"castle2"}, {"stick"}]
+    seen = observed("stick_in_tower", 1.0, seed)
+    away = (seen.goals[1] - shown.demonstration.goals[1])[:3, 3]
+    assert 1e3 * np.linalg.norm(away) < 0.5
+
+
+def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
+    """The scene shows a stick where the topology expects a second cube-like block to arrive."""
+    shown = watched("stick_in_tower")
+    assembly = shown.demonstration.assembly
+    short = replace(assembly.solids["stick"], boxes=assembly.solids["castle1"].boxes)
+    wrong = replace(assembly, solids={**assembly.solids, "stick": short})
+    eye = through(scene("stick_in_tower"), shown, 1.0)
+    seen = eye(wrong, replace(shown.demonstration, assembly=wrong), stream(3, OBSERVATION))
+    assert seen.seen.tolist() == [True, True, False]
+    assert seen.covariance[2][0, 0] > 0.005
+    assert np.array_equal(seen.goals[2], shown.layout.start["stick"])
+
+
+def test_an_operation_that_no_image_shows_is_not_seen() -> None:
+    shown = watched("stick_in_tower")
+    eye = through(scene("stick_in_tower"), shown, 1.0)
+    blind = RangeEye(eye.finder, eye.images[:2], eye.level_m, eye.turns, eye.play_m)
+    seen = see(scene("stick_in_tower"), shown, blind, 3)
+    assert seen.seen.tolist() == [True, False, False]
+    none = RangeEye(eye.finder, eye.images[:1], eye.level_m, eye.turns, eye.play_m)
+    assert not see(scene("stick_in_tower"), shown, none, 3).seen.any()
+
+
+def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
+    shown = watched("stick_in_tower")
+    eye = through(scene("stick_in_tower"), shown, 1.0)
+    S = symmetries(shown.demonstration.assembly.solids["stick"])[3]
+    turned = np.array(eye.turns)
+    turned[2] = turned[2] @ S[:3, :3]
+    other = replace(eye, turns=turned)
+    a, b = (e(shown.demonstration.assembly, shown.demonstration, stream(3, OBSERVATION)) for e in (eye, other))
+    assert np.array_equal(a.goals[:2], b.goals[:2])
+    assert b.goals[2] == pytest.approx(a.goals[2] @ S, abs=1e-9)
+    assert sorted(np.linalg.eigvalsh(b.covariance[2])) == pytest.approx(
+        sorted(np.linalg.eigvalsh(a.covariance[2])), rel=1e-6
+    )
+
+
+def test_a_trial_through_the_range_finder() -> None:
+    spec = TrialSpec("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
+    row = run_trial(spec, scene("stick_in_tower"), shown=watched("stick_in_tower"))
+    assert row["eye"] == "range"
+    assert row["success"] is True
+
+
+def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "eye.png"
+    assert main(["eye", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
+    form = json.loads(capsys.readouterr().out)
+    assert form["schema"] == "apo-bench/eye/1"
+    assert [operation["found"] for operation in form["operations"]] == [True, True]
+    assert all(operation["error_mm"] < 1.0 for operation in form["operations"])
+    assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [["--level", "-1"], ["--seed", "-1"], ["--view", "3"], ["--out", "eye.txt"], ["--careless", "nan"]],
+)
+def test_wrong_requests_end_in_one_sentence(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["eye", "block_on_block", *wrong]) == 2
+    said = capsys.readouterr().err.strip()
+    assert said
+    assert "Traceback" not in said
