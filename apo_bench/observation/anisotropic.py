@@ -12,7 +12,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
 
 ELEVATION_DEG, AZIMUTH_DEG = 40.0, 25.0

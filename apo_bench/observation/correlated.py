@@ -13,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
 
 CORRELATION = 0.9

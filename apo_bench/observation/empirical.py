@@ -16,7 +16,7 @@ from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.fitted import UNITS, check_level, reported
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.observation.residuals import Residuals
 from apo_bench.program import Demonstration, Observation
 from apo_bench.strict_csv import Row, read_csv

@@ -15,7 +15,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.observation.outliers import UNKNOWN, last_seen
 from apo_bench.observation.tails import Split
 from apo_bench.program import Demonstration, Observation

@@ -11,7 +11,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.facts import Facts
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
 
 FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)

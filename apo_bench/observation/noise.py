@@ -6,14 +6,17 @@ import inspect
 import math
 from collections.abc import Callable
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
 from apo_bench.errors import InputError
 from apo_bench.names import resolve
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
+
+__all__ = ["NOISES", "Level", "Noise", "make_noise"]
 
 Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 """Any function `(assembly, shown, rng) -> Observation` is a noise model."""
@@ -32,13 +35,6 @@ NOISES = MappingProxyType(
         "symmetric": "apo_bench.observation.symmetric:Symmetric",
     }
 )
-
-
-class Level(NamedTuple):
-    """How much noise: standard deviation per axis."""
-
-    mm: float
-    deg: float
 
 
 def make_noise(given: Any, level: Level) -> Noise:

@@ -12,7 +12,7 @@ from apo_bench.errors import InputError
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.empirical import PREFIX, Empirical, empirical_noise
 from apo_bench.observation.fitted import LEAST_FREEDOM, SMALLEST, Fitted, Measured
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.observation.tails import Split, Tail
 from apo_bench.resources import folder
 from apo_bench.scenario_keys import read_pose

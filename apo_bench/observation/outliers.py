@@ -14,7 +14,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation, Poses
 
 OUTLIERS, MISSES = 0.1, 0.02

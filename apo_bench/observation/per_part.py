@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly import Assembly
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
 
 LEAST, MOST = 0.3, 4.0

@@ -12,7 +12,7 @@ from apo_bench.observation.anisotropic import ACROSS, ALONG, IN_IMAGE, OUT_OF_IM
 from apo_bench.observation.camera import AZIMUTH_DEG, DISTANCE_M, ELEVATION_DEG, MIDDLE_M, Camera
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
 
 

@@ -14,7 +14,7 @@ from apo_bench.geometry.solid import Solid
 from apo_bench.geometry.symmetry import folds, nearest, symmetries
 from apo_bench.observation.facts import Facts
 from apo_bench.observation.isotropic import seen_at
-from apo_bench.observation.noise import Level
+from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
 
 WORSE, MANY = 3.0, 3.0
