@@ -151,20 +151,21 @@ def _recognised(
     expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, seen: Appearance
 ) -> tuple[Mapping[str, float], Located | None]:
     """How much each model explains, and where the one that moved is, if none explains more."""
-    assembly = expected.assembly
+    assembly, points = expected.assembly, seen.points()
+    shares: dict[str, float] = {}
+    found = None
+    if which is not None and group is not None:
+        found = located(group, seen, points)
+        shares["+".join(assembly.operations[which].moves)] = found.explained if found else 0.0
     models: dict[str, Model] = {}
+    known = [] if group is None else [group.shape]
     for part, solid in assembly.solids.items():
-        if part not in assembly.fixed and not any(_alike(shapes[part], m.shape) for m in models.values()):
+        if part not in assembly.fixed and not any(_alike(shapes[part], shape) for shape in known):
             models[part] = Model(shapes[part], symmetries(solid))
-    points = seen.points()
-    shares = dict(rivals(models, seen, points))
-    if which is None or group is None:
-        return shares, None
-    found = located(group, seen, points)
-    if found is not None and len(assembly.operations[which].moves) > 1:
-        shares["+".join(assembly.operations[which].moves)] = found.explained
-    if found is None or found.explained < max(shares.values()) - ALIKE:
-        return shares, None
+            known.append(shapes[part])
+    shares |= rivals(models, seen, points)
+    if found is not None and found.explained < max(shares.values()) - ALIKE:
+        found = None
     return shares, found
 
 

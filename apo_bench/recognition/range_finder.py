@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple, final
 
 import numpy as np
@@ -23,6 +24,7 @@ class RangeImage(NamedTuple):
     """Of the angle between the ray and the normal of what it strikes, 0 (grazing) to 1."""
 
 
+@lru_cache(maxsize=4)
 def two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
     """From the left in front and from the right behind, 45 degrees high: together they see every side of a part.
 

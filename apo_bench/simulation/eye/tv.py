@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import final
 
 import numpy as np
@@ -19,6 +20,7 @@ LUMA = np.array([0.299, 0.587, 0.114])
 BACKGROUND = 0.9
 
 
+@lru_cache(maxsize=1)
 def front_view() -> View:
     """Obliquely from the front, 160 x 120: a pixel is 6 mm wide, and a motion of some millimetres changes few."""
     return View(looking((0.85, -0.35, 0.75), MIDDLE_M), 160, 120, 45.0)

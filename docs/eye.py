@@ -1,0 +1,21 @@
+"""Draw what the range finder saw, stage by stage, as in `apo-bench eye`: `python docs/eye.py` (seconds)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from apo_bench.benchmark.eye_one import see_once
+from apo_bench.benchmark.eye_picture import draw_eye
+
+HERE = Path(__file__).parent
+SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}
+"""Scenario and seed."""
+
+
+def main() -> None:
+    for scenario, seed in SHOWN.items():
+        draw_eye(see_once(scenario, 1.0, seed, 1.0), HERE / "pictures" / f"eye_{scenario}.png")
+
+
+if __name__ == "__main__":
+    main()
