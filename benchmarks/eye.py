@@ -89,9 +89,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
     everything = {}
-    print(
-        "| scenario | level | found | mm: median, 90 %, most | deg | chi-square / 6 | shifted late, noticed, surprises |"
-    )
+    print("| scenario | level | found | mm: median, 90 %, most | deg | chi-square / 6 | shifted, noticed, surprises |")
     print("|---|---|---|---|---|---|---|")
     for name in args.scenarios:
         scene = build_scene(load_scenario(name))
