@@ -16,6 +16,9 @@ ARM_M = 0.04
 """Length by which turns are weighed against shifts: half a part."""
 LEAST_NOISE_M = 0.0001
 """What one point is worth at best, [m]: the shape is not known better than to a tenth of a millimetre."""
+BENT_M = 0.003
+"""Noise of this size doubles the covariance: beside an edge the nearest surface is then often not the one that was
+hit, which the linear part of the formula does not know. Measured by `python benchmarks/eye.py`."""
 PRIOR = np.array([0.05] * 3 + [0.5] * 3)
 """Standard deviation of what is known without any point, [m, rad]: it keeps directions finite of which points say
 nothing, and states for them how little that is."""
@@ -92,7 +95,7 @@ def covariance(shape: Shape, points: Points, T: Array, width_m: float, noise_m: 
 
     The minimum moves by H^-1 J^t W e if the points are wrong by e, so with independent noise and one common error per
     view the covariance is H^-1 J^t W (N + sum_v b_v b_v^t) W J H^-1; an error along a ray counts by the cosine between
-    ray and normal. `PRIOR` stands for what no point says.
+    ray and normal. `PRIOR` stands for what no point says, `BENT_M` for what is not linear.
     """
     d, J = (a[0] for a in _rows(shape, points, T[None]))
     weight = 1.0 / (1.0 + (d / width_m) ** 2) ** 2
@@ -106,7 +109,8 @@ def covariance(shape: Shape, points: Points, T: Array, width_m: float, noise_m: 
     for v in np.unique(points.view):
         common = WJ.T @ np.where(points.view == v, bias_m * slope, 0.0)
         middle += np.outer(common, common)
-    both = inverse @ (middle + np.diag((loose * PRIOR) ** 2)) @ inverse
+    bent = 1.0 + (noise_m / BENT_M) ** 2
+    both = bent * inverse @ (middle + np.diag((loose * PRIOR) ** 2)) @ inverse
     return np.asarray((both + both.T) / 2)
 
 
