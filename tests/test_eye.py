@@ -65,7 +65,7 @@ def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
     built = scene("stick_in_tower")
     start = watched("stick_in_tower").layout.start
     hands, finder = Hands(built.shown, start), RangeFinder()
-    hands.grab(0, "castle1")
+    hands.grab(0, "stick")  # the ball that holds it is thicker than the stick
     sight = Sight(built.shown)
     sight.look(hands.data.qpos)
     image = sight.range_image(finder)
@@ -201,6 +201,18 @@ def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.C
     assert [operation["found"] for operation in form["operations"]] == [True, True]
     assert all(operation["error_mm"] < 1.0 for operation in form["operations"])
     assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
+    asked = ["--eye", "noise,range", "--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1"]
+    out = tmp_path / "run"
+    for _ in range(2):
+        assert main(["sweep", "block_on_block", *asked, "--workers", "1", "--out", str(out)]) == 0
+        rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
+        assert sorted((row["eye"], row["noise"], row["level_deg"]) for row in rows) == [
+            ("noise", "isotropic", 1.0),
+            ("range", "range", 0.0),
+        ]
 
 
 @pytest.mark.parametrize(
