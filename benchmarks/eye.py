@@ -20,6 +20,7 @@ import numpy as np
 from apo_bench.benchmark.stages import OBSERVATION, Shown, show, stream, through
 from apo_bench.geometry import pose
 from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.placement import placed
 from apo_bench.recognition.distance import joined, shape_of, struck
 from apo_bench.recognition.follow import Event
 from apo_bench.scenario_file import load_scenario, scenario_names
@@ -65,12 +66,12 @@ def noticed(scene: Scene, shown: Shown, event: Event) -> int:
 
     Per part some 1500 can be seen in both views together.
     """
-    parts = shifted(shown)
+    parts, demonstration = shifted(shown), shown.demonstration
+    stages = (demonstration.start, *placed(demonstration.assembly, demonstration.start, demonstration.goals))
     solids, play = scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm
     count = 0
     for view, region in zip(shown.watched.finder.views, event.regions, strict=True):
-        for mask, where in ((region.appeared, {}), (region.vanished, parts)):
-            poses = {**shown.demonstration.final, **where}
+        for mask, poses in ((region.appeared, demonstration.final), (region.vanished, stages[-2])):
             shapes = [shape_of(physical_boxes(solids[part], play), poses[part]) for part in solids]
             owner = np.concatenate([[part] * len(shape.center) for part, shape in zip(solids, shapes, strict=True)])
             pixels = np.flatnonzero(mask)
