@@ -102,7 +102,7 @@ def _split(node: Node, unit: str, largest: float) -> Split:
     keys = node.fields((f"limit_{unit}", *(key for pair in tails for key in pair)))
     limit = _number(keys[f"limit_{unit}"], 1e-3, largest)
     across, along = (
-        Tail(_number(keys[scale], 0.99 * SMALLEST * limit, limit), _number(keys[freedom], LEAST_FREEDOM, math.inf))
+        Tail(_number(keys[scale], 0.9 * SMALLEST * limit, limit), _number(keys[freedom], LEAST_FREEDOM, math.inf))
         for scale, freedom in tails
     )
     return Split(across, along, limit)
