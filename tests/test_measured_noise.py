@@ -255,7 +255,7 @@ GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
         ("missed_rate = 0.16609", "mised_rate = 0.1", "unknown key 'mised_rate'; did you mean 'missed_rate'"),
         ("missed_rate = 0.16609", "missed_rate = 1979-05-27", "the date or time 1979-05-27 was given"),
         ("along_scale_mm = 13.59", "along_scale_mm = 51", "along_scale_mm: a number from 0.0045 to 50 is needed"),
-        ("along_scale_mm = 13.59", "along_scale_mm = 0", "along_scale_mm: a finite number from 0.005 is needed"),
+        ("along_scale_mm = 13.59", "along_scale_mm = 0", "along_scale_mm: a finite number from 0.0045 is needed"),
         ("along_scale_mm = 13.59\n", "", "the key 'along_scale_mm' is missing"),
         ("along_degrees_of_freedom = 0.89326", "along_degrees_of_freedom = 0.1", "a finite number from 0.5 is needed"),
         ("limit_mm = 50", "limit_mm = inf", "limit_mm: a finite number from 0.001 is needed"),
