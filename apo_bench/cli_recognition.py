@@ -10,7 +10,6 @@ import typer
 
 from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM
 from apo_bench.errors import InputError, unknown
-from apo_bench.program import Observation
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
@@ -36,6 +35,7 @@ def recognise(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
+    from apo_bench.benchmark.one import looked_at
     from apo_bench.benchmark.recognised import KINDS, recognised
     from apo_bench.benchmark.recognised_text import difference_lines, evidence_table, recognition_form
     from apo_bench.scenario_file import load_scenario
@@ -45,7 +45,7 @@ def recognise(
     asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     name = load_scenario(scenario).name
-    seen, assumed = _seen(scenario, observation, asked, deviations)
+    seen, assumed = looked_at(scenario, observation, asked, deviations)
     found = recognised(seen, relations)
     if as_json:
         typer.echo(json.dumps(recognition_form(name, relations, seen, found, assumed), allow_nan=False))
@@ -58,25 +58,6 @@ def recognise(
     if not seen.seen.all():
         missing = ", ".join(str(k + 1) for k, was in enumerate(seen.seen) if not was)
         typer.echo(f"not seen, so nothing is recognised there: operation {missing}")
-
-
-def _seen(
-    scenario: str, observation: Path | None, asked: dict[str, Any], deviations: dict[str, float | None]
-) -> tuple[Observation, bool]:
-    """The observation of a trial or of a file, and whether its deviations had to be assumed."""
-    from apo_bench.benchmark.one import Request, watched
-    from apo_bench.observed import observed
-
-    refused, reason = (deviations, "is for files") if observation is None else (asked, "draws a trial")
-    for name, value in refused.items():
-        if value is not None:
-            option, where = "--" + name.replace("_", "-"), "without" if observation is None else "together with"
-            raise InputError(f"{option}, which {reason}, was given {where} --observation; leave one of them out.")
-    if observation is None:
-        return watched(Request(scenario=scenario, **asked)), False
-    stated = {name: value for name, value in deviations.items() if value is not None}
-    seen, _, assumed = observed(observation, scenario, **stated)
-    return seen, assumed
 
 
 def _print(table: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -12,7 +13,7 @@ from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import Row, eye_of, run_measured, run_trial
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
-from apo_bench.observed import read_observation, read_stated
+from apo_bench.observed import observed, read_stated
 from apo_bench.program import Observation
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
@@ -67,8 +68,35 @@ def run_one(request: Request) -> Row:
     return row
 
 
+def looked_at(
+    scenario: str,
+    observation: Path | None,
+    asked: Mapping[str, Any],
+    deviations: Mapping[str, float | None],
+) -> tuple[Observation, bool]:
+    """What is seen of a trial, or stands in a file, and whether standard deviations had to be assumed.
+
+    Args:
+        asked: What only a trial knows: level, seed, noise and so on, as in `Request`; None stands for the default.
+        deviations: What only a file may need: `deviation_mm` and `deviation_deg`.
+
+    Raises:
+        InputError: One of the two was given with the other, or something is not allowed.
+    """
+    refused, reason = (deviations, "is for files") if observation is None else (asked, "draws a trial")
+    for name, value in refused.items():
+        if value is not None:
+            option, where = "--" + name.replace("_", "-"), "without" if observation is None else "together with"
+            raise InputError(f"{option}, which {reason}, was given {where} --observation; leave one of them out.")
+    if observation is None:
+        return watched(Request(scenario=scenario, **asked)), False
+    stated = {name: value for name, value in deviations.items() if value is not None}
+    seen, _, assumed = observed(observation, scenario, **stated)
+    return seen, assumed
+
+
 def watched(request: Request) -> Observation:
-    """What is seen of the trial, or read from the file, that was asked for; nothing is replayed.
+    """What is seen of the trial that was asked for; nothing is replayed.
 
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
@@ -76,8 +104,6 @@ def watched(request: Request) -> Observation:
     """
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
-    if request.observation:
-        return read_observation(request.observation, scenario)
     scene = build_scene(scenario, clearance_mm=spec.clearance_mm, grasp=spec.grasp, arm=spec.arm)
     shown = show(scene, spec.careless, spec.seed, spec.eye)
     if shown.demonstration.code != "ok":
@@ -121,14 +147,14 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
         level_deg=level if request.level_deg is None else request.level_deg,
         careless=1.0 if request.careless is None else request.careless,
         clearance_mm=clearance_mm if request.clearance_mm is None else request.clearance_mm,
-        noise=request.noise or "isotropic",
+        noise="isotropic" if request.noise is None else request.noise,
         grasp=request.grasp,
         arm=request.arm,
         method=request.method,
         seed=0 if request.seed is None else request.seed,
         timestep_s=request.timestep_s,
-        relations=request.relations or "given",
-        eye=request.eye or "noise",
+        relations="given" if request.relations is None else request.relations,
+        eye="noise" if request.eye is None else request.eye,
     )
 
 
