@@ -115,6 +115,13 @@ def test_the_command_prints_the_evidence(capsys: pytest.CaptureFixture[str]) -> 
     assert "all 9 contacts of the scenario were recognised, and no other" in said
 
 
+def test_nothing_is_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["recognise", "stick_in_tower", "--level", "0", "--careless", "1", "--seed", "3"]) == 0
+    said = capsys.readouterr().out
+    assert " 0.00 " in said
+    assert "-0.00" not in said
+
+
 def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = Path(SEEN).read_text(encoding="utf-8").splitlines()
     header, first, *rest = lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -179,9 +180,19 @@ def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None
 def test_recognised_twice_sees_as_much_as_once() -> None:
     for name in ("stick_in_tower", "pockets"):
         scene = scenes.ALL[name]()
-        found = recognised(seen_at(scene, 2, 1.0, play_m=0.25e-3), "recognised-twice")
-        assert contacts(found.assembly) == contacts(scene.assembly)
-        assert max(abs(e.seen_gap_m) for e in found.evidence) < 1e-4
+        seen = seen_at(scene, 2, 1.0, play_m=0.25e-3)
+        once, twice = recognised(seen), recognised(seen, "recognised-twice")
+        assert contacts(twice.assembly) == contacts(scene.assembly)
+        assert max(abs(e.gap_m) for e in twice.evidence) < 1e-4  # looked at where the correction put the parts
+        assert [e.seen_gap_m for e in twice.evidence] == [e.seen_gap_m for e in once.evidence]
+        assert max(abs(e.seen_gap_m) for e in twice.evidence) > 5e-4
+
+
+@pytest.mark.parametrize("wrong", [("seen.csv",), (None,), ("seen", "fixed"), ("seen", None), ("seen", Rules)])
+def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> None:
+    given = [seen_at(scenes.bridge(), 0, 0.5) if x == "seen" else x for x in wrong]
+    with pytest.raises(InputError, match="was given to recognise; an Observation is allowed"):
+        recognise(*given)
 
 
 def test_kinds_of_gaps_are_not_looked_at() -> None:

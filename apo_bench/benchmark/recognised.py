@@ -57,7 +57,8 @@ def _again(seen: Observation, first: Recognised) -> Recognised:
     made = correct(replace(seen, assembly=first.assembly), "contact")
     if not made.ok or made.covariance is None:
         return first
-    return recognise(replace(seen, goals=made.goals, covariance=floored(made.covariance)))
+    corrected = replace(seen, goals=made.goals, covariance=floored(made.covariance))
+    return recognise(corrected, first_seen=seen.goals)
 
 
 def _contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
