@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from apo_bench.arguments import check_writable
 from apo_bench.errors import InputError
+from apo_bench.program import Observation
+from apo_bench.scenario import Scenario
+
+if TYPE_CHECKING:
+    from apo_bench.benchmark.believed_picture import Belief
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
@@ -31,29 +36,62 @@ def show(
     noise: Annotated[str | None, typer.Option(help="A noise model; default: isotropic.")] = None,
     eye: Annotated[str | None, typer.Option(help="noise or range; default: noise.")] = None,
     observation: Annotated[Path | None, typer.Option(help="Show this observation file instead.")] = None,
+    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
+    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
     from apo_bench.benchmark.believed_picture import belief, belief_lines, draw_beliefs
-    from apo_bench.benchmark.one import Request, watched
-    from apo_bench.correction.correct import correct
+    from apo_bench.benchmark.one import looked_at
     from apo_bench.scenario_file import load_scenario
 
     check_writable(out, "--out", (".png",))
     loaded = load_scenario(scenario)
     k = _step(len(loaded.assembly), step)
     asked: dict[str, Any] = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
-    looked = watched(Request(scenario=scenario, observation=observation, **asked))
-    if not looked.seen.all():
-        missed = int(looked.seen.argmin()) + 1
-        raise RuntimeError(f"operation {missed} was not seen, so there is nothing to show after it; try another seed.")
+    deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    looked, assumed = looked_at(scenario, observation, asked, deviations)
+    _check_seen(looked, k)
     panels = [] if corrected and not seen else [belief("as seen", looked, looked.goals, k)]
     if corrected or not seen:
-        made = correct(looked, method)
-        if not made.ok:
-            raise RuntimeError(f"{method} did not correct what was seen: {made.sentence}.")
-        panels.append(belief(f"corrected by {method}", looked, made.goals, k))
+        panels.append(_corrected(loaded, looked, method, k))
     draw_beliefs(loaded, k, panels, out)
-    typer.echo("\n".join([*belief_lines(panels), f"Wrote {out}"]))
+    said = belief_lines(panels)
+    if assumed and (corrected or not seen):
+        said.append(assumed_line(deviation_mm, deviation_deg))
+    typer.echo("\n".join([*said, f"Wrote {out}"]))
+
+
+def assumed_line(deviation_mm: float | None, deviation_deg: float | None) -> str:
+    """What is said where a file states no standard deviations; None stands for the default."""
+    from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM
+
+    mm = DEVIATION_MM if deviation_mm is None else deviation_mm
+    deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
+    return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"
+
+
+def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> Belief:
+    from apo_bench.benchmark.believed_picture import belief
+    from apo_bench.benchmark.misgivings import misgivings
+    from apo_bench.benchmark.planning import planned
+    from apo_bench.correction.correct import correct
+
+    made = correct(looked, method)
+    if not made.ok:
+        raise RuntimeError(
+            f"{method} did not correct what was seen: {made.sentence.rstrip('.')}; --seen draws what was seen."
+        )
+    warning = misgivings(scenario, planned(looked, made), made)
+    return belief(f"corrected by {method}", looked, made.goals, step, warning)
+
+
+def _check_seen(looked: Observation, step: int) -> None:
+    """Nothing is known after an operation that was not seen."""
+    missed = int(looked.seen.argmin()) + 1
+    if looked.seen.all() or missed > step:
+        return
+    before = f"--seen --step {missed - 1} shows what is known before it" if missed > 1 else "nothing is known before it"
+    raise RuntimeError(f"operation {missed} was not seen, so nothing is known after it; {before}.")
 
 
 def _step(operations: int, step: int | None) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,10 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     ("arguments", "part"),
     [
         (("--step", "4"), "step 4 was given; the scenario has operations 1 to 3"),
-        (("--level", "1", "--observation", "docs/seen.csv"), "--level was given together with --observation"),
+        (
+            ("--level", "1", "--observation", "docs/seen.csv"),
+            "--level, which draws a trial, was given together with",
+        ),
         (("--method", "contakt"), "contact"),
         (("--out", "seen.jpg"), "ends in .png"),
         (("--eye", "telescope"), "telescope"),
@@ -95,5 +99,48 @@ def test_what_was_not_seen_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFi
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     out = tmp_path / "x.png"
     assert cli.main(["show", "stick_in_tower", "--observation", str(path), "--out", str(out)]) == 1
-    assert "operation 2 was not seen" in capsys.readouterr().err
+    assert "operation 2 was not seen, so nothing is known after it; --seen --step 1 shows" in capsys.readouterr().err
     assert not out.exists()
+    only = ("--seen", "--step", "1")
+    assert cli.main(["show", "stick_in_tower", "--observation", str(path), *only, "--out", str(out)]) == 0
+    assert capsys.readouterr().out.startswith("as seen: largest gap")
+
+
+@pytest.fixture
+def far(tmp_path: Path) -> Path:
+    """A table without deviations in which castle 1 stands 0.3 m from where it was."""
+    lines = Path("docs/seen.csv").read_text(encoding="utf-8").splitlines()
+    heads = lines[0].split(",")
+    kept = [i for i, head in enumerate(heads) if not head.startswith("deviation")]
+    rows = [[line.split(",")[i] for i in kept] for line in lines]
+    rows[1][rows[0].index("x_mm")] = "420"
+    path = tmp_path / "far.csv"
+    path.write_text("\n".join(map(",".join, rows)) + "\n", encoding="utf-8")
+    return path
+
+
+def test_what_speaks_against_a_correction_is_said(
+    far: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Planes that coincide a metre apart are no contact."""
+    assert cli.main(["show", "stick_in_tower", "--observation", str(far), "--out", str(tmp_path / "far.png")]) == 0
+    _, corrected, assumed, _ = capsys.readouterr().out.splitlines()
+    assert corrected.startswith("corrected by contact: largest gap 0.000 mm; open: R2 castle2 -> castle1: beside it")
+    for said in (
+        "the stated noise does not explain the correction (p = ",
+        "foretold: operation 2 (castle2) will fail: ",
+    ):
+        assert said in corrected
+    assert assumed == "a standard deviation of 1 mm and 1 deg per axis, assumed where the file states none"
+    assert cli.main(["plan", "stick_in_tower", "--observation", str(far), "--deviation-mm", "3"]) == 0
+    *_, assumed, wrong = capsys.readouterr().out.splitlines()
+    assert assumed == "a standard deviation of 3 mm and 1 deg per axis, assumed where the file states none"
+    assert wrong.startswith("the stated noise does not explain the correction (p = ")
+    assert "; foretold: operation 2 (castle2) will fail: " in wrong
+
+
+def test_a_plan_without_misgivings_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["plan", "stick_in_tower", "--observation", "docs/seen.csv", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["notes"] == []
+    assert cli.main(["plan", "stick_in_tower", "--observation", "docs/seen.csv", "--method", ""]) == 2
+    assert cli.main(["plan", "stick_in_tower", "--deviation-mm", "3"]) == 2

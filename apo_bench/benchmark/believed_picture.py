@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from apo_bench.assembly import Assembly, Contact
 from apo_bench.benchmark.explain_text import listed
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import extent
 from apo_bench.graph import arc_residuals, relation_graph
 from apo_bench.placement import placed
@@ -19,7 +22,7 @@ from apo_bench.scenario import Scenario
 
 WIDTH, HEIGHT, LINE_PX = 620, 480, 20
 NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
-MOST_LINES = 6
+MOST_LINES, LETTERS = 6, 86
 
 
 class Belief(NamedTuple):
@@ -30,23 +33,38 @@ class Belief(NamedTuple):
     gap_m: float
     """The largest |e| of all contacts."""
     open: tuple[str, ...]
-    """`R4 stick -> castle2: 1.31 mm`, the worst first; of contacts that stand."""
+    """`R4 stick -> castle2: 1.31 mm`, the worst first; then `R1 castle1 -> table: beside it`, of faces that stand and
+    cover nothing of each other."""
+    warning: str = ""
+    """What else is wrong with it: what the test says, and the failure that is foretold."""
 
 
-def belief(title: str, seen: Observation, goals: Array, step: int) -> Belief:
+def belief(title: str, seen: Observation, goals: Array, step: int, warning: str = "") -> Belief:
     """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
     graph = relation_graph(seen.assembly, step)
     residuals = arc_residuals(seen.assembly, seen.start, goals, graph)
     found = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
-    wrong = tuple(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}" for e, arc in found)
+    wrong = tuple(
+        f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}" for e, arc in found if e > seen.gap_m
+    )
     poses = placed(seen.assembly.first(step), seen.start, goals[:step])[-1]
-    return Belief(title, poses, max(residuals, default=0.0), wrong[: sum(e > seen.gap_m for e in residuals)])
+    standing = [arc for arc in graph.arcs if arc.lost is None]
+    beside = tuple(f"{arc}: beside it" for arc in standing if not _covered(seen.assembly, arc.contacts, poses))
+    return Belief(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
+
+
+def _covered(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> bool:
+    """Whether the faces of every contact lie over each other somewhere."""
+    ends = [((assembly.face(end), poses[end.part]) for end in contact) for contact in contacts]
+    return all(overlap(*a, *b).area > 0.0 for a, b in ends)
 
 
 def belief_lines(beliefs: Sequence[Belief]) -> list[str]:
     """A sentence for each: `as seen: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
     return [
-        f"{b.title}: largest gap {1e3 * b.gap_m:.3f} mm; " + (f"open: {', '.join(b.open)}" if b.open else "all hold")
+        f"{b.title}: largest gap {1e3 * b.gap_m:.3f} mm; "
+        + (f"open: {', '.join(b.open)}" if b.open else "all hold")
+        + (f"; {b.warning}" if b.warning else "")
         for b in beliefs
     ]
 
@@ -66,7 +84,7 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
     last = scenario.assembly.operations[step - 1]
     near = dict.fromkeys([*last.moves, *(c.environment.part for c in last.contacts)])
     camera = _camera(scenario, beliefs[0].poses, tuple(part for part in near if part not in scenario.assembly.fixed))
-    lines = min(MOST_LINES, max(len(b.open) for b in beliefs)) + 1
+    lines = max(len(_below(b)) for b in beliefs) + 1
     below, width = LINE_PX * lines + 8, WIDTH * len(beliefs)
     height = HEIGHT + below + 56
     figure = Figure(figsize=(width / 100, height / 100))
@@ -90,11 +108,12 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
 
 def _below(one: Belief) -> list[str]:
     """The lines below a panel."""
+    warning = textwrap.wrap(one.warning, LETTERS)
     if not one.open:
-        return [f"every contact holds: largest gap {1e3 * one.gap_m:.3f} mm"]
+        return [f"every contact holds: largest gap {1e3 * one.gap_m:.3f} mm", *warning]
     shown = [f"contacts that do not hold: {one.open[0]}", *one.open[1 : MOST_LINES - 1]]
     left = len(one.open) - len(shown)
-    return [*shown, f"and {left} more"] if left else shown
+    return [*shown, *([f"and {left} more"] if left else []), *warning]
 
 
 def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:

@@ -33,8 +33,12 @@ def plan_text(lines: Sequence[Line]) -> list[str]:
     return [*rows, *([""] if wrong else []), *wrong]
 
 
-def plan_form(lines: Sequence[Line], scenario: Scenario) -> dict[str, Any]:
-    """What `json` can write: mm, degrees, operations from 1."""
+def plan_form(lines: Sequence[Line], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
+    """What `json` can write: mm, degrees, operations from 1.
+
+    Args:
+        notes: What is to be said with it: what was assumed, and what speaks against the plan.
+    """
     start = waiting(scenario)
     stages = (start, *placed(scenario.assembly, start, scenario.goals))
     forms = []
@@ -66,7 +70,7 @@ def plan_form(lines: Sequence[Line], scenario: Scenario) -> dict[str, Any]:
                 "grasp": {"at_mm": (1e3 * line.grasp.point).tolist(), "across": line.grasp.across.tolist()},
             }
         )
-    return {"schema": MACROS, "scenario": scenario.name, "steps": forms}
+    return {"schema": MACROS, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
 
 
 def direction(v: Array) -> str:

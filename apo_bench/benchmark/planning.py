@@ -42,7 +42,7 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
         return _as_it_is(seen, seen.goals, unseen(seen))
     made = correct(seen if told is None else told, method)
     return Planned(
-        plan=_planned(seen, made) if made.ok else None,
+        plan=planned(seen, made) if made.ok else None,
         refused=None if made.ok else refusal(made),
         freed=made.freed,
         tried=made.tried,
@@ -52,7 +52,8 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
     )
 
 
-def _planned(seen: Observation, made: Correction) -> Plan:
+def planned(seen: Observation, made: Correction) -> Plan:
+    """The plan that a correction makes."""
     if made.targets is None:
         return Plan(seen.assembly, seen.start, made.goals, made.schedule)
     return Plan(seen.assembly, seen.start, made.goals, made.schedule, made.targets)
