@@ -34,7 +34,7 @@ ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench 
 Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that fit; default: the scenario's.")]
 GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
 ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
-NOISE = "A name out of `apo-bench noise list`, or package.module:name"
+NOISE = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name"
 RELATIONS = (
     "What correctors are told of the contacts: given (right), recognised, recognised-fixed (thresholds), "
     "recognised-twice, missed, false, shifted:3 (mm)"
@@ -245,7 +245,7 @@ def sweep(
     clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,
     grasp: GraspOption = "friction",
     arm: ArmOption = "six_axis",
-    noise: Annotated[str, typer.Option(help=f"{NOISE}; several with commas.")] = "isotropic",
+    noise: Annotated[str | None, typer.Option(help=f"{NOISE}; several with commas; default: isotropic.")] = None,
     relations: Annotated[str, typer.Option(help=f"{RELATIONS}; several with commas.")] = "given",
     eye: Annotated[str, typer.Option(help=f"{EYE}; several with commas.")] = "noise",
     timestep_ms: Timestep = 1.0,
@@ -265,7 +265,7 @@ def sweep(
         clearances_mm=() if clearance is None else numbers(clearance, "--clearance"),
         trials=trials,
         seed=seed,
-        noises=words(noise, "--noise"),
+        noises=() if noise is None else words(noise, "--noise"),
         relations=words(relations, "--relations"),
         eyes=words(eye, "--eye"),
         grasp=grasp,

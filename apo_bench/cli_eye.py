@@ -33,8 +33,8 @@ def eye(
 
     if out is not None:
         check_writable(out, "--out", (".png",))
+    shows = checked_view(view)
     seen = see_once(scenario, level, seed, careless)
-    shows = checked_view(seen, view)
     form = eye_form(seen, level, seed, careless)
     typer.echo(json.dumps(form, allow_nan=False) if as_json else "\n".join(eye_lines(form)))
     if out is not None:

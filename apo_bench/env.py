@@ -13,7 +13,16 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
-from apo_bench.benchmark.spec import RANGE, check_careless, check_clearance, check_eye, check_seed, level_pair
+from apo_bench.benchmark.spec import (
+    RANGE,
+    USUAL,
+    check_careless,
+    check_clearance,
+    check_eye,
+    check_seed,
+    level_pair,
+    refuse_noise,
+)
 from apo_bench.benchmark.stages import Ending, Shown, attempt, ending, foretold, misshown, see, show, through, unseen
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -82,7 +91,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `scenario`: a name (`apo-bench scenarios`), the path of a scenario file, or a `Scenario`.
     - `level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
     - `careless`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
-    - `noise`: a noise model by name, as `module:name`, or the object.
+    - `noise`: a noise model by name, as `module:name`, or the object; None stands for `isotropic`.
     - `eye`: `noise`, or `range`: poses are measured in depth images; `level` is then the noise of a ray in mm, and
       there is no noise model.
     - `grasp`: `friction`, or `weld` for an ideal gripper.
@@ -103,7 +112,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         scenario: str | Path | Scenario = "stick_in_tower",
         level: float | Sequence[float] = 1.0,
         careless: float = 1.0,
-        noise: str | Callable[..., Any] = "isotropic",
+        noise: str | Callable[..., Any] | None = None,
         grasp: str = "friction",
         clearance_mm: float | None = None,
         arm: str | Arm = "six_axis",
@@ -119,8 +128,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self.render_mode = render_mode
         self._careless = careless
         check_eye(eye)
-        self._eye, self._level = eye, Level(*level_pair(level))
-        self._noise: Noise = make_noise(noise, self._level)
+        if eye == RANGE and noise is not None:
+            refuse_noise(noise)
+        self._eye, self._level = eye, Level(*level_pair(level, eye))
+        self._noise: Noise = make_noise(USUAL if noise is None else noise, self._level)
         self._scene = build_scene(
             load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
         )

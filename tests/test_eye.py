@@ -6,14 +6,18 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
+from apo_bench.benchmark.grid import SweepSpec
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stages import OBSERVATION, Shown, see, show, stream, through
 from apo_bench.benchmark.trial import run_trial
 from apo_bench.cli import main
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
@@ -217,10 +221,58 @@ def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [["--level", "-1"], ["--seed", "-1"], ["--view", "3"], ["--out", "eye.txt"], ["--careless", "nan"]],
+    [
+        *(["--level", "-1"], ["--level", "51"], ["--seed", "-1"], ["--view", "0"], ["--view", "3"]),
+        *(["--out", "eye.txt"], ["--careless", "nan"]),
+    ],
 )
-def test_wrong_requests_end_in_one_sentence(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
+    wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("apo_bench.benchmark.eye_one.show", lambda *_: pytest.fail("the human demonstrated already"))
     assert main(["eye", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()
     assert said
     assert "Traceback" not in said
+    assert "degree" not in said
+
+
+@pytest.mark.parametrize("noise", ["camera", "isotropic", "camera,outliers"])
+def test_noise_models_are_refused_where_only_the_range_finder_looks(
+    noise: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["sweep", "block_on_block", "--eye", "range", "--noise", noise, "--out", str(out)]) == 2
+    assert "was given together with the eye 'range', which draws no pose noise" in capsys.readouterr().err
+    assert not out.exists()
+    with pytest.raises(InputError, match="draws no pose noise"):
+        SweepSpec(("block_on_block",), eyes=("range",), noises=tuple(noise.split(",")))
+    with pytest.raises(InputError, match="draws no pose noise"):
+        gymnasium.make("APOReplay-v0", eye="range", noise=noise.split(",")[0])
+
+
+def test_what_draws_noise_depends_on_the_eyes() -> None:
+    assert SweepSpec(("block_on_block",), eyes=("range",)).noises == ()
+    assert SweepSpec(("block_on_block",)).noises == ("isotropic",)
+    assert SweepSpec(("block_on_block",), eyes=("range", "noise")).noises == ("isotropic",)
+    assert SweepSpec(("block_on_block",), eyes=("range", "noise"), noises=("camera",)).noises == ("camera",)
+    with pytest.raises(InputError, match="draws no pose noise"):
+        TrialSpec("block_on_block", eye="range", noise="camera")
+
+
+@pytest.mark.parametrize("eye", [None, 3, "rang", ["range"]])
+def test_what_is_no_eye_is_refused(eye: Any) -> None:
+    with pytest.raises(InputError, match=r"unknown eye .* Known: noise, range\."):
+        gymnasium.make("APOReplay-v0", eye=eye)
+
+
+@pytest.mark.parametrize("level", [(1.0, 1.0), None, 51.0])
+def test_the_level_of_the_range_finder_is_one_number(level: Any) -> None:
+    with pytest.raises(InputError, match="mm per ray"):
+        gymnasium.make("APOReplay-v0", eye="range", level=level)
+
+
+@pytest.mark.parametrize("careless", [None, "much", float("nan")])
+def test_carelessness_is_a_number(careless: Any) -> None:
+    with pytest.raises(InputError, match="a number from 0 to 10 is allowed"):
+        gymnasium.make("APOReplay-v0", careless=careless)

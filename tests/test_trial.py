@@ -369,6 +369,26 @@ def test_a_level_is_one_number_or_two() -> None:
     assert level_pair([1.0, 0.5]) == (1.0, 0.5)
     with pytest.raises(InputError, match="a pair of mm and degrees"):
         level_pair([1.0, 2.0, 3.0])
+    for wrong in (None, "far", ["far", 1.0], []):
+        with pytest.raises(InputError, match="one number is allowed"):
+            level_pair(wrong)  # type: ignore[arg-type]
+
+
+def test_a_level_of_a_ray_is_one_number() -> None:
+    assert level_pair(2, "range") == (2.0, 0.0)
+    with pytest.raises(InputError, match="one number is allowed, mm per ray"):
+        level_pair((1.0, 2.0), "range")
+    for make in (lambda: level_pair(51, "range"), lambda: TrialSpec("stick_in_tower", level_mm=51, eye="range")):
+        with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm per ray"):
+            make()
+    with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm and 1 degree"):
+        TrialSpec("stick_in_tower", level_mm=51)
+
+
+@pytest.mark.parametrize("relations", ["recognised:3", "recognised-twice:3", "given:1", "missed:2", "false:"])
+def test_only_shifted_relations_have_a_size(relations: str) -> None:
+    with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
+        TrialSpec("stick_in_tower", relations=relations)
 
 
 def observed(scene: Scene, shown: Shown, level: float = 1.0) -> Observation:

@@ -10,6 +10,7 @@ from apo_bench.benchmark.stages import OBSERVATION, Shown, misshown, show, strea
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.follow import Event
+from apo_bench.recognition.range_finder import RangeFinder
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.eye.watch import Watched
 from apo_bench.simulation.scene import build_scene
@@ -36,7 +37,7 @@ def see_once(scenario: str, level_mm: float, seed: int, careless: float) -> Seen
         InputError: A setting that is not allowed.
         RuntimeError: The demonstration itself failed.
     """
-    check_level(level_mm, "level in mm")
+    check_level(level_mm, "level in mm", RANGE)
     check_careless(careless)
     check_seed(seed)
     scene = build_scene(load_scenario(scenario))
@@ -49,13 +50,13 @@ def see_once(scenario: str, level_mm: float, seed: int, careless: float) -> Seen
     return Seen(scene.scenario.name, shown, shown.watched, images, eye.events(shown.demonstration, images))
 
 
-def checked_view(seen: Seen, view: int) -> int:
+def checked_view(view: int) -> int:
     """The number of a view, from 0, of one given from 1.
 
     Raises:
         InputError: The range finder has no such view.
     """
-    views = len(seen.watched.finder.views)
+    views = len(RangeFinder().views)
     if not 1 <= view <= views:
         raise InputError(f"--view {view} was given; the range finder has views 1 to {views}.")
     return view - 1

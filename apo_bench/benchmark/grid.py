@@ -8,6 +8,7 @@ from typing import Any, final
 
 from apo_bench.benchmark.spec import (
     RANGE,
+    USUAL,
     TrialSpec,
     check_careless,
     check_clearance,
@@ -17,6 +18,7 @@ from apo_bench.benchmark.spec import (
     check_seed,
     checked_relations,
     knows_relations,
+    refuse_noise,
 )
 from apo_bench.errors import InputError
 from apo_bench.scenario import Scenario
@@ -45,11 +47,12 @@ class SweepSpec:
     trials: int = 100
     seed: int = 0
     """The first of the seeds."""
-    noises: tuple[str, ...] = ("isotropic",)
+    noises: tuple[str, ...] = ()
+    """Empty stands for `isotropic`, and for none where no eye draws any."""
     relations: tuple[str, ...] = ("given",)
     """What correctors are told of the contacts, as in `TrialSpec`."""
     eyes: tuple[str, ...] = ("noise",)
-    """As in `TrialSpec`; the noise models are those of the eye `noise`."""
+    """As in `TrialSpec`; noise models are those of the eye `noise`."""
     grasp: str = "friction"
     arm: str = "six_axis"
     timestep_s: float = 0.001
@@ -58,23 +61,27 @@ class SweepSpec:
         object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
         for name in ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes"):
             object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
-        for name in ("scenarios", "levels", "careless", "methods", "noises", "relations", "eyes"):
+        for name in ("scenarios", "levels", "careless", "methods", "relations", "eyes"):
             if not getattr(self, name):
                 raise InputError(f"no {name} were given for the sweep; at least one is needed.")
         if not 1 <= self.trials <= LARGEST_TRIALS:
             raise InputError(f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.")
         check_seed(self.seed)
         check_seed(self.seed + self.trials - 1)
+        for eye in self.eyes:
+            check_eye(eye)
+        drawn = set(self.eyes) != {RANGE}
+        if self.noises and not drawn:
+            refuse_noise(*self.noises)
+        object.__setattr__(self, "noises", self.noises or (USUAL,) * drawn)
         for level in self.levels:
-            check_level(level)
+            check_level(level, eye="noise" if drawn else RANGE)
         for careless in self.careless:
             check_careless(careless)
         for clearance in self.clearances_mm:
             check_clearance(clearance)
         for method in self.methods:
             check_method(method)
-        for eye in self.eyes:
-            check_eye(eye)
 
 
 @final

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import final
+from numbers import Real
+from typing import Never, final
 
 from apo_bench.errors import InputError, unknown
 
@@ -14,6 +15,8 @@ ROW = "apo-bench/row/4"
 EYES = ("noise", "range")
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"
+USUAL = "isotropic"
+"""The noise model where none is asked for."""
 LARGEST_LEVEL = 50.0
 """[mm] and [degrees]: five times that is still inside the room."""
 LARGEST_CARELESS = 10.0
@@ -32,7 +35,7 @@ class TrialSpec:
     level_deg: float = 1.0
     careless: float = 1.0
     clearance_mm: float = 0.25
-    noise: str = "isotropic"
+    noise: str = USUAL
     grasp: str = "friction"
     arm: str = "six_axis"
     method: str = "none"
@@ -46,31 +49,39 @@ class TrialSpec:
     zero and `noise` is `range`."""
 
     def __post_init__(self) -> None:
-        check_level(self.level_mm, "level in mm")
+        check_eye(self.eye)
+        check_level(self.level_mm, "level in mm", self.eye)
         check_level(self.level_deg, "level in degrees")
         check_careless(self.careless)
         check_clearance(self.clearance_mm)
         check_method(self.method)
         check_seed(self.seed)
         object.__setattr__(self, "relations", checked_relations(self.relations))
-        check_eye(self.eye)
         if self.eye == RANGE:
+            if self.noise not in (USUAL, RANGE):
+                refuse_noise(self.noise)
             object.__setattr__(self, "noise", RANGE)
             object.__setattr__(self, "level_deg", 0.0)
 
 
-def check_level(level: float, what: str = "level") -> None:
+def check_level(level: float, what: str = "level", eye: str = "noise") -> None:
     """Raise an `InputError` unless the level is a number from 0 to the largest."""
-    _within(level, 0.0, LARGEST_LEVEL, what, "where 1 means 1 mm and 1 degree standard deviation")
+    of = "1 mm per ray" if eye == RANGE else "1 mm and 1 degree"
+    _within(level, 0.0, LARGEST_LEVEL, what, f"where 1 means a standard deviation of {of}")
 
 
-def level_pair(level: float | Sequence[float]) -> tuple[float, float]:
-    """A level in mm and in degrees: one number stands for both, a pair for each."""
-    pair = (level, level) if isinstance(level, (int, float)) else tuple(level)
-    if len(pair) != 2:
+def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[float, float]:
+    """A level in mm and in degrees: one number stands for both, a pair for each; of a ray it is one, in mm."""
+    try:
+        given = tuple(map(float, level if isinstance(level, Iterable) and not isinstance(level, str) else [level]))
+    except (TypeError, ValueError):
+        given = ()
+    if eye == RANGE and len(given) != 1:
+        raise InputError(f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.")
+    if len(given) not in (1, 2):
         raise InputError(f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees.")
-    mm, deg = float(pair[0]), float(pair[1])
-    check_level(mm, "level in mm")
+    mm, deg = given[0], 0.0 if eye == RANGE else given[-1]
+    check_level(mm, "level in mm", eye)
     check_level(deg, "level in degrees")
     return mm, deg
 
@@ -93,8 +104,17 @@ def check_seed(seed: int) -> None:
 
 def check_eye(eye: str) -> None:
     """Raise an `InputError` unless there is such an eye."""
-    if eye not in EYES:
-        raise InputError(unknown("eye", eye, EYES))
+    if not isinstance(eye, str) or eye not in EYES:
+        raise InputError(unknown("eye", str(eye), EYES))
+
+
+def refuse_noise(*noises: object) -> Never:
+    """Raise an `InputError`: noise models were asked for where poses are measured, so they would draw nothing."""
+    names = ", ".join(f"'{noise}'" for noise in noises if isinstance(noise, str))
+    raise InputError(
+        f"the noise {names or 'model'} was given together with the eye 'range', which draws no pose noise; the level "
+        "is the noise of its rays in mm, so leave one of the two out."
+    )
 
 
 def check_method(method: str) -> None:
@@ -112,6 +132,8 @@ def checked_relations(given: str) -> str:
     from apo_bench.observation.relations import KINDS, relations_name
 
     name, known = relations_name(given), (*KINDS, *RECOGNISED)
+    if name.partition(":")[0] in known and name not in known and not name.startswith("shifted:"):
+        raise InputError(f"the relations '{given}' were given; only shifted has a size, as in shifted:3.")
     if ":" not in name and name not in known:
         raise InputError(unknown("kind of relations", given, known) + " Or give your own as 'package.module:name'.")
     return name
@@ -123,5 +145,7 @@ def knows_relations(method: str) -> bool:
 
 
 def _within(x: float, low: float, high: float, what: str, meaning: str) -> None:
-    if not (math.isfinite(x) and low <= x <= high):
-        raise InputError(f"a {what} of {x:g} was given; a number from {low:g} to {high:g} is allowed, {meaning}.")
+    number = isinstance(x, Real)
+    if not (number and math.isfinite(x) and low <= x <= high):
+        given = f"{x:g}" if number else repr(x)
+        raise InputError(f"a {what} of {given} was given; a number from {low:g} to {high:g} is allowed, {meaning}.")
