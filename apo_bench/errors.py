@@ -24,6 +24,16 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     return f"unknown {kind} '{given}'{hint} Known: {', '.join(shown) or 'none'}{more}."
 
 
+def failed(what: str, error: Exception) -> InputError:
+    """`the noise model 'mine' failed: it raised RuntimeError('oops'); mend it, or use another.`, to raise from it."""
+    try:
+        text = " ".join(str(error).split()) if type(error) is ValueError else ""
+        said = text.rstrip(".") or f"it raised {' '.join(repr(error).split())}"
+    except Exception:
+        said = f"it raised {type(error).__name__}"
+    return InputError(f"{what} failed: {said}; mend it, or use another.")
+
+
 def kind(value: Any) -> str:
     """What a value is, for a sentence: `a str`, `an int`, `None`, `a class`."""
     if value is None or isinstance(value, type):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Mapping
 from typing import Any
 
@@ -50,4 +51,14 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
 
 
 def _public(module: Any) -> list[str]:
-    return [name for name in vars(module) if not name.startswith("_")]
+    """What a module offers: neither the modules that it imports nor functions and classes of other packages."""
+    return [name for name, value in vars(module).items() if not name.startswith("_") and _own(value, module.__name__)]
+
+
+def _own(value: Any, module: str) -> bool:
+    """Not what `import` or `from __future__ import` put there, nor a function or class of another package."""
+    if inspect.ismodule(value) or isinstance(value, type(annotations)):
+        return False
+    made = inspect.isroutine(value) or inspect.isclass(value)
+    where = getattr(value, "__module__", None) if made else None
+    return not isinstance(where, str) or where.partition(".")[0] == module.partition(".")[0]

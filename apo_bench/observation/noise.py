@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, failed, unknown
 from apo_bench.names import resolve
 from apo_bench.observation.level import Level
 from apo_bench.program import Demonstration, Observation
@@ -48,19 +48,31 @@ def make_noise(given: Any, level: Level) -> Noise:
         level: How much noise.
 
     Raises:
-        InputError: There is no such noise model, it does not say how large its errors are, or the level is negative or
-            not finite.
+        InputError: There is no such noise model, it cannot be made or does not say how large its errors are, or the
+            level is negative or not finite.
     """
     for value, unit in zip(level, ("mm", "degrees"), strict=True):
         if not (math.isfinite(value) and value >= 0.0):
             raise InputError(f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.")
     if isinstance(given, str):
-        from apo_bench.observation.noise_file import noise_of_file
+        from apo_bench.observation.noise_file import noise_of_file, presets
 
         if (measured := noise_of_file(given, level)) is not None:
             return measured
+        if ":" not in given and given not in NOISES:
+            raise InputError(_unknown(given, (*NOISES, *presets())))
     model = resolve(given, NOISES, "noise model")
     name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
+    try:
+        return _made(model, name, level)
+    except InputError:
+        raise
+    except Exception as error:
+        raise failed(f"the noise model '{name}'", error) from error
+
+
+def _made(model: Any, name: str, level: Level) -> Noise:
+    """What can be called, from what a name stands for."""
     if isinstance(model, type):
         _check(model, 1, f"the noise model '{name}' is a class that cannot be made with one argument, the level")
         model = model(level)
@@ -69,7 +81,19 @@ def make_noise(given: Any, level: Level) -> Noise:
 
         return declared(model, name)
     _check(model, 3, f"the noise model '{name}' cannot be called with (assembly, shown, rng)")
-    return model
+    made: Noise = model
+    return made
+
+
+def _unknown(given: str, names: Iterable[str]) -> str:
+    """What to say to a name that is none."""
+    if given.lower().endswith(".csv"):
+        return (
+            f"unknown noise model '{given}'; did you mean 'empirical:{given}'? That takes residuals, which "
+            "`apo-bench noise fit --residuals` writes; its --out writes a noise file, whose name ends in .toml."
+        )
+    said = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
+    return said + " Or give your own as 'package.module:name'."
 
 
 def _takes(model: Any, arguments: int) -> bool:

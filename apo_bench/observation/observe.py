@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 from apo_bench.observation.noise import Noise
@@ -26,16 +26,16 @@ def observe(
         play_m: Clearance per side of parts that fit, [m].
 
     Raises:
-        InputError: The noise model returned something that is not an observation of this demonstration.
+        InputError: The noise model raised an error, or returned what is not an observation of this demonstration.
     """
     name = getattr(noise, "__name__", type(noise).__name__)
     try:
         seen = noise(shown.assembly, shown, rng)
+        complaint = _complaint(shown, seen)
     except InputError:
         raise
-    except ValueError as error:
-        raise InputError(f"the noise model '{name}' failed: {error}.") from error
-    complaint = _complaint(shown, seen)
+    except Exception as error:
+        raise failed(f"the noise model '{name}'", error) from error
     if complaint:
         raise InputError(f"the noise model '{name}' {complaint}.")
     return replace(seen, gap_m=gap_m, play_m=play_m)

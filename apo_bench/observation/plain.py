@@ -45,10 +45,7 @@ class Plain:
         return str(getattr(self.function, "__name__", type(self.function).__name__))
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        try:
-            goals = np.array(self.function(shown.goals.copy(), rng), dtype=np.float64)
-        except TypeError as error:
-            raise InputError(f"the noise model '{self.__name__}' failed: {error}.") from error
+        goals = np.array(self.function(shown.goals.copy(), rng), dtype=np.float64)
         sigma = np.repeat([self.deviation_mm * 1e-3, np.radians(self.deviation_deg)], 3)
         stated = floored(np.diag(sigma**2) + shown.careless)
         return Observation(assembly, shown.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Gap, Operation, PartFace
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Face
@@ -98,17 +98,34 @@ def told(seen: Observation, relations: Relations | None, truth: Array, rng: np.r
         truth: (n, 4, 4), the true goals, world frame, [m].
 
     Raises:
-        InputError: The function returned something other than an assembly of the same operations.
+        InputError: The function raised an error, or returned something other than an assembly of the same operations.
     """
     if relations is None:
         return seen
-    wrong = relations(seen.assembly, seen.start, truth, rng)
     name = getattr(relations, "__name__", type(relations).__name__)
-    if not isinstance(wrong, Assembly):
-        raise InputError(f"the relations '{name}' returned {type(wrong).__name__}; return an Assembly.")
-    if _acts(wrong) != _acts(seen.assembly) or set(wrong.solids) != set(seen.assembly.solids):
-        raise InputError(f"the relations '{name}' changed parts or operations; change nothing but contacts and faces.")
+    try:
+        wrong = relations(seen.assembly, seen.start, truth, rng)
+        complaint = _complaint(seen.assembly, wrong)
+    except InputError:
+        raise
+    except Exception as error:
+        raise failed(f"the relations '{name}'", error) from error
+    if complaint:
+        raise InputError(f"the relations '{name}' {complaint}.")
     return replace(seen, assembly=wrong)
+
+
+def _complaint(right: Assembly, wrong: Any) -> str:
+    """What is wrong with what a function for relations returned; empty if nothing is."""
+    if not isinstance(wrong, Assembly):
+        return f"returned {type(wrong).__name__}; return an Assembly"
+    if _acts(wrong) != _acts(right) or set(wrong.solids) != set(right.solids):
+        return "changed parts or operations; change nothing but contacts and faces"
+    for relation in wrong.relations():
+        for part, face in relation.contact:
+            if part not in wrong.solids or face not in wrong.solids[part].faces:
+                return f"returned a contact of {part}.{face}, which is no face; name faces that the solids have"
+    return ""
 
 
 def culprit(right: Assembly, wrong: Assembly) -> str | None:
