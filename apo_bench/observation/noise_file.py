@@ -21,6 +21,8 @@ from apo_bench.strict_json import Node
 SCHEMA = "apo-bench/noise/1"
 LARGEST_BYTES = 100_000
 FARTHEST_MM = 1e5
+HUGE = 1e300
+"""Degrees of freedom beyond are infinitely many."""
 
 
 def presets() -> Mapping[str, Path]:
@@ -110,11 +112,10 @@ def _split(node: Node, unit: str, largest: float) -> Split:
 
 def _number(node: Node, low: float, high: float) -> float:
     """A number within bounds; infinity only where that is the bound."""
-    infinite = isinstance(node.value, float) and node.value == math.inf == high
-    x = math.inf if infinite else node.number(low)
-    if x > high:
-        node.fail(f"a number from {low:g} to {high:g} is needed")
-    return x
+    x = node.value
+    if isinstance(x, bool) or not isinstance(x, int | float) or not low <= x <= high:
+        node.fail(f"a number from {low:g}{' on, or inf,' if high == math.inf else f' to {high:g}'} is needed")
+    return float(x) if x < HUGE else math.inf
 
 
 def _document(path: Path) -> Node:
