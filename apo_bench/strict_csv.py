@@ -103,7 +103,7 @@ def _header(place: str, names: Sequence[str], columns: Columns, required: Sequen
     taken = dict[str, str]()
     for column in found:
         if column not in columns:
-            _check_separator(place, names)
+            check_separator(place, names)
             longer = [name for name in columns if column and name.startswith(f"{column}_")]
             near = longer or get_close_matches(column, columns, n=1, cutoff=0.3)
             hint = f"did you mean '{near[0]}'? Allowed are" if near else "allowed are"
@@ -119,7 +119,7 @@ def _header(place: str, names: Sequence[str], columns: Columns, required: Sequen
     return found
 
 
-def _check_separator(place: str, names: Sequence[str]) -> None:
+def check_separator(place: str, names: Sequence[str]) -> None:
     """Refuse what spreadsheets of some countries put in place of commas."""
     for separator, called in ((";", "';'"), ("\t", "tabs"), ("|", "'|'")):
         if len(names) == 1 and separator in names[0]:

@@ -131,6 +131,11 @@ BAD = {
     "no rows": ([HEADER], "no pose stands in the file"),
     "missing column": ([HEADER.replace(",time", ""), ROW], "line 1: the column 'time' is missing; needed are"),
     "wrong order": ([HEADER.replace("R,t", "t,R"), ROW], "line 1: the columns are scene_id,.*in this order"),
+    "semicolons": (
+        [HEADER.replace(",", ";"), ROW.replace(",", ";")],
+        "line 1: .* by commas; this file uses ';', so save",
+    ),
+    "tabs": ([HEADER.replace(",", "\t")], "line 1: .* by commas; this file uses tabs"),
     "no header": ([ROW], "line 1: the column 'scene_id' is missing"),
     "cells": ([HEADER, ROW, ROW + ",1"], "line 3: 7 cells are needed, one for each column, 8 were given"),
     "text": ([HEADER, ROW.replace("900", "far")], "line 2, t: 3 numbers with spaces between .* '10 20 far' was given"),

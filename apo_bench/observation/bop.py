@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.strict_csv import check_separator
 
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 WANTED = "needed are, in this order, " + ",".join(COLUMNS)
@@ -133,6 +134,7 @@ def _check_header(text: str, place: str) -> None:
     found = tuple(cell.strip() for cell in text.split(","))
     if found == COLUMNS:
         return
+    check_separator(place, found)
     for column in COLUMNS:
         if column not in found:
             raise InputError(f"{place}: the column '{column}' is missing; {WANTED}.")
