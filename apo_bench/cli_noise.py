@@ -10,7 +10,10 @@ import typer
 from apo_bench.arguments import check_writable
 from apo_bench.errors import InputError
 
-noise = typer.Typer(add_completion=False, rich_markup_mode=None, help="Noise models: list them, read their cards.")
+NO_RESULT = 1
+HELP = "Noise models: list, cards, fits to measured poses."
+NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
+noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=HELP)
 
 
 def register(app: typer.Typer) -> None:
@@ -39,21 +42,28 @@ def list_models() -> None:
 
 @noise.command()
 def card(
-    name: Annotated[str, typer.Argument(help="A name out of `apo-bench noise list`, or package.module:name.")],
-    level: Annotated[float, typer.Option(help="Of the histogram: mm and degrees, standard deviation.")] = 1.0,
+    name: Annotated[str, typer.Argument(help=NAME)],
+    level: Annotated[
+        float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
+    ] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Draw the histogram into this file: .png.")] = None,
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.benchmark.noise_card import draw, noise_card
     from apo_bench.benchmark.noise_picture import draw_histogram
+    from apo_bench.benchmark.spec import check_level
     from apo_bench.observation.noise import Level
 
+    check_level(level)
     if out is not None:
         check_writable(out, "--out", (".png",))
     drawn = draw(name, Level(level, level))
     typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
     if out is None:
         return
+    if not len(drawn.errors):
+        typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
+        raise typer.Exit(NO_RESULT)
     try:
         draw_histogram(drawn, out)
     except OSError as error:

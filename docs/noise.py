@@ -28,11 +28,13 @@ attributes:
 
     high.deviation_mm, high.deviation_deg = 1.5, 0.1
 
+No level reaches such a function, nor an object that is made already: its errors are the same at every level, 0 too.
+
 In the formulas T is the pose of a part in the world, exp(xi) the displacement of a twist (x, y, z, rx, ry, rz) in the
 part's own frame, e are independent standard normal numbers, and L is the level: in mm for positions, in degrees for
-turns. Levels only scale the same draws, so one seed gives comparable errors at all of them, and at level 0 everything
-is seen exactly as it was shown. What is stated also holds the mean square of the human's carelessness, where the
-scenario has any, and at least 0.05 mm and 0.05 deg.
+turns. Levels only scale the same draws, so one seed gives comparable errors at all of them, and at level 0 the models
+below see everything exactly as it was shown. What is stated also holds the mean square of the human's carelessness,
+where the scenario has any, and at least 0.05 mm and 0.05 deg.
 
 `tests/test_noise_laws.py` and, for what is measured, `tests/test_measured_noise.py` hold all of them to the same laws:
 over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice of the world
@@ -94,7 +96,7 @@ def main() -> None:
         drawn = draw(name, LEVEL)
         draw_histogram(drawn, HERE / picture)
         lines += ["", f'<a id="{name}"></a>', "", described(name, 2)]
-        lines += [f"![Errors of {name}]({picture})", "", f"*{measured(drawn, LEVEL)}.*"]
+        lines += [f"![Errors of {name}]({picture})", "", f"*{measured(name, drawn, LEVEL)}.*"]
     (HERE / "noise.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

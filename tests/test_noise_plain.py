@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.isotropic import FLOOR
 from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.observation.noise_file import presets
 from apo_bench.observation.observe import observe
 from apo_bench.observation.plain import Plain
 from tests import scenes
@@ -166,11 +168,15 @@ def test_a_card_prints_what_the_model_does(name: str, capsys: pytest.CaptureFixt
     assert ("were not seen" in text) == (name == "outliers")
 
 
-@pytest.mark.parametrize("name", sorted(NOISES))
+@pytest.mark.parametrize("name", sorted([*NOISES, *presets()]))
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
     """Written by `python docs/noise.py`."""
     page = (Path(__file__).parent.parent / "docs" / "noise.md").read_text(encoding="utf-8")
     assert described(name, 2) in page
+    card = page.split(f"![Errors of {name}]")[1]
+    assert card.split("\n")[2].startswith(
+        "*Errors as measured, " if name in presets() else "*Errors at 1 mm and 1 deg, "
+    )
 
 
 def test_the_histogram_is_of_errors_that_were_drawn() -> None:
@@ -179,6 +185,53 @@ def test_the_histogram_is_of_errors_that_were_drawn() -> None:
     bars = [line for line in card.splitlines() if "#" in line and not line.startswith("#")]
     assert len(bars) == 1
     assert bars[0].split()[0] == "0.0"
+
+
+@pytest.mark.parametrize(
+    ("given", "level", "words"),
+    [
+        ("camera", Level(2.0, 1.0), "Errors at 2 mm and 1 deg, 3000 operations"),
+        ("megapose-lmo-inliers", LEVEL, "Errors as measured, 3000 operations"),
+        ("megapose-lmo-inliers", Level(2.0, 2.0), "Errors 2 times what was measured, 3000 operations"),
+        ("megapose-lmo-inliers", Level(2.0, 0.5), "Errors 2 times in mm and 0.5 times in deg what was measured, 3000"),
+        (Plain(lifted, 2.0, 0.5), Level(2.0, 2.0), "Errors at every level alike, 3000 operations"),
+    ],
+)
+def test_a_card_says_what_its_level_means(given: object, level: Level, words: str) -> None:
+    assert f"\n{words}" in noise_card(given, level)
+
+
+def test_no_level_reaches_a_plain_function() -> None:
+    for level in (Level(0.0, 0.0), Level(5.0, 5.0)):
+        seen = observe(SHOWN, make_noise(with_deviations(lifted, 2.0, 0.5), level), np.random.default_rng(4))
+        assert (seen.goals[:, 2, 3] > TOWER.goals[:, 2, 3] + 1e-3).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    blind, out = tmp_path / "blind.toml", tmp_path / "blind.png"
+    text = presets()["megapose-lmo"].read_text(encoding="utf-8")
+    blind.write_text(re.sub("missed_rate = [0-9.]+", "missed_rate = 1", text), encoding="utf-8")
+    assert main(["noise", "card", str(blind)]) == 0
+    said = capsys.readouterr()
+    assert said.out.endswith("\nNothing was seen: every operation of stick_in_tower was missed.\n")
+    assert "nan" not in said.out + said.err
+    assert main(["noise", "card", str(blind), "--out", str(out)]) == 1
+    assert capsys.readouterr().err == f"apo-bench: nothing was seen, so {out} was not written.\n"
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("command", [["replay", "--help"], ["sweep", "--help"], ["noise", "card", "--help"]])
+def test_help_says_that_noise_may_be_measured(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(command) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "FILE.toml, empirical:FILE.csv, or package.module:name" in said
+
+
+def test_the_help_of_all_names_the_three_noise_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.split()[:1] == ["noise"])
+    assert all(word in line for word in ("list", "card", "fit"))
 
 
 def test_a_card_can_be_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -192,8 +245,10 @@ def test_a_card_can_be_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     ("arguments", "message"),
     [
         (["card", "isotropc"], "unknown noise model 'isotropc'; did you mean 'isotropic'"),
-        (["card", "isotropic", "--level", "-1"], "the noise level -1.0 mm is not possible"),
-        (["card", "isotropic", "--level", "nan"], "the noise level nan mm is not possible"),
+        (["card", "isotropic", "--level", "-1"], "a level of -1 was given; a number from 0 to 50 is allowed"),
+        (["card", "isotropic", "--level", "nan"], "a level of nan was given; a number from 0 to 50 is allowed"),
+        (["card", "isotropic", "--level", "51"], "a level of 51 was given; a number from 0 to 50 is allowed"),
+        (["card", "megapose"], "did you mean 'megapose-lmo'"),
         (["card", "isotropic", "--out", "card.txt"], "a file name that ends in .png is allowed"),
         (["card", "isotropic", "--out", "/nowhere/card.png"], "cannot be written"),
         (["card"], "Missing argument"),

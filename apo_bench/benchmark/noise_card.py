@@ -49,13 +49,18 @@ def listed() -> Mapping[str, str]:
 
 def facts(given: Any) -> Facts:
     """What a model says of itself; of one that says nothing, its docstring."""
-    measured = noise_of_file(given, Level(1.0, 1.0)) if isinstance(given, str) else None
-    model = measured or resolve(given, NOISES, "noise model")
+    model = _model(given)
     own = getattr(model, "FACTS", None)
     if isinstance(own, Facts):
         return own
     said = (inspect.getdoc(model) or "A noise model that says nothing of itself.").split("\n\n")[0]
     return Facts(" ".join(said.split()), (), "", (), "")
+
+
+def _model(given: Any) -> Any:
+    """What a name stands for: a class, or an object that no level changes, but what is measured at level 1."""
+    measured = noise_of_file(given, Level(1.0, 1.0)) if isinstance(given, str) else None
+    return measured or resolve(given, NOISES, "noise model")
 
 
 def draw(given: Any, level: Level, draws: int = DRAWS) -> Drawn:
@@ -72,7 +77,8 @@ def draw(given: Any, level: Level, draws: int = DRAWS) -> Drawn:
         missed += int(np.sum(~seen.seen))
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
     some = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
-    rms = np.sqrt(np.concatenate(variances)[:, [0, 2, 3, 5]].mean(axis=0)) * scale
+    stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
+    rms = np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale
     return Drawn(some, rms, missed / (draws * len(shown.goals)))
 
 
@@ -88,8 +94,10 @@ def demonstrated() -> Demonstration:
 def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
     """The card of a model in Markdown, with a histogram in text of what was drawn, which `draw` does if nothing was."""
     drawn = drawn or draw(given, level)
+    if not len(drawn.errors):
+        return f"{described(given)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
     bars = "\n".join(f"    {line}".rstrip() for line in histogram(drawn))
-    return f"{described(given)}\n{measured(drawn, level)}:\n\n{bars}\n"
+    return f"{described(given)}\n{measured(given, drawn, level)}:\n\n{bars}\n"
 
 
 def described(given: Any, heading: int = 1) -> str:
@@ -107,11 +115,18 @@ def described(given: Any, heading: int = 1) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def measured(drawn: Drawn, level: Level) -> str:
+def measured(given: Any, drawn: Drawn, level: Level) -> str:
     """One sentence on what was drawn, without its full stop."""
+    if facts(given).measured:
+        apart = f" in mm and {level.deg:g} times in deg" if level.deg != level.mm else ""
+        where = "as measured" if level == (1.0, 1.0) else f"{level.mm:g} times{apart} what was measured"
+    elif isinstance(_model(given), type):
+        where = f"at {level.mm:g} mm and {level.deg:g} deg"
+    else:
+        where = "at every level alike"
     missed = f"; {100 * drawn.missed:.1f} % were not seen" if drawn.missed else ""
     n = f"{len(drawn.errors)} operations of {SCENARIO}"
-    return f"Errors at {level.mm:g} mm and {level.deg:g} deg, {n}{missed}"
+    return f"Errors {where}, {n}{missed}"
 
 
 def histogram(drawn: Drawn) -> list[str]:

@@ -75,6 +75,7 @@ class Empirical:
         parameters=("all in the file: the residuals, which of them are outliers, and how many parts were missed",),
         states="the mean square of the residuals of what is no outlier, turned into the part that is seen",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
+        measured=True,
     )
 
     def __post_init__(self) -> None:

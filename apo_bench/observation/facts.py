@@ -17,3 +17,5 @@ class Facts(NamedTuple):
     states: str
     """Which covariance an observation states, and how that compares with the errors."""
     notes: tuple[str, ...] = ()
+    measured: bool = False
+    """Whether a level multiplies what was measured, instead of being the deviation in mm and degrees."""

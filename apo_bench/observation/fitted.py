@@ -74,6 +74,7 @@ class Fitted:
         parameters=("all in the file: scales s, degrees of freedom n, limits, shares of outliers and misses, source",),
         states="that of what is no outlier, within the limits, turned into the part that is seen",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
+        measured=True,
     )
 
     def __post_init__(self) -> None:
