@@ -11,6 +11,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from apo_bench.benchmark.grid import SweepSpec
 from apo_bench.benchmark.spec import TrialSpec
@@ -207,7 +209,51 @@ def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.C
     assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
-def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, set[str]]:
+    """File name -> every text in the figure that was written there."""
+    texts: dict[str, set[str]] = {}
+
+    def keep(figure: Figure, path: Path, **_: Any) -> None:
+        figure.draw_without_rendering()
+        texts[Path(path).name] = {text.get_text() for text in figure.findobj(Text)}
+
+    monkeypatch.setattr(Figure, "savefig", keep)
+    return texts
+
+
+def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], drawn: dict[str, set[str]]
+) -> None:
+    asked = ["--eye", "range", "--levels", "0.5", "--careless", "0", "--methods", "none,contact", "--trials", "1"]
+    out = tmp_path / "run"
+    more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--workers", "1", "--out", str(out)]
+    assert main(["sweep", "block_on_block", *asked, *more]) == 0
+    assert main(["report", str(out)]) == 0
+    said, page = capsys.readouterr().out, (out / "report.md").read_text(encoding="utf-8")
+    for text in (said, page):
+        assert "0.5 mm per ray" in text
+        assert "0 deg" not in text
+    assert "A level of L is a standard deviation of L mm per ray of the range finder." in page
+    assert "degrees per axis" not in page
+    assert len(drawn) == 3
+    for name, texts in drawn.items():
+        assert not {text for text in texts if "deg" in text or "range noise" in text}, name
+        if name != "success_over_tightness.png":
+            assert "level: standard deviation of a ray of the range finder [mm]" in texts
+            assert "0.5" in texts
+    assert any("\nrange finder, relations recognised" in text for text in drawn["success_over_level.png"])
+
+
+def test_a_trial_of_the_range_finder_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--level", "0.5", "--careless", "0", "--seed", "4"]
+    assert main(["replay", "block_on_block", "--eye", "range", *asked]) == 0
+    said = capsys.readouterr().out
+    assert "level 0.5 mm per ray, careless 0, seed 4, range finder" in said
+    assert "0 deg" not in said
+
+
+def test_a_sweep_has_both_eyes(tmp_path: Path, drawn: dict[str, set[str]]) -> None:
     asked = ["--eye", "noise,range", "--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1"]
     out = tmp_path / "run"
     for _ in range(2):
@@ -217,6 +263,12 @@ def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
             ("noise", "isotropic", 1.0),
             ("range", "range", 0.0),
         ]
+    assert main(["report", str(out)]) == 0
+    both = "level: standard deviation of the seen poses [mm and degrees]; range finder: of a ray [mm]"
+    assert both in drawn["success_over_level.png"]
+    page = (out / "report.md").read_text(encoding="utf-8")
+    assert "L mm and L degrees per axis" in page
+    assert "seen by the range finder (noise `range`), of L mm per ray" in page
 
 
 @pytest.mark.parametrize(

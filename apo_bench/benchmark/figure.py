@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Cell
 
 CEILING = "#444444"
@@ -35,7 +36,7 @@ class Row(NamedTuple):
     def title(self, careless: float) -> str:
         """`stick_in_tower, careful human, 0.25 mm clearance`, and what is not as usual."""
         human = "careful human" if careless == 0 else f"carelessness {careless:g}"
-        unusual = [f"{self.noise} noise"] * (self.noise != "isotropic")
+        unusual = ["range finder" if self.noise == RANGE else f"{self.noise} noise"] * (self.noise != "isotropic")
         unusual += [f"relations {self.relations}"] * (self.relations != "given")
         clearance = "" if self.clearance_mm is None else f", {self.clearance_mm:g} mm clearance"
         first = f"{self.scenario}, {human}{clearance}"
@@ -94,7 +95,7 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
             axis.set_title(row.title(f), fontsize=10)
             _panel(axis, [c for c in cells if row.holds(c)], f)
         across[0].set_ylabel("strict success")
-    figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
+    figure.supxlabel(level_axis(row.noise for row in rows), fontsize=10)
     legend(figure, axes, width)
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
@@ -127,7 +128,8 @@ def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
         _line(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, method)
         if len(methods) <= MANY:
             _counts(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, i, len(methods))
-    axis.set_xticks(range(len(levels)), [level_label(*level) for level in levels])
+    measured = bool(here) and here[0].noise == RANGE
+    axis.set_xticks(range(len(levels)), [f"{mm:g}" if measured else level_label(mm, deg) for mm, deg in levels])
     axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
     axis.set_ylim(-0.04, 1.06)
     axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
@@ -161,6 +163,17 @@ def _counts(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style, 
         axis.annotate(f"n={cell.trials}", (at, rate), (side, away), **text)
 
 
-def level_label(level: float, level_deg: float) -> str:
-    """`0.5`, or `0.5 mm, 1 deg` where the two differ."""
+def level_axis(noises: Iterable[str]) -> str:
+    """What a level is: of poses that are drawn, of rays of the range finder, or of both."""
+    found = set(noises)
+    if found == {RANGE}:
+        return "level: standard deviation of a ray of the range finder [mm]"
+    also = "; range finder: of a ray [mm]" if RANGE in found else ""
+    return f"level: standard deviation of the seen poses [mm and degrees]{also}"
+
+
+def level_label(level: float, level_deg: float, noise: str = "") -> str:
+    """`0.5`, `0.5 mm, 1 deg` where the two differ, or `0.5 mm per ray` of the range finder."""
+    if noise == RANGE:
+        return f"{level:g} mm per ray"
     return f"{level:g}" if level == level_deg else f"{level:g} mm, {level_deg:g} deg"

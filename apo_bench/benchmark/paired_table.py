@@ -47,9 +47,10 @@ def paired_lines(found: Sequence[Paired]) -> list[str]:
 
 def _line(p: Paired) -> str:
     where = p.place
+    level = level_label(where.level, where.level_deg, where.noise)
     return (
         f"| {where.scenario} | {where.clearance_mm:g} mm | {where.noise} | {_told(where)} | {where.careless:g} "
-        f"| {level_label(where.level, where.level_deg)} | {where.method} | {p.reference} | {p.pairs} | {p.only_method} "
+        f"| {level} | {where.method} | {p.reference} | {p.pairs} | {p.only_method} "
         f"| {p.only_reference} | {_points(p)} | {_free(p.free_mm, p.free_interval)} |"
     )
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.figure import DODGE, Style, legend, level_label
+from apo_bench.benchmark.figure import DODGE, Style, legend, level_axis, level_label
 from apo_bench.benchmark.recognised_table import ALL, Recognition
+from apo_bench.benchmark.spec import RANGE
 
 STYLES = {
     "recognised": Style("#009E73", "o", "-"),
@@ -29,11 +30,11 @@ def draw_recognitions(found: Sequence[Recognition], path: Path) -> None:
     axes = figure.subplots(len(rows), len(PANELS), squeeze=False)
     for across, (noise, eye, careless) in zip(axes, rows, strict=True):
         here = [r for r in shown if (r.place.noise, r.place.eye, r.place.careless) == (noise, eye, careless)]
-        across[0].set_ylabel(f"{noise if eye == 'noise' else eye}, careless {careless:g}")
+        across[0].set_ylabel(f"{'range finder' if eye == RANGE else noise}, careless {careless:g}")
         for axis, (what, title) in zip(across, PANELS, strict=True):
             axis.set_title(title, fontsize=10)
             _panel(axis, here, what)
-    figure.supxlabel("level: standard deviation of the seen poses [mm and degrees]", fontsize=10)
+    figure.supxlabel(level_axis(noise for noise, _, _ in rows), fontsize=10)
     legend(figure, axes, len(PANELS))
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
 
@@ -47,7 +48,8 @@ def _panel(axis: Any, here: Sequence[Recognition], what: str) -> None:
         style = STYLES[kind]
         shape = {"color": style.color, "marker": style.marker, "linestyle": style.dashes, "markersize": 5}
         axis.plot(x, [_value(r, what) for r in line], linewidth=1.6, label=kind, clip_on=False, **shape)
-    axis.set_xticks(range(len(levels)), [level_label(*level) for level in levels])
+    measured = all(r.place.eye == RANGE for r in here)
+    axis.set_xticks(range(len(levels)), [f"{mm:g}" if measured else level_label(mm, deg) for mm, deg in levels])
     axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
     low = min((_value(r, what) for r in here), default=0.0)
     axis.set_ylim(0.0 if low < 0.6 else 0.6 if low < 0.9 else 0.9, 1.0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.recognised import KINDS
 from apo_bench.benchmark.statistics import wilson
 
@@ -114,7 +115,7 @@ def _order(place: Place) -> tuple[Any, ...]:
 def _line(r: Recognition) -> str:
     p, interval = r.place, wilson(r.complete, r.demonstrations)
     noise = p.noise if p.eye == "noise" else p.eye
-    level = f"{p.level:g}" if p.level == p.level_deg else f"{p.level:g} mm, {p.level_deg:g} deg"
+    level = level_label(p.level, p.level_deg, p.noise)
     return (
         f"| {p.scenario} | {noise} | {p.relations} | {p.careless:g} | {level} | {r.complete} of {r.demonstrations} "
         f"| {100 * interval.low:.1f} to {100 * interval.high:.1f} % | {_share(r.precision)} | {_share(r.recall)} "

@@ -22,7 +22,7 @@ from apo_bench.benchmark.paired_table import paired_lines, write_paired
 from apo_bench.benchmark.recognised_picture import draw_recognitions
 from apo_bench.benchmark.recognised_table import WORDS as RECOGNISED
 from apo_bench.benchmark.recognised_table import recognition_lines, recognitions, write_recognitions
-from apo_bench.benchmark.spec import knows_relations
+from apo_bench.benchmark.spec import RANGE, knows_relations
 from apo_bench.benchmark.statistics import Cell, tally
 from apo_bench.errors import InputError
 
@@ -128,8 +128,7 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
     lines = [
         "# Success of replayed demonstrations",
         "",
-        f"{len(rows)} trials; grasp {grasps}. A level of L is a standard deviation of L mm and L degrees per axis, "
-        "times what the noise model makes of it in a direction or for a part.",
+        f"{len(rows)} trials; grasp {grasps}. {_level(rows)}",
         "`oracle` replays the drawn layout and meets neither noise nor carelessness; `none` replays what was seen. "
         "Neither is told what touches what, so wrong relations are met by correctors alone.",
         f"{len(excluded)} of {len(shown)} demonstrations were not right themselves and are left out of every method.",
@@ -173,6 +172,18 @@ def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report
     return "\n".join(lines) + "\n"
 
 
+def _level(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What a level is, for the eyes that looked."""
+    noises = {row["noise"] for row in rows}
+    if noises == {RANGE}:
+        return "A level of L is a standard deviation of L mm per ray of the range finder."
+    also = "; seen by the range finder (noise `range`), of L mm per ray" if RANGE in noises else ""
+    return (
+        "A level of L is a standard deviation of L mm and L degrees per axis, times what the noise model makes of it "
+        f"in a direction or for a part{also}."
+    )
+
+
 def _recognised(rows: Sequence[Mapping[str, Any]], made: Report) -> list[str]:
     """The section on recognised contacts; nothing where all were given."""
     if made.recognised is None:
@@ -188,6 +199,6 @@ def _line(c: Cell) -> str:
     noise, relations = "any" if ceiling else c.noise, c.relations if knows_relations(c.method) else "any"
     return (
         f"| {c.scenario} | {c.clearance_mm:g} mm | {noise} | {relations} | {'any' if ceiling else f'{c.careless:g}'} "
-        f"| {'any' if ceiling else level_label(c.level, c.level_deg)} | {c.method} | {percent(c.rate)} "
+        f"| {'any' if ceiling else level_label(c.level, c.level_deg, c.noise)} | {c.method} | {percent(c.rate)} "
         f"| {interval(c)} | {c.trials} | {c.excluded} | {percent(c.loose_rate)} | {failures(c)} |"
     )

@@ -13,7 +13,7 @@ from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.report import failures, interval, percent
-from apo_bench.benchmark.spec import knows_relations
+from apo_bench.benchmark.spec import RANGE, knows_relations
 from apo_bench.benchmark.statistics import Cell
 from apo_bench.scenario import Scenario
 
@@ -46,7 +46,8 @@ def print_cells(cells: Sequence[Cell]) -> None:
         table.add_column(name, justify="right")
     table.add_column("failures")
     for c in cells:
-        where = (f"{c.careless:g}", level_label(c.level, c.level_deg)) if c.method != "oracle" else ("any", "any")
+        level = level_label(c.level, c.level_deg, c.noise)
+        where = (f"{c.careless:g}", level) if c.method != "oracle" else ("any", "any")
         met = {"noise": c.method != "oracle", "relations": knows_relations(c.method)}
         axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
         rates = (percent(c.rate), interval(c), str(c.trials), percent(c.loose_rate))
@@ -66,8 +67,9 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     if row["level"] is None:
         asked = "measured observation"
     else:
-        asked = f"level {level_label(row['level'], row['level_deg'])}, careless {row['careless']:g}, seed {row['seed']}"
-        asked += f", {row['noise']} noise" * (row["noise"] != "isotropic")
+        level = level_label(row["level"], row["level_deg"], row["noise"])
+        asked = f"level {level}, careless {row['careless']:g}, seed {row['seed']}"
+        asked += ", range finder" if row["eye"] == RANGE else f", {row['noise']} noise" * (row["noise"] != "isotropic")
         asked += f", relations {row['relations']}" * (row["relations"] != "given")
     lines = [
         ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
