@@ -7,17 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from apo_bench.assembly import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.distance import Shape, joined, shape_of, signed_distance, struck
 from apo_bench.recognition.explained import explained
 from apo_bench.recognition.fit import PRIOR, Points, covariance, refined
+from apo_bench.recognition.follow import Expected, follow
 from apo_bench.recognition.range_finder import RangeFinder, RangeImage
 from apo_bench.recognition.regions import large, regions, smoothed
 from apo_bench.recognition.starts import distinct, starts
 from apo_bench.recognition.symmetry import nearest, quarter_turns, symmetries
 from apo_bench.recognition.view import View, looking
-from tests.scenes import block, castle, cube, stick
+from tests.scenes import block, castle, cube, mm, stick
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOLIDS = {"castle": castle(), "cube": cube(), "stick": stick(), "block": block()}
@@ -115,6 +117,29 @@ def test_noise_alone_is_no_change() -> None:
         found = regions(*noisy, level)
         assert not found.appeared.any()
         assert not found.vanished.any()
+
+
+@pytest.mark.parametrize("moved_twice", [False, True])
+def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool) -> None:
+    """The first is not seen, instead of being where the second ended; a hand that pauses alone does no harm."""
+    turned = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 20.0))
+    start = {"castle": STANDING, "block": mm(0, -180, 25)}
+    halfway, goal, last = mm(100, 100, 0) @ turned, mm(-60, 120, 0) @ turned, mm(120, -90, 25)
+    operations = [Operation("castle")] * (1 + moved_twice) + [Operation("block")]
+    assembly = Assembly({name: SOLIDS[name] for name in start}, tuple(operations), frozenset())
+    after = [start, start | {"castle": halfway}, start | {"castle": goal}, {"castle": goal, "block": last}]
+    finder, rng = RangeFinder(), np.random.default_rng(0)
+    images = []
+    for poses in after:
+        scene = joined(posed(SHAPES[name], T) for name, T in poses.items())
+        true = np.stack([range_of(scene, view) for view in finder.views])
+        images.append(finder.sense(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
+    turns = np.array([T[:3, :3] for T in [halfway] * moved_twice + [goal, last]])
+    events = follow(images, finder, 0.5e-3, Expected(assembly, start, turns))
+    assert [event.operation for event in events] == [int(moved_twice), 1 + moved_twice]
+    for event, T in zip(events, (goal, last), strict=True):
+        assert event.found is not None
+        assert np.linalg.norm(event.found.T[:3, 3] - T[:3, 3]) < 0.5e-3
 
 
 @pytest.mark.parametrize("yaw", range(0, 180, 15))

@@ -68,7 +68,8 @@ def follow(images: Sequence[Array], finder: RangeFinder, level_m: float, expecte
 
     An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
     what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
-    this eye where it was. Two operations in a row that move the same parts are one for it.
+    this eye where it was. Of operations in a row that move the same parts only where the last one ended is known: a
+    pause of the hand looks the same as the end of an operation, so the others are not seen.
     """
     assembly, believed = expected.assembly, dict(expected.start)
     shapes = {p: shape_of(physical_boxes(s, expected.play_m)) for p, s in assembly.solids.items()}
@@ -109,7 +110,8 @@ def _spell(
 ) -> tuple[int, int | None, tuple[Regions, ...], frozenset[str]] | None:
     """The spell in which the next operation was over: image, operation, what changed, what moved; None if none was.
 
-    Operation k is looked for first; one that moves something else may come instead, if k was not seen.
+    Operation k is looked for first; one that moves something else may come instead, if k was not seen. Of operations in
+    a row that move the same parts it is the last, since the spell ends when something else moves.
     """
     found = None
     for last in range(first + 1, len(images)):
@@ -118,6 +120,8 @@ def _spell(
         if not moved:
             continue
         which = next((j for j in range(k, len(assembly)) if moved == set(assembly.operations[j].moves)), None)
+        while which is not None and which + 1 < len(assembly) and moved == set(assembly.operations[which + 1].moves):
+            which += 1
         if found is None or (found[1] is None and moved >= found[3]) or which == found[1]:
             found = last, which, compared, moved
         elif found[1] is not None and not moved <= found[3]:
