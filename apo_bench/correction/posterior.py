@@ -13,6 +13,7 @@ from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpstrf
 
 from apo_bench.correction import sparse
 from apo_bench.correction.compact import compact
@@ -26,7 +27,7 @@ from apo_bench.program import Correction, Observation
 LARGE = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
 UNCLEAR = (1e-14, 1e-9)
-"""Squares of singular values, in parts of the largest: with none between these, rounding is told from rank quickly."""
+"""Squares of pivots, in parts of the largest: with none between these, rounding is told from rank quickly."""
 CUT_OFF = 1e-7
 """Singular values below this part of the largest one are rounding, at a solution."""
 
@@ -63,17 +64,18 @@ def freedom(Jt: Any) -> Freedom | None:
 
 
 def rank(Jt: Any) -> int:
-    """The rank alone, of a dense or a sparse matrix."""
+    """The rank alone, of a dense or a sparse matrix; from the pivots of a Cholesky factor where they are clear."""
     if not isinstance(Jt, np.ndarray):
         return sparse.rank(Jt)
     if not Jt.size:
         return 0
-    w = np.linalg.eigvalsh(Jt @ Jt.T if Jt.shape[0] <= Jt.shape[1] else Jt.T @ Jt)
-    if not w[-1] > 0.0:
+    G = Jt @ Jt.T if Jt.shape[0] <= Jt.shape[1] else Jt.T @ Jt
+    largest = G.diagonal().max()
+    if not largest > 0.0:
         return 0
-    unclear, clear = w.searchsorted((UNCLEAR[0] * w[-1], UNCLEAR[1] * w[-1]))
-    if unclear == clear:
-        return int(len(w) - clear)
+    R, _, found, _ = dpstrf(G, tol=UNCLEAR[0] * largest)
+    if R[found - 1, found - 1] ** 2 > UNCLEAR[1] * largest:
+        return int(found)
     w = np.linalg.svd(Jt, compute_uv=False)
     return int(np.count_nonzero(w > CUT_OFF * w[0]))
 
