@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from apo_bench.deviations import assumed_deviations
 from apo_bench.errors import InputError
 from apo_bench.program import Plan
 from apo_bench.scenario import Scenario
@@ -64,7 +65,6 @@ def _planned(
     """The scenario, the plan that a method makes of an observation of it, and what is to be said with it."""
     from apo_bench.benchmark.misgivings import misgivings
     from apo_bench.benchmark.planning import plan as planned
-    from apo_bench.cli_show import assumed_line
     from apo_bench.observed import observed
 
     stated = zip(("deviation_mm", "deviation_deg"), deviations, strict=True)
@@ -76,7 +76,7 @@ def _planned(
         why = found.refused.sentence if found.refused is not None else "no plan was made"
         raise RuntimeError(f"{observation} gives no plan: {why.rstrip('.')}.")
     wrong = misgivings(loaded, found.plan, found.correction)
-    notes = [assumed_line(*deviations)] if assumed and found.correction is not None else []
+    notes = [assumed_deviations(*deviations)] if assumed and found.correction is not None else []
     return loaded, found.plan, [*notes, *([wrong] if wrong else [])]
 
 

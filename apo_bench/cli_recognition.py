@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM
+from apo_bench.deviations import assumed_deviations
 from apo_bench.errors import InputError, unknown
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
@@ -52,8 +52,7 @@ def recognise(
         return
     _print(evidence_table(found, seen.assembly))
     if assumed:
-        mm, deg = deviation_mm or DEVIATION_MM, deviation_deg or DEVIATION_DEG
-        typer.echo(f"\na standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none")
+        typer.echo("\n" + assumed_deviations(deviation_mm, deviation_deg))
     typer.echo("\n" + "\n".join(difference_lines(seen, found)))
     if not seen.seen.all():
         missing = ", ".join(str(k + 1) for k, was in enumerate(seen.seen) if not was)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from apo_bench.arguments import check_writable
+from apo_bench.deviations import assumed_deviations
 from apo_bench.errors import InputError
 from apo_bench.program import Observation
 from apo_bench.scenario import Scenario
@@ -57,17 +58,8 @@ def show(
     draw_beliefs(loaded, k, panels, out)
     said = belief_lines(panels)
     if assumed and (corrected or not seen):
-        said.append(assumed_line(deviation_mm, deviation_deg))
+        said.append(assumed_deviations(deviation_mm, deviation_deg))
     typer.echo("\n".join([*said, f"Wrote {out}"]))
-
-
-def assumed_line(deviation_mm: float | None, deviation_deg: float | None) -> str:
-    """What is said where a file states no standard deviations; None stands for the default."""
-    from apo_bench.deviations import DEVIATION_DEG, DEVIATION_MM
-
-    mm = DEVIATION_MM if deviation_mm is None else deviation_mm
-    deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
-    return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"
 
 
 def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> Belief:

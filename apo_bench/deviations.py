@@ -34,6 +34,13 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
             raise InputError(f"{name} {shown} was given; a number from {low:g} to {high:g} is allowed.")
 
 
+def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
+    """What is said where a file states no standard deviations; None stands for the default."""
+    mm = DEVIATION_MM if deviation_mm is None else deviation_mm
+    deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
+    return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"
+
+
 def within(deviation: float, limits: tuple[float, float]) -> bool:
     """Whether a standard deviation, [m] or [rad], is between its limits; a NaN is not."""
     return limits[0] * (1.0 - _ROUNDING) <= deviation <= limits[1] * (1.0 + _ROUNDING)
