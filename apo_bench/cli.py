@@ -7,7 +7,6 @@ request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees
 from __future__ import annotations
 
 import json
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,8 +14,9 @@ from typing import Annotated
 
 import typer
 
-from apo_bench import __version__, cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show
-from apo_bench.arguments import check_writable, cores, numbers, path_given, words
+from apo_bench import __version__, cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show, cli_sweep
+from apo_bench.arguments import check_writable
+from apo_bench.cli_sweep import EYE, FIDELITY, NOISE, RELATIONS, Interrupted
 from apo_bench.errors import InputError
 
 app = typer.Typer(
@@ -34,17 +34,7 @@ ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench 
 Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that fit; default: the scenario's.")]
 GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
 ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
-NOISE = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name"
-RELATIONS = (
-    "What correctors are told of the contacts: given (right), recognised, recognised-fixed (thresholds), "
-    "recognised-twice, missed, false, shifted:3 (mm)"
-)
-EYE = "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)"
 Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
-
-
-class Interrupted(Exception):
-    """Ctrl-C, told apart from what the command line library makes of a `KeyboardInterrupt`."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -139,7 +129,7 @@ def graph(
             typer.echo(f"\nWrote {out}")
 
 
-for commands in (cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show):
+for commands in (cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show, cli_sweep):
     commands.register(app)
 
 
@@ -182,6 +172,7 @@ def replay(
     relations: Annotated[str | None, typer.Option(help=f"{RELATIONS}; default: given.")] = None,
     eye: Annotated[str | None, typer.Option(help=f"{EYE}; default: noise.")] = None,
     timestep_ms: Timestep = 1.0,
+    fidelity: Annotated[str, typer.Option(help=FIDELITY)] = "full",
     observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,
     save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
     video: Annotated[Path | None, typer.Option(help="Write a film of the replay: .mp4 or .gif.")] = None,
@@ -213,6 +204,7 @@ def replay(
             grasp=grasp,
             arm=arm,
             timestep_s=timestep_ms * 1e-3,
+            fidelity=fidelity,
             observation=observation,
             save_observation=save_observation,
             video=video,
@@ -226,62 +218,6 @@ def replay(
         typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
     if row["success"] is None:
         raise typer.Exit(NO_RESULT)
-
-
-@app.command()
-def sweep(
-    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Names, or scenario files.")],
-    out: Annotated[
-        Path,
-        typer.Option(
-            parser=path_given, metavar="<path>", help="Folder of the rows; one that was interrupted is continued."
-        ),
-    ],
-    levels: Annotated[str, typer.Option(help="Noise levels, mm and degrees.")] = "0,0.1,0.25,0.5,1,2,4",
-    careless: Annotated[str, typer.Option(help="Carelessness of the human.")] = "0,1",
-    methods: Annotated[str, typer.Option(help="oracle, none and correctors.")] = "oracle,none,paper,contact",
-    trials: Annotated[int, typer.Option(help="Trials per cell; the same seeds in every cell.")] = 100,
-    seed: Annotated[int, typer.Option(help="First seed.")] = 0,
-    clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,
-    grasp: GraspOption = "friction",
-    arm: ArmOption = "six_axis",
-    noise: Annotated[str | None, typer.Option(help=f"{NOISE}; several with commas; default: isotropic.")] = None,
-    relations: Annotated[str, typer.Option(help=f"{RELATIONS}; several with commas.")] = "given",
-    eye: Annotated[str, typer.Option(help=f"{EYE}; several with commas.")] = "noise",
-    timestep_ms: Timestep = 1.0,
-    workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
-) -> None:
-    """Run every combination and print success rates with Wilson 95 % intervals."""
-    from apo_bench.benchmark import sweep as runner
-    from apo_bench.benchmark.grid import SweepSpec
-    from apo_bench.benchmark.statistics import tally
-    from apo_bench.benchmark.terminal import print_cells, print_prediction
-
-    spec = SweepSpec(
-        scenarios=tuple(scenarios),
-        levels=numbers(levels, "--levels"),
-        careless=numbers(careless, "--careless"),
-        methods=words(methods, "--methods"),
-        clearances_mm=() if clearance is None else numbers(clearance, "--clearance"),
-        trials=trials,
-        seed=seed,
-        noises=() if noise is None else words(noise, "--noise"),
-        relations=words(relations, "--relations"),
-        eyes=words(eye, "--eye"),
-        grasp=grasp,
-        arm=arm,
-        timestep_s=timestep_ms * 1e-3,
-    )
-    command = shlex.join(["apo-bench", *sys.argv[1:]])
-    try:
-        rows = runner.sweep(spec, out, workers=cores() if workers is None else workers, command=command)
-    except KeyboardInterrupt as error:
-        raise Interrupted("interrupted; what had ended is kept, and the same command continues.") from error
-    print_cells(tally(rows))
-    print_prediction(rows)
-    typer.echo(
-        f"{len(rows)} rows in {out / 'trials.jsonl'}; table and figure: apo-bench report {shlex.quote(str(out))}"
-    )
 
 
 @app.command()

@@ -63,7 +63,12 @@ def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> 
 
 def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
     spec = SweepSpec(
-        ("stick_on_castles",), levels=(HOPELESS,), careless=(1.0,), methods=("none", "paper"), trials=2, grasp="weld"
+        ("stick_on_castles",),
+        levels=(HOPELESS,),
+        careless=(1.0,),
+        methods=("none", "paper"),
+        trials=2,
+        grasps=("weld",),
     )
     one = sweep(spec, tmp_path / "one", workers=1)
     two = sweep(spec, tmp_path / "two", workers=2)
@@ -73,9 +78,7 @@ def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
-    spec = SweepSpec(
-        ("stick_in_tower", "stick_on_castles"), levels=(0.5,), careless=(1.0,), trials=1, seed=21, grasp="friction"
-    )
+    spec = SweepSpec(("stick_in_tower", "stick_on_castles"), levels=(0.5,), careless=(1.0,), trials=1, seed=21)
     one = sweep(spec, tmp_path / "one", workers=1)
     two = sweep(spec, tmp_path / "two", workers=2)
     assert by_seed_and_method(one) == by_seed_and_method(two)

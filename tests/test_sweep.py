@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark import sweep as runner
-from apo_bench.benchmark.grid import SweepSpec, load_all, row_key, trial_key, units
+from apo_bench.benchmark.grid import KEY, SweepSpec, load_all, row_key, trial_key, units
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.spec import ROW
 from apo_bench.correction.correct import CORRECTORS
@@ -50,8 +50,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["trial"] += 1
         assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
-        names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "noise", "relations", "method")
-        return {"schema": ROW, **dict(zip(names, key, strict=True)), "success": spec.seed % 2 == 0}
+        return {"schema": ROW, **dict(zip(KEY, key, strict=True)), "success": spec.seed % 2 == 0}
 
     monkeypatch.setattr("apo_bench.benchmark.grid.load_scenario", LOAD)
     monkeypatch.setattr(runner, "load_scenario", LOAD)
@@ -174,7 +173,7 @@ def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_pa
     [
         ({"levels": (0.0, 2.0)}, "specification: levels was"),
         ({"seed": 11}, "specification: seed was 10, now 11"),
-        ({"grasp": "weld"}, "specification: grasp"),
+        ({"grasps": ("weld",)}, "specification: grasps"),
         ({"clearances_mm": (0.5,)}, "specification: clearances_mm"),
         ({"scenarios": ("stick_on_castles",)}, "content: stick_in_tower"),
     ],

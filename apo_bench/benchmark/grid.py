@@ -13,6 +13,7 @@ from apo_bench.benchmark.spec import (
     check_careless,
     check_clearance,
     check_eye,
+    check_fidelity,
     check_level,
     check_method,
     check_seed,
@@ -20,16 +21,22 @@ from apo_bench.benchmark.spec import (
     knows_relations,
     refuse_noise,
 )
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, unknown
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 METHODS = ("oracle", "none", "paper", "contact")
 LARGEST_TRIALS = 1_000_000
+AXES = ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes", "grasps")
+"""What a sweep has several of."""
 
-Key = tuple[str, float, int, float, float, float, str, str, str]
-"""Scenario, clearance, seed, carelessness, level in mm, in degrees, noise, relations, method: one trial of a sweep."""
+Key = tuple[str, float, int, float, float, float, str, str, str, str]
+"""What tells one trial of a sweep from another: the columns `KEY` of its row."""
+KEY = (
+    *("scenario", "clearance_mm", "seed", "careless", "level", "level_deg"),
+    *("noise", "relations", "grasp", "method"),
+)
 
 
 @final
@@ -53,16 +60,19 @@ class SweepSpec:
     """What correctors are told of the contacts, as in `TrialSpec`."""
     eyes: tuple[str, ...] = ("noise",)
     """As in `TrialSpec`; noise models are those of the eye `noise`."""
-    grasp: str = "friction"
+    grasps: tuple[str, ...] = ("friction",)
+    """`friction`, or `weld` for an ideal gripper."""
     arm: str = "six_axis"
     timestep_s: float = 0.001
+    fidelity: str = "full"
+    """As in `TrialSpec`; one for all trials, like the arm and the time step."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
-        for name in ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes"):
+        for name in AXES:
             object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
-        for name in ("scenarios", "levels", "careless", "methods", "relations", "eyes"):
-            if not getattr(self, name):
+        for name in AXES:
+            if name not in ("clearances_mm", "noises") and not getattr(self, name):
                 raise InputError(f"no {name} were given for the sweep; at least one is needed.")
         if not 1 <= self.trials <= LARGEST_TRIALS:
             raise InputError(f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.")
@@ -82,6 +92,9 @@ class SweepSpec:
             check_clearance(clearance)
         for method in self.methods:
             check_method(method)
+        for grasp in self.grasps:
+            check_grasp(grasp)
+        check_fidelity(self.fidelity)
 
 
 @final
@@ -109,8 +122,9 @@ def load_all(spec: SweepSpec) -> Mapping[str, Scenario]:
 def units(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
     """All the work of a sweep, seeds first, so that an interrupted sweep has every cell about equally full.
 
-    The oracle meets neither noise nor carelessness: it runs once per seed, recorded at level 0, carelessness 0 and the
-    first noise model or eye. Neither it nor `none` asks what touches what: both are recorded with relations as given.
+    The oracle meets neither noise nor carelessness: it runs once per seed and grasp, recorded at level 0,
+    carelessness 0 and the first noise model or eye. Neither it nor `none` asks what touches what: both are recorded
+    with relations as given.
     """
     return tuple(
         Unit(_trials(spec, given, clearance, seed))
@@ -131,19 +145,22 @@ def described(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> dict[str, Any]
 def trial_key(trial: TrialSpec, name: str) -> Key:
     """The key of a trial whose scenario is called `name`."""
     t = trial
-    return (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg, t.noise, t.relations, t.method)
+    where = (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg)
+    return (*where, t.noise, t.relations, t.grasp, t.method)
 
 
 def row_key(row: Mapping[str, Any]) -> Key:
     """The key of the trial that a row is of."""
     return (
-        *(row["scenario"], row["clearance_mm"], row["seed"], row["careless"]),
-        *(row["level"], row["level_deg"], row["noise"], row["relations"], row["method"]),
+        *(row["scenario"], row["clearance_mm"], row["seed"], row["careless"], row["level"]),
+        *(row["level_deg"], row["noise"], row["relations"], row["grasp"], row["method"]),
     )
 
 
 def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tuple[TrialSpec, ...]:
-    def trial(method: str, level: float, careless: float, seen: tuple[str, str], relations: str) -> TrialSpec:
+    def trial(
+        method: str, level: float, careless: float, seen: tuple[str, str], relations: str, grasp: str
+    ) -> TrialSpec:
         return TrialSpec(
             scenario=given,
             level_mm=level,
@@ -151,19 +168,23 @@ def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tupl
             careless=careless,
             clearance_mm=clearance_mm,
             noise=seen[1],
-            grasp=spec.grasp,
+            grasp=grasp,
             arm=spec.arm,
             method=method,
             seed=seed,
             timestep_s=spec.timestep_s,
             relations=relations,
             eye=seen[0],
+            fidelity=spec.fidelity,
         )
 
     ways = [way for eye in spec.eyes for way in _ways(eye, spec.noises)]
-    ceiling = tuple(trial(m, 0.0, 0.0, ways[0], "given") for m in spec.methods if m == "oracle")
+    ceiling = tuple(
+        trial(m, 0.0, 0.0, ways[0], "given", grasp) for m in spec.methods if m == "oracle" for grasp in spec.grasps
+    )
     rest = tuple(
-        trial(method, level, careless, seen, relations)
+        trial(method, level, careless, seen, relations, grasp)
+        for grasp in spec.grasps
         for careless in spec.careless
         for level in spec.levels
         for seen in ways
@@ -172,6 +193,14 @@ def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tupl
         for relations in (spec.relations if knows_relations(method) else ("given",))
     )
     return ceiling + rest
+
+
+def check_grasp(grasp: str) -> None:
+    """Raise an `InputError` unless there is such a grasp."""
+    from apo_bench.simulation.scene import GRASPS
+
+    if grasp not in GRASPS:
+        raise InputError(unknown("grasp", str(grasp), GRASPS))
 
 
 def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:

@@ -22,10 +22,10 @@ from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
 
 RUN = "apo-bench/run/2"
-OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3")
-"""Rows that say less: nothing about the test of a correction and its posterior, nothing about the eye. Reports still
+OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3", "apo-bench/row/4")
+"""Rows that say less: nothing about the test of a correction and its posterior, the eye, the fidelity. Reports still
 read them."""
-UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise"}
+UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full"}
 """What stands in place of what older rows do not say."""
 PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),

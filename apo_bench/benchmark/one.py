@@ -38,6 +38,7 @@ class Request:
     grasp: str = "friction"
     arm: str = "six_axis"
     timestep_s: float = 0.001
+    fidelity: str = "full"
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
@@ -155,6 +156,7 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
         timestep_s=request.timestep_s,
         relations="given" if request.relations is None else request.relations,
         eye="noise" if request.eye is None else request.eye,
+        fidelity=request.fidelity,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Never, final
 from apo_bench.errors import InputError, unknown
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/4"
+ROW = "apo-bench/row/5"
 EYES = ("noise", "range")
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"
@@ -19,6 +19,8 @@ USUAL = "isotropic"
 """The noise model where none is asked for."""
 LARGEST_LEVEL = 50.0
 """[mm] and [degrees]: five times that is still inside the room."""
+FIDELITIES = ("full", "contact")
+"""Every motion is simulated, or the part of each in which things may touch."""
 LARGEST_CARELESS = 10.0
 LARGEST_SEED = 2**53 - 1
 """Whole numbers up to here survive every JSON reader."""
@@ -47,6 +49,8 @@ class TrialSpec:
     eye: str = "noise"
     """`noise`, or `range`: poses are measured in depth images; `level_mm` is the noise of a ray then, `level_deg` is
     zero and `noise` is `range`."""
+    fidelity: str = "full"
+    """`full`, or `contact`: only the part of each motion in which things may touch is simulated."""
 
     def __post_init__(self) -> None:
         check_eye(self.eye)
@@ -56,6 +60,7 @@ class TrialSpec:
         check_clearance(self.clearance_mm)
         check_method(self.method)
         check_seed(self.seed)
+        check_fidelity(self.fidelity)
         object.__setattr__(self, "relations", checked_relations(self.relations))
         if self.eye == RANGE:
             if self.noise not in (USUAL, RANGE):
@@ -106,6 +111,12 @@ def check_eye(eye: str) -> None:
     """Raise an `InputError` unless there is such an eye."""
     if not isinstance(eye, str) or eye not in EYES:
         raise InputError(unknown("eye", str(eye), EYES))
+
+
+def check_fidelity(fidelity: str) -> None:
+    """Raise an `InputError` unless there is such a fidelity."""
+    if not isinstance(fidelity, str) or fidelity not in FIDELITIES:
+        raise InputError(unknown("fidelity", str(fidelity), FIDELITIES))
 
 
 def refuse_noise(*noises: object) -> Never:

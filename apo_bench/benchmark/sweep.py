@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.benchmark.fingerprint import content_hash, noise_content
-from apo_bench.benchmark.grid import SweepSpec, Unit, described, load_all, trial_key, units
+from apo_bench.benchmark.grid import KEY, SweepSpec, Unit, described, load_all, trial_key, units
 from apo_bench.benchmark.journal import Journal, run_record
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import TrialSpec
@@ -97,7 +97,7 @@ class Worker:
 
     def __init__(self, number: int) -> None:
         self.number = number
-        self._scenes: dict[tuple[str, float], tuple[Scene, str]] = {}
+        self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
 
     def run(self, unit: Unit, emit: Emit, stopped: Callable[[], bool] = lambda: False) -> None:
         """Run the trials of a unit, demonstrations shared, and emit each row with its timing."""
@@ -116,7 +116,7 @@ class Worker:
             emit(row, self._timing(row, began, ready, shown, time.perf_counter()))
 
     def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:
-        key = (spec.scenario, spec.clearance_mm)
+        key = (spec.scenario, spec.clearance_mm, spec.grasp)
         if key not in self._scenes:
             scene = build_scene(
                 load_scenario(spec.scenario),
@@ -130,9 +130,8 @@ class Worker:
 
     def _timing(self, row: Row, began: float, ready: float, shown: float, ended: float) -> dict[str, Any]:
         """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
-        keys = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg", "noise", "relations", "method")
         return {
-            **{key: row[key] for key in keys},
+            **{key: row[key] for key in KEY},
             "compile_s": ready - began,
             "demonstrate_s": shown - ready,
             "trial_s": ended - shown,

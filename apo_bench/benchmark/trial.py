@@ -55,6 +55,7 @@ def run_trial(
     Raises:
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
+    _refuse_unwired(spec)
     shown = shown or show(scene, spec.careless, spec.seed, spec.eye)
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     head = _head(spec, scene, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
@@ -87,6 +88,7 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
     Raises:
         InputError: The method is `oracle`, which would need the truth.
     """
+    _refuse_unwired(spec)
     if spec.method == "oracle":
         raise InputError(
             "the method 'oracle' was given for a measured observation, whose truth is not known; use none or paper."
@@ -103,6 +105,11 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
     planned = plan(spec.method, seen, None, told)
     said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
     return head | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch) | said
+
+
+def _refuse_unwired(spec: TrialSpec) -> None:
+    if spec.fidelity != "full":
+        raise InputError(f"the fidelity '{spec.fidelity}' is not there yet; full is allowed.")
 
 
 def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
@@ -175,6 +182,7 @@ def _head(spec: TrialSpec, scene: Scene, hashed: str) -> Row:
         "method": spec.method,
         "seed": spec.seed,
         "timestep_s": spec.timestep_s,
+        "fidelity": spec.fidelity,
         "thresholds": asdict(scene.scenario.thresholds),
     }
 
