@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO, final
@@ -102,16 +102,22 @@ def read_rows(folder: str | Path) -> list[dict[str, Any]]:
     Raises:
         InputError: No such folder, no trials in it, or a line that is not a row.
     """
+    return list(each_row(folder))
+
+
+def each_row(folder: str | Path) -> Iterator[dict[str, Any]]:
+    """The same, one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
     try:
-        text = path.read_bytes()
+        with path.open("rb") as file:
+            for i, line in enumerate(file, start=1):
+                if line.endswith(b"\n"):
+                    yield _row(line, path, i)
     except OSError as error:
         raise InputError(
             f"the folder '{folder}' holds no sweep ({error.strerror}: {path.name}); give the one that "
             "`apo-bench sweep --out` wrote."
         ) from error
-    whole, _, _ = text.rpartition(b"\n")
-    return [_row(line, path, i) for i, line in enumerate(whole.split(b"\n"), start=1) if whole]
 
 
 def _row(line: bytes, path: Path, number: int) -> dict[str, Any]:
