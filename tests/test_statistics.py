@@ -36,6 +36,7 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "noise": "isotropic",
         "relations": "given",
         "grasp": "friction",
+        "fidelity": "full",
         "method": method,
         "seed": seed,
         **UNKNOWN,

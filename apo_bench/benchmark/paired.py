@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
+from apo_bench.benchmark.adjust import DEFAULT, adjusted
+from apo_bench.benchmark.mcnemar import mcnemar
 from apo_bench.benchmark.spec import knows_relations
-from apo_bench.benchmark.statistics import CONFIDENCE, Interval, Place, order
+from apo_bench.benchmark.statistics import CONFIDENCE, Interval, Place, Rate, by_place, order
 
 REFERENCES = ("paper", "none")
 EDGE = 1e-9
@@ -28,6 +30,12 @@ class Paired:
     only_method: int
     """Seeds at which the method alone was right (strict)."""
     only_reference: int
+    both: int
+    """Seeds at which both were right."""
+    p: float | None
+    """McNemar's exact p-value; None without a pair."""
+    p_adjusted: float | None
+    """The same, adjusted for all comparisons that were made together."""
     planned: int
     """Seeds at which both had a plan."""
     free_mm: float | None
@@ -45,25 +53,61 @@ class Paired:
         """Tango's 95 % interval of the difference."""
         return tango(self.only_method, self.only_reference, self.pairs)
 
+    @property
+    def neither(self) -> int:
+        """Seeds at which both failed."""
+        return self.pairs - self.both - self.only_method - self.only_reference
 
-def paired(rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
+    @property
+    def recovered(self) -> Rate:
+        """Of the seeds at which the reference failed, those at which the method was right."""
+        return Rate(self.only_method, self.only_method + self.neither)
+
+    @property
+    def harmed(self) -> Rate:
+        """Of the seeds at which the reference was right, those at which the method failed."""
+        return Rate(self.only_reference, self.only_reference + self.both)
+
+
+def paired(
+    rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES, adjust: str = DEFAULT
+) -> tuple[Paired, ...]:
     """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
 
     `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
+    The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
+
+    Args:
+        adjust: One of `ADJUSTMENTS`.
+
+    Raises:
+        InputError: A trial is there twice, or there is no such adjustment.
     """
-    cells: dict[Place, dict[int, Mapping[str, Any]]] = {}
-    for row in rows:
-        if row["level"] is not None and row["success"] is not None:
-            place = Place(*(row[name] for name in Place._fields))
-            cells.setdefault(place, {})[row["seed"]] = row
-    found = []
-    for place in sorted(cells, key=order):
-        for reference in references:
-            other = place._replace(method=reference)
-            other = other if knows_relations(reference) else other._replace(relations="given")
-            if place.method not in ("oracle", reference) and other in cells:
-                found.append(_paired(place, reference, cells[place], cells[other]))
-    return tuple(found)
+    counted = {place: _counted(seeds) for place, seeds in by_place(rows).items()}
+    cells = {place: counted[place] for place in sorted(counted, key=order) if counted[place]}
+    found = [
+        _paired(place, reference, cells[place], cells[place_of_reference(place, reference)])
+        for place in cells
+        for reference in references
+        if place.method not in ("oracle", reference) and place_of_reference(place, reference) in cells
+    ]
+    p = {_comparison(pair): pair.p for pair in found if pair.p is not None}
+    raised = adjusted(p, adjust)
+    return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in found)
+
+
+def place_of_reference(place: Place, reference: str) -> Place:
+    """The cell that a cell is compared with."""
+    other = place._replace(method=reference)
+    return other if knows_relations(reference) else other._replace(relations="given")
+
+
+def _counted(seeds: Mapping[int, Mapping[str, Any]]) -> dict[int, Mapping[str, Any]]:
+    return {seed: row for seed, row in seeds.items() if row["success"] is not None}
+
+
+def _comparison(pair: Paired) -> frozenset[Place]:
+    return frozenset((pair.place, place_of_reference(pair.place, pair.reference)))
 
 
 def tango(b: int, c: int, n: int) -> Interval:
@@ -102,12 +146,17 @@ def _paired(
     pairs = [(ours[seed], theirs[seed]) for seed in sorted(set(ours) & set(theirs))]
     free = [(a["planned_error_free_mm"], b["planned_error_free_mm"]) for a, b in pairs]
     apart = [a - b for a, b in free if a is not None and b is not None]
+    only_method = sum(a["success"] and not b["success"] for a, b in pairs)
+    only_reference = sum(b["success"] and not a["success"] for a, b in pairs)
     return Paired(
         place=place,
         reference=reference,
         pairs=len(pairs),
-        only_method=sum(a["success"] and not b["success"] for a, b in pairs),
-        only_reference=sum(b["success"] and not a["success"] for a, b in pairs),
+        only_method=only_method,
+        only_reference=only_reference,
+        both=sum(a["success"] and b["success"] for a, b in pairs),
+        p=mcnemar(only_method, only_reference) if pairs else None,
+        p_adjusted=None,
         planned=len(apart),
         free_mm=sum(apart) / len(apart) if apart else None,
         free_interval=_student(apart),

@@ -1,4 +1,5 @@
-"""Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level and method."""
+"""Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp
+and fidelity."""
 
 from __future__ import annotations
 
@@ -8,7 +9,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
+from apo_bench.errors import InputError
+
 CONFIDENCE = 0.95
+NOT_EXECUTED = ("observe", "correct", "worker")
+"""Stages of failures at which no plan was carried out to its end: there was none, or its process died."""
 
 
 class Place(NamedTuple):
@@ -22,13 +27,32 @@ class Place(NamedTuple):
     level: float
     level_deg: float
     method: str
+    grasp: str = "friction"
+    fidelity: str = "full"
 
 
 class Interval(NamedTuple):
-    """A two-sided confidence interval of a rate."""
+    """A two-sided confidence interval."""
 
     low: float
     high: float
+
+
+class Rate(NamedTuple):
+    """So many successes among so many trials."""
+
+    successes: int
+    trials: int
+
+    @property
+    def rate(self) -> float | None:
+        """None without a trial."""
+        return self.successes / self.trials if self.trials else None
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's at 95 %."""
+        return wilson(self.successes, self.trials)
 
 
 @final
@@ -44,11 +68,15 @@ class Cell:
     level: float
     level_deg: float
     method: str
+    grasp: str
+    fidelity: str
     trials: int
     """Trials that count: those whose demonstration was right."""
     successes: int
     """Strict."""
     loose_successes: int
+    not_executed: int
+    """Failures of which no plan was carried out: nothing was corrected, or the worker died. They count as failures."""
     excluded: int
     """Trials left out of every method alike, since the demonstration itself was not right."""
     failures: Mapping[str, int]
@@ -73,6 +101,11 @@ class Cell:
         """Wilson's 95 % interval of the strict rate."""
         return wilson(self.successes, self.trials)
 
+    @property
+    def executed(self) -> Rate:
+        """Strict success among the trials whose plan was carried out."""
+        return Rate(self.successes, self.trials - self.not_executed)
+
 
 def wilson(successes: int, trials: int) -> Interval:
     """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
@@ -95,32 +128,62 @@ def rank_relations(relations: str) -> tuple[int, str]:
     return int(relations != "given"), relations
 
 
+def place_of(row: Mapping[str, Any]) -> Place | None:
+    """The cell of a row; None for a measured demonstration, which has no level."""
+    if row["level"] is None:
+        return None
+    return Place(*(row[name] for name in Place._fields[:-1]), fidelity=row.get("fidelity", "full"))
+
+
+def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping[str, Any]]]:
+    """Cell -> seed -> row.
+
+    Raises:
+        InputError: A trial is there twice; counted twice it would make intervals narrower than they are.
+    """
+    cells: dict[Place, dict[int, Mapping[str, Any]]] = {}
+    for row in rows:
+        place = place_of(row)
+        if place is None:
+            continue
+        seeds = cells.setdefault(place, {})
+        if row["seed"] in seeds:
+            raise InputError(
+                f"the rows hold a trial twice ({place.scenario}, {place.method}, level {place.level:g}, seed "
+                f"{row['seed']}); every trial counts once, so leave one of the two out."
+            )
+        seeds[row["seed"]] = row
+    return cells
+
+
 def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
-    """Count rows into cells, sorted by scenario, clearance, noise, relations, carelessness, method, level.
+    """Count rows into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
 
     Rows of a measured demonstration have no level and belong to no cell.
+
+    Raises:
+        InputError: A trial is there twice.
     """
-    groups: dict[Place, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        if row["level"] is not None:
-            groups.setdefault(Place(*(row[name] for name in Place._fields)), []).append(row)
-    return tuple(_cell(key, groups[key]) for key in sorted(groups, key=order))
+    groups = by_place(rows)
+    return tuple(_cell(key, list(groups[key].values())) for key in sorted(groups, key=order))
 
 
 def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
     counted = [row for row in rows if row["success"] is not None]
-    why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in counted if not row["success"])
+    failed = [row for row in counted if not row["success"]]
+    why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in failed)
     return Cell(
         **key._asdict(),
         trials=len(counted),
-        successes=sum(row["success"] for row in counted),
+        successes=len(counted) - len(failed),
         loose_successes=sum(row["loose_success"] for row in counted),
+        not_executed=sum(row["failure_stage"] in NOT_EXECUTED for row in failed),
         excluded=len(rows) - len(counted),
-        failures=MappingProxyType(dict(why.most_common())),
+        failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
     )
 
 
 def order(k: Place) -> tuple[Any, ...]:
     """How cells are sorted: by what is asked, then by method (`oracle` first), then by level."""
     where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
-    return (*where, rank(k.method), k.method, k.level, k.level_deg)
+    return (*where, k.grasp, k.fidelity != "full", rank(k.method), k.method, k.level, k.level_deg)

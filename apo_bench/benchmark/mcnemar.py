@@ -1,0 +1,18 @@
+"""McNemar's exact test: whether two methods over the same seeds are right equally often."""
+
+from __future__ import annotations
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """The two-sided exact p-value: how unlikely so uneven a split is if each discordant pair falls either way alike.
+
+    After Q. McNemar, Note on the sampling error of the difference between correlated proportions or percentages,
+    Psychometrika 12 (1947), 153-157; exact by the binomial distribution. Without a discordant pair it is 1.
+
+    Args:
+        only_first: Pairs in which the first alone succeeded.
+        only_second: Pairs in which the second alone succeeded.
+    """
+    from statsmodels.stats.contingency_tables import mcnemar as test
+
+    return float(test([[0, only_first], [only_second, 0]], exact=True).pvalue)
