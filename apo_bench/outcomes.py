@@ -23,6 +23,7 @@ CODES = MappingProxyType(
         "doubtful": "a relation is probably wrong",
         "not_converged": "the solver did not come to rest within its iterations",
         "not_finite": "the correction holds a number that is not finite",
+        "raised": "the corrector raised an error or returned what it must not",
         # plan
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
         "unstable_goal": "at the goal of operation {operation} the centre of mass of {part} lies beside its support",
@@ -39,6 +40,9 @@ CODES = MappingProxyType(
         "pushed": "a part that was already in place was pushed away",
         "not_released": "a part is still held",
         "not_at_rest": "a part still moves",
+        # worker: of sweeps alone, whatever the trial was doing
+        "worker_died": "the process that ran the trial died",
+        "time_limit": "the trial took longer than the sweep allows, and was ended",
     }
 )
 

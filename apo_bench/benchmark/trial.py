@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.confidence import UNKNOWN, confidence
+from apo_bench.benchmark.confidence import confidence
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
-from apo_bench.benchmark.recognised import UNCOUNTED, counted, understood
-from apo_bench.benchmark.spec import ENV_ID, RANGE, ROW, TrialSpec, knows_relations
+from apo_bench.benchmark.recognised import counted, understood
+from apo_bench.benchmark.row import Row, head, result
+from apo_bench.benchmark.spec import RANGE, TrialSpec, knows_relations
 from apo_bench.benchmark.stages import (
-    Ending,
     Shown,
     Tried,
     attempt,
@@ -37,9 +36,6 @@ from apo_bench.pose_error import pose_errors
 from apo_bench.program import Observation, Plan, Snapshot
 from apo_bench.simulation.scene import Scene
 
-Row = dict[str, Any]
-"""One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1."""
-
 
 def run_trial(
     spec: TrialSpec, scene: Scene, *, shown: Shown | None = None, content: str | None = None, watch: Any = None
@@ -58,15 +54,15 @@ def run_trial(
     _refuse_unwired(spec)
     shown = shown or show(scene, spec.careless, spec.seed, spec.eye)
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    head = _head(spec, scene, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
+    first = head(spec, scene.scenario, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
     if shown.demonstration.code != "ok":
-        return head | _result(misshown(shown.demonstration), success=None)
+        return first | result(misshown(shown.demonstration), success=None)
     seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed)
     told = _told(spec, seen, shown.layout.goals)
     truth = shown.layout.goals
     planned = plan(spec.method, seen, truth, told)
     said = confidence(planned, seen, told, truth)
-    return head | _carry_out(planned, scene, truth, truth, watch) | said | _contacts(spec, seen, told)
+    return first | _carry_out(planned, scene, truth, truth, watch) | said | _contacts(spec, seen, told)
 
 
 def eye_of(spec: TrialSpec, scene: Scene, shown: Shown) -> Noise:
@@ -94,7 +90,7 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
             "the method 'oracle' was given for a measured observation, whose truth is not known; use none or paper."
         )
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    head = _head(spec, scene, spec_hash(spec, content, text)) | {
+    first = head(spec, scene.scenario, spec_hash(spec, content, text)) | {
         "level": None,
         "level_deg": None,
         "careless": None,
@@ -104,7 +100,7 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
     told = _told(spec, seen, None)
     planned = plan(spec.method, seen, None, told)
     said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
-    return head | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch) | said
+    return first | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch) | said
 
 
 def _refuse_unwired(spec: TrialSpec) -> None:
@@ -139,10 +135,10 @@ def _carry_out(planned: Planned, scene: Scene, reference: Array, truth: Array | 
     said = _correction(planned)
     if planned.plan is None:
         assert planned.refused is not None
-        return _result(planned.refused, success=False) | said
+        return result(planned.refused, success=False) | said
     said |= {"predicted": foretold(planned.plan, scene)}
     tried = attempt(planned.plan, scene, reference, watch)
-    return _result(ending(tried), success=tried.verdict.success) | said | _physics(tried, planned.plan, truth)
+    return result(ending(tried), success=tried.verdict.success) | said | _physics(tried, planned.plan, truth)
 
 
 def _correction(planned: Planned) -> Row:
@@ -162,60 +158,6 @@ def _correction(planned: Planned) -> Row:
 def _numbers(operations: Iterable[int]) -> list[int]:
     """Counted from 1, as whole numbers that JSON can hold."""
     return [int(k) + 1 for k in operations]
-
-
-def _head(spec: TrialSpec, scene: Scene, hashed: str) -> Row:
-    return {
-        "schema": ROW,
-        "env_id": ENV_ID,
-        "spec_hash": hashed,
-        "scenario": scene.scenario.name,
-        "level": spec.level_mm,
-        "level_deg": spec.level_deg,
-        "careless": spec.careless,
-        "clearance_mm": spec.clearance_mm,
-        "eye": spec.eye,
-        "noise": spec.noise,
-        "grasp": spec.grasp,
-        "arm": spec.arm,
-        "relations": spec.relations,
-        "method": spec.method,
-        "seed": spec.seed,
-        "timestep_s": spec.timestep_s,
-        "fidelity": spec.fidelity,
-        "thresholds": asdict(scene.scenario.thresholds),
-    }
-
-
-def _result(end: Ending, *, success: bool | None) -> Row:
-    """The rest of a row of which nothing but its ending is known."""
-    return {
-        "success": success,
-        "loose_success": success,
-        "failure_stage": end.stage if end.failed else None,
-        "failure_code": end.code if end.failed else None,
-        "failure_operation": None if end.operation is None else end.operation + 1,
-        "sentence": end.sentence,
-        "conditions": None,
-        "worst_gap_mm": None,
-        "worst_angle_deg": None,
-        "least_overlap": None,
-        "penetration_mm": None,
-        "pushed_mm": None,
-        "freed": None,
-        "tried": None,
-        "extra_operations": None,
-        "predicted": None,
-        "gap_before_mm": None,
-        "gap_after_mm": None,
-        **UNKNOWN,
-        **UNCOUNTED,
-        "reached": None,
-        "pose_error_fixed_mm": None,
-        "pose_error_free_mm": None,
-        "peak_force_n": None,
-        "sim_seconds": None,
-    }
 
 
 def _physics(tried: Tried, plan: Plan, truth: Array | None) -> Row:

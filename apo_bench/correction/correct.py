@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.measured import gap_of, measured
 from apo_bench.correction.returned import RIGID, check_near, checked
-from apo_bench.errors import InputError, kind
+from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 from apo_bench.names import resolve
@@ -45,6 +45,10 @@ CORRECTORS = MappingProxyType(
 STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
 
 
+class Misbehaved(InputError):
+    """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
+
+
 def correct(seen: Observation, corrector: Any = "contact") -> Correction:
     """What the corrector makes of an observation.
 
@@ -53,8 +57,8 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
             bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
 
     Raises:
-        InputError: There is no such corrector, the observation makes no sense, or the corrector returned something
-            else, or a schedule that makes no sense.
+        InputError: There is no such corrector, or the observation makes no sense.
+        Misbehaved: The corrector raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observations((seen,))
     chosen = resolve(corrector, CORRECTORS, "corrector")
@@ -65,11 +69,17 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
             "and returns a Correction, or an object with such a __call__."
         )
     try:
-        found = chosen(seen)
-    except InputError:
-        raise
+        return _admitted(chosen(seen), seen, chosen, name)
+    except InputError as error:
+        if _ours(chosen) or isinstance(error, Misbehaved):
+            raise
+        raise Misbehaved(str(error)) from error
     except Exception as error:
-        raise InputError(f"the corrector '{name}' failed: it raised {error!r}; mend it, or use another.") from error
+        raise Misbehaved(str(failed(f"the corrector '{name}'", error))) from error
+
+
+def _admitted(found: Any, seen: Observation, chosen: Any, name: str) -> Correction:
+    """What a corrector returned, as a `Correction` that makes sense."""
     if not isinstance(found, Correction):
         return measured(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
     if found.status not in STATUSES:

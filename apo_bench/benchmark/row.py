@@ -1,0 +1,74 @@
+"""A row: what was asked for, and how it ended; what only a replay can say is filled in by `trial`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from apo_bench.benchmark.confidence import UNKNOWN
+from apo_bench.benchmark.recognised import UNCOUNTED
+from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
+from apo_bench.benchmark.stages import Ending
+from apo_bench.scenario import Scenario
+
+Row = dict[str, Any]
+"""One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1."""
+
+
+def head(spec: TrialSpec, scenario: Scenario, hashed: str) -> Row:
+    """What was asked for.
+
+    Args:
+        hashed: From `spec_hash`.
+    """
+    return {
+        "schema": ROW,
+        "env_id": ENV_ID,
+        "spec_hash": hashed,
+        "scenario": scenario.name,
+        "level": spec.level_mm,
+        "level_deg": spec.level_deg,
+        "careless": spec.careless,
+        "clearance_mm": spec.clearance_mm,
+        "eye": spec.eye,
+        "noise": spec.noise,
+        "grasp": spec.grasp,
+        "arm": spec.arm,
+        "relations": spec.relations,
+        "method": spec.method,
+        "seed": spec.seed,
+        "timestep_s": spec.timestep_s,
+        "fidelity": spec.fidelity,
+        "thresholds": asdict(scenario.thresholds),
+    }
+
+
+def result(end: Ending, *, success: bool | None) -> Row:
+    """The rest of a row of which nothing but its ending is known."""
+    return {
+        "success": success,
+        "loose_success": success,
+        "failure_stage": end.stage if end.failed else None,
+        "failure_code": end.code if end.failed else None,
+        "failure_operation": None if end.operation is None else end.operation + 1,
+        "sentence": end.sentence,
+        "conditions": None,
+        "worst_gap_mm": None,
+        "worst_angle_deg": None,
+        "least_overlap": None,
+        "penetration_mm": None,
+        "pushed_mm": None,
+        "freed": None,
+        "tried": None,
+        "extra_operations": None,
+        "predicted": None,
+        "gap_before_mm": None,
+        "gap_after_mm": None,
+        **UNKNOWN,
+        **UNCOUNTED,
+        "reached": None,
+        "pose_error_fixed_mm": None,
+        "pose_error_free_mm": None,
+        "peak_force_n": None,
+        "sim_seconds": None,
+    }
