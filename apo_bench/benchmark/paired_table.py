@@ -30,7 +30,8 @@ WORDS = (
     "*harmed*, the share of the seeds at which the other was right that it spoilt, and the mean difference of the "
     "errors of their planned goals in directions that contacts leave free, over seeds at which both had a plan, with "
     "Student's t interval (intervals are of 95 %). Negative errors are smaller than the other's. With no discordant "
-    "pair among n the score interval still reaches 3.84 / (n + 3.84) to both sides: 3.7 points at 100 pairs, less than 3 from 125 on."
+    "pair among n the score interval still reaches 3.84 / (n + 3.84) to both sides: 3.7 points at 100 pairs, less than "
+    "3 from 125 on."
 )
 
 

@@ -132,7 +132,7 @@ def place_of(row: Mapping[str, Any]) -> Place | None:
     """The cell of a row; None for a measured demonstration, which has no level."""
     if row["level"] is None:
         return None
-    return Place(*(row[name] for name in Place._fields[:-1]), fidelity=row.get("fidelity", "full"))
+    return Place(*[row[name] for name in Place._fields[:-1]] + [row.get("fidelity", "full")])
 
 
 def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping[str, Any]]]:
