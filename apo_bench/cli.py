@@ -14,7 +14,17 @@ from typing import Annotated
 
 import typer
 
-from apo_bench import __version__, cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show, cli_sweep
+from apo_bench import (
+    __version__,
+    cli_correction,
+    cli_eye,
+    cli_noise,
+    cli_plan,
+    cli_power,
+    cli_recognition,
+    cli_show,
+    cli_sweep,
+)
 from apo_bench.arguments import check_writable
 from apo_bench.cli_sweep import EYE, FIDELITY, NOISE, RELATIONS, Interrupted
 from apo_bench.errors import InputError
@@ -129,7 +139,7 @@ def graph(
             typer.echo(f"\nWrote {out}")
 
 
-for commands in (cli_correction, cli_eye, cli_noise, cli_plan, cli_recognition, cli_show, cli_sweep):
+for commands in (cli_correction, cli_eye, cli_noise, cli_plan, cli_power, cli_recognition, cli_show, cli_sweep):
     commands.register(app)
 
 

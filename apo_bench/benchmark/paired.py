@@ -7,10 +7,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
+import numpy as np
+
 from apo_bench.benchmark.adjust import DEFAULT, adjusted
 from apo_bench.benchmark.mcnemar import mcnemar
 from apo_bench.benchmark.spec import knows_relations
 from apo_bench.benchmark.statistics import CONFIDENCE, Interval, Place, Rate, by_place, order
+from apo_bench.geometry.arrays import Array
+
+Counts = Array | int
 
 REFERENCES = ("paper", "none")
 EDGE = 1e-9
@@ -128,16 +133,16 @@ def tango(b: int, c: int, n: int) -> Interval:
     if n == 0:
         return Interval(-1.0, 1.0)
     z, d = float(norm.ppf((1 + CONFIDENCE) / 2)), (b - c) / n
-    low = -1.0 if c == n else brentq(lambda x: _score(b, c, n, x) - z, -1 + EDGE, d - EDGE)
-    high = 1.0 if b == n else brentq(lambda x: _score(b, c, n, x) + z, d + EDGE, 1 - EDGE)
+    low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + EDGE, d - EDGE)
+    high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + EDGE, 1 - EDGE)
     return Interval(float(low), float(high))
 
 
-def _score(b: int, c: int, n: int, delta: float) -> float:
-    """The score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
+def score(b: Counts, c: Counts, n: Counts, delta: Array | float) -> Array:
+    """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
     B = -b - c + (2 * n - b + c) * delta
-    q = (math.sqrt(max(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
-    return (b - c - n * delta) / math.sqrt(n * (2 * q + delta * (1 - delta)))
+    q = (np.sqrt(np.maximum(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
+    return np.asarray((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
 
 
 def _paired(
@@ -165,7 +170,6 @@ def _paired(
 
 def _student(x: Sequence[float]) -> Interval | None:
     """Student's t interval of a mean at 95 %."""
-    import numpy as np
     from scipy.stats import t
 
     if len(x) < 2:
