@@ -19,6 +19,7 @@ from apo_bench.outcomes import sentence
 from apo_bench.prediction import predict
 from apo_bench.program import Demonstration, Layout, Observation, Plan, ReplayResult
 from apo_bench.recognition.range_eye import RangeEye
+from apo_bench.simulation.branches import Branches
 from apo_bench.simulation.demonstrate import demonstrate
 from apo_bench.simulation.eye.watch import Watched, Watcher
 from apo_bench.simulation.replay import replay
@@ -117,14 +118,21 @@ def foretold(plan: Plan, scene: Scene) -> dict[str, Any]:
     return {"fails": said.fails, "operation": operation, "code": said.code, "size_mm": said.size_mm}
 
 
-def attempt(plan: Plan, scene: Scene, reference: Array, watch: Any = None) -> Tried:
+def attempt(
+    plan: Plan,
+    scene: Scene,
+    reference: Array,
+    watch: Any = None,
+    fidelity: str = "full",
+    branches: Branches | None = None,
+) -> Tried:
     """Replay a plan and judge what was reached.
 
     Args:
         reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
         watch: Called with the `MjData` about every 20 ms of simulated time.
     """
-    result = replay(plan, scene, watch)
+    result = replay(plan, scene, watch, fidelity=fidelity, branches=branches)
     scenario = scene.scenario
     verdict = judge(scenario.assembly, result.reached, reference, scenario.thresholds, scene.clearance_mm)
     return Tried(result, verdict)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.solid import Box, Solid
 
 
@@ -27,8 +29,7 @@ def depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: A
     Returns:
         (k,), [m].
     """
-    centers_a, halves_a = _boxes(a)
-    centers_b, halves_b = _boxes(b)
+    (centers_a, halves_a), (centers_b, halves_b) = _boxes(a), _boxes(b)
     axes = _axes(R_a, T_b[:3, :3])
     reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
     between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
@@ -36,14 +37,29 @@ def depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: A
     return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
 
 
+@lru_cache(maxsize=1024)
 def _boxes(boxes: tuple[Box, ...]) -> tuple[Array, Array]:
     """Centres and half sizes, (k, 3) each, in the frame of their solid."""
-    return np.array([box.center for box in boxes]), np.array([box.half for box in boxes])
+    return frozen([box.center for box in boxes], None, 3), frozen([box.half for box in boxes], None, 3)
 
 
 def _axes(R_a: Array, R_b: Array) -> Array:
     """The directions along which two boxes may be apart, (k, 3), unit length; parallel edges give no cross product."""
-    crossed = np.cross(R_a.T[:, None], R_b.T[None]).reshape(-1, 3)
-    length = np.linalg.norm(crossed, axis=1)
+    a, b = R_a[:, :, None], R_b[:, None, :]
+    crossed = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    crossed = crossed.reshape(3, -1).T
+    length = np.sqrt((crossed * crossed).sum(axis=1))
     kept = length > 1e-6
     return np.concatenate([R_a.T, R_b.T, crossed[kept] / length[kept, None]])
+
+
+def upright(boxes: tuple[Box, ...], R: Array, at: Array) -> tuple[Array, Array]:
+    """The lowest and the highest corner, (3,) each, of the box around posed boxes whose sides are those of the world.
+
+    Args:
+        R: (3, 3), their orientation.
+        at: (3,), the place of their frame, [m].
+    """
+    centers, halves = _boxes(boxes)
+    middle, reach = centers @ R.T + at, halves @ np.abs(R).T
+    return (middle - reach).min(axis=0), (middle + reach).max(axis=0)

@@ -14,20 +14,29 @@ LOST_LOAD = 0.8
 """A hand that feels less than this part of the weight of a group has lost some of it."""
 
 
-def carry_out(robot: Robot, t: Transfer) -> None:
-    """Carry it out.
+def take(robot: Robot, t: Transfer) -> int:
+    """Pick the part and lift it; returns which of its grips is then in use.
 
     Raises:
         Halt: Something went wrong; the stage and code say what.
     """
-    grips = iter(t.grips)
-    grip = next(grips)
-    _pick(robot, t, grip)
+    changes = t.out.left is not None
+    _pick(robot, t, t.grips[0])
     if t.out.level:
-        grip = pull_out(robot, t, grip, next(grips) if t.out.left is not None else None)
+        pull_out(robot, t, t.grips[0], t.grips[1] if changes else None)
     _lift(robot, t)
+    return 1 if t.out.level and changes else 0
+
+
+def bring(robot: Robot, t: Transfer, i: int) -> None:
+    """Carry the part that is held by its i-th grip, attach it, let go and depart.
+
+    Raises:
+        Halt: Something went wrong; the stage and code say what.
+    """
+    grip = t.grips[i]
     _carry(robot, t, grip)
-    left, grip = attach(robot, t, grip, next(grips) if t.into.left is not None else None)
+    left, grip = attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
     release(robot, t, grip)
     depart(robot, t)
     if left > ARRIVED_M:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import depths
+from apo_bench.geometry.intrusion import depths, upright
 from apo_bench.geometry.solid import Box, Solid
 from apo_bench.program import Poses
 from apo_bench.scenario import Grasp
@@ -192,9 +192,20 @@ def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: floa
 
 
 def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
-    """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world."""
+    """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
+
+    What its way does not come by counts as far away.
+    """
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
-    return np.max([depths(boxes, R, at, each.boxes, each.T) for each in around], axis=0, initial=-1.0)
+    low, high = upright(boxes, R, np.zeros(3))
+    low, high = low + at.min(axis=0), high + at.max(axis=0)
+    met = [each for each in around if _overlap(low, high, *upright(each.boxes, each.T[:3, :3], each.T[:3, 3]))]
+    return np.max([np.full(len(at), -1.0), *(depths(boxes, R, at, each.boxes, each.T) for each in met)], axis=0)
+
+
+def _overlap(low: Array, high: Array, bottom: Array, top: Array) -> bool:
+    """Whether two upright boxes have more than their sides in common."""
+    return bool((low < top).all() and (high > bottom).all())
 
 
 def _back(stroke: Stroke, left: float) -> Array:

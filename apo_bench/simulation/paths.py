@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import final
 
 import numpy as np
@@ -13,6 +14,8 @@ from apo_bench.geometry.arrays import Array
 
 PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
+STRAIGHT = 1e-8
+"""Rotations this near to none are as good as their antisymmetric part, which is quick to have."""
 
 
 @final
@@ -26,11 +29,16 @@ class Line:
     progress: Callable[[Array], Array]
     """Time / seconds in [0, 1] -> part of the way in [0, 1]."""
 
+    @cached_property
+    def turn(self) -> Array:
+        """The rotation vector from start to end, (3,), in the frame of the start, [rad]."""
+        return turn_between(self.start, self.end)
+
     def poses(self, s: Array) -> Array:
         """(k,) parts of the way -> (k, 4, 4)."""
-        turn = pose.log(pose.inverse(self.start) @ self.end)[3:]
         T = np.zeros((len(s), 4, 4))
-        T[:, :3, :3] = self.start[:3, :3] @ pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * turn]))[:, :3, :3]
+        turns = pose.exp(np.hstack([np.zeros((len(s), 3)), s[:, None] * self.turn]))
+        T[:, :3, :3] = self.start[:3, :3] @ turns[:, :3, :3]
         T[:, :3, 3] = self.start[:3, 3] + s[:, None] * (self.end[:3, 3] - self.start[:3, 3])
         T[:, 3, 3] = 1.0
         return T
@@ -39,7 +47,7 @@ class Line:
 def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5, shortest: float = 0.15) -> Line:
     """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
     far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    turn = float(np.linalg.norm(pose.log(pose.inverse(start) @ end)[3:]))
+    turn = float(np.linalg.norm(turn_between(start, end)))
     return Line(start, end, max(shortest, PEAK * far / speed, PEAK * turn / turn_speed), minimum_jerk)
 
 
@@ -66,6 +74,16 @@ class _Trapezoid:
         r, top = self.ramp, 1.0 - self.ramp
         s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
         return s / top
+
+
+def turn_between(start: Array, end: Array) -> Array:
+    """The rotation vector from one pose to another, (3,), in the frame of the first, [rad]."""
+    R = start[:3, :3].T @ end[:3, :3]
+    if np.abs(R - np.eye(3)).max() < STRAIGHT:
+        return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    T = np.eye(4)
+    T[:3, :3] = R
+    return pose.log(T)[3:]
 
 
 def turn_from(rest: Array, T: Array) -> float:

@@ -7,11 +7,12 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.outcomes import sentence
 from apo_bench.program import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step
-from apo_bench.simulation.carry_out import carry_out
+from apo_bench.simulation.branches import Branches, marks
+from apo_bench.simulation.carry_out import bring, take
 from apo_bench.simulation.prepare import Move, moves, unreachable
 from apo_bench.simulation.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.world import snapshot
+from apo_bench.simulation.world import sleeping, snapshot
 from apo_bench.stability import unstable
 
 SETTLE_S = 0.5
@@ -21,27 +22,46 @@ REST_M_S, REST_RAD_S = 5e-5, 1e-3
 LOOK_S, PATIENCE_S = 0.04, 1.5
 
 
-def replay(plan: Plan, scene: Scene, watch: Watch | None = None, parts_at: Poses | None = None) -> ReplayResult:
+def replay(
+    plan: Plan,
+    scene: Scene,
+    watch: Watch | None = None,
+    parts_at: Poses | None = None,
+    fidelity: str = "full",
+    branches: Branches | None = None,
+) -> ReplayResult:
     """Carry out a plan.
 
     Args:
         watch: Called with the `MjData` about every 20 ms of simulated time.
         parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
+        fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out, and what rests
+            untouched is not stepped.
+        branches: What replays of this scene have in common; changes nothing but the time it takes.
     """
-    robot = Robot(scene, plan.start if parts_at is None else parts_at, watch)
-    after: list[Snapshot | None] = [None] * len(plan.assembly)
-    todo, timeline = moves(plan, scene), list[tuple[Step, float]]()
-    outcome = _refusal(plan, scene, todo) or _carry_out(plan, robot, todo, after, timeline)
-    final = None
-    if outcome.code != "unstable_simulation":
-        final = _settled(robot, plan)
-    return ReplayResult(
+    start = plan.start if parts_at is None else parts_at
+    todo = moves(plan, scene)
+    refused = _refusal(plan, scene, todo)
+    branches = Branches() if branches is None or watch is not None else branches
+    way = marks(scene, start, fidelity, todo)
+    ended = None if refused or not way else branches.ended(way[-1])
+    if ended is not None:
+        return ended
+    robot, after = Robot(scene, start, watch, fidelity), list[Snapshot | None]([None] * len(plan.assembly))
+    timeline = list[tuple[Step, float]]()
+    with sleeping(scene.work, fidelity == "contact"):
+        outcome = refused or _carry_out(plan, robot, todo, after, timeline, branches, way)
+        final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
+    result = ReplayResult(
         reached=Reached(after=tuple(after), final=final),
         outcome=outcome,
         peak_force_n=robot.peak_force_n,
         sim_seconds=float(robot.data.time),
         timeline=tuple(timeline),
     )
+    if way and not refused:
+        branches.end(way[-1], result)
+    return result
 
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
@@ -73,11 +93,22 @@ def _carry_out(
     todo: tuple[Move, ...],
     after: list[Snapshot | None],
     timeline: list[tuple[Step, float]],
+    branches: Branches,
+    way: list[bytes],
 ) -> Outcome:
-    robot.wait(0.05)
-    for step, t in todo:
+    done, kept = branches.resume(way, robot)
+    if kept is None:
+        robot.wait(0.05)
+    else:
+        after[:], timeline[:] = kept.after, kept.timeline
+    for i, (step, t) in list(enumerate(todo))[done // 2 :]:
         try:
-            carry_out(robot, t)
+            if kept is None or done <= 2 * i:
+                grip = take(robot, t)
+                branches.keep(way[2 * i], robot, grip, after, timeline)
+            else:
+                grip = kept.grip
+            bring(robot, t, grip)
             _until_rest(robot)
         except Halt as halt:
             if halt.code == "force_stop" and not step.undo:
@@ -85,6 +116,7 @@ def _carry_out(
             return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
         after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
         timeline.append((step, float(robot.data.time)))
+        branches.keep(way[2 * i + 1], robot, 0, after, timeline)
     return Outcome("done", "ok", None, sentence("ok"))
 
 

@@ -12,19 +12,20 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
+from apo_bench.simulation.gripper import gripper_boxes
+from apo_bench.simulation.leap import leap
+from apo_bench.simulation.near import Moving, clear, near_spans
 from apo_bench.simulation.paths import Line, smooth, unwound
+from apo_bench.simulation.reach import along, at_end
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.world import fresh, unstable
+from apo_bench.simulation.world import fresh, part_pose, unstable
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
-KNOT_M, KNOT_RAD = 0.03, 0.15
-"""Inverse kinematics is solved this densely along a line; a cubic spline leads through."""
 COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
 
@@ -51,14 +52,17 @@ class Guard(NamedTuple):
 class Robot:
     """One arm during one replay."""
 
-    def __init__(self, scene: Scene, start: Poses, watch: Watch | None = None) -> None:
-        self.scene, self.watch = scene, watch
+    def __init__(self, scene: Scene, start: Poses, watch: Watch | None = None, fidelity: str = "full") -> None:
+        self.scene, self.watch, self.fidelity = scene, watch, fidelity
+        self.left_out_s = 0.0
+        """How much of the time passed without being simulated."""
         self.model, self.arm = scene.work.model, scene.arm
         self.stage = "plan"
-        self._held: list[int] = []
+        self._held: tuple[str, ...] = ()
         self._handled: int | None = None
         self.peak_force_n = 0.0
         self._find_joints()
+        self._net = np.zeros((3, self.model.nsensordata))
         self.data: Any = fresh(scene.work, start)
         self.data.qpos[self._qpos] = self.arm.home
         self.data.qpos[self._fingers] = self.arm.opening_m
@@ -68,8 +72,9 @@ class Robot:
         self._rest = self.T
         self.data.ctrl[self._drives] = self.q
         self.data.ctrl[self._grip] = self.arm.opening_m
-        forces, free = self.data.sensordata.reshape(-1, 3), len(scene.work.free)
-        self._on_all, self._on_arm = forces[:free], forces[free:]
+        self._names = (*scene.work.free, *scene.work.fixed)
+        self._forces = self.data.sensordata
+        self._on_arm = self._forces.reshape(-1, 3)[len(scene.work.free) :]
 
     def follow(self, line: Line, guard: Guard | None = None) -> float:
         """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.
@@ -77,17 +82,23 @@ class Robot:
         Raises:
             Halt: The line leaves the arm's reach, or something went wrong on the way.
         """
-        if np.allclose(line.start, line.end, rtol=0.0, atol=1e-7):
+        if np.abs(line.start - line.end).max() < 1e-7:
             return 0.0
-        step = float(self.model.opt.timestep)
-        n = max(1, round(line.seconds / step))
-        path = self._joint_path(line)(line.progress(np.arange(1, n + 1) / n))
-        velocity = np.gradient(np.vstack([self.q, path]), step, axis=0)[1:]
-        done = self._run(path + self._lead * velocity, guard)
-        if done < n:
-            self._hold_where_it_is()
-            return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
-        self.q, self.T = path[-1], line.end
+        n = max(1, round(line.seconds / self.step_s))
+        s, done = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)]), 0
+        for begin, end in self._spans(line, s):
+            q = self.q
+            if begin > done:
+                q = self._reached(at_end(self.scene.kinematics, line, s[done], s[begin], q))
+            path = self._reached(along(self.scene.kinematics, line, s[begin : end + 1], q))
+            velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
+            if begin > done:
+                self._leap(q, velocity[0], begin - done)
+            if self._run((path + self._lead * velocity)[1:], guard) < end - begin:
+                self._hold_where_it_is()
+                return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
+            self.q, done = path[-1], end
+        self.T = line.end
         return 0.0
 
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
@@ -96,10 +107,19 @@ class Robot:
             self.follow(smooth(self.T, T, speed, turn_speed))
 
     def wait(self, seconds: float) -> None:
-        self._run(np.broadcast_to(self.q, (round(seconds / self.model.opt.timestep), len(self.q))), None)
+        self.data.ctrl[self._drives] = self.q
+        steps = round(seconds / self.step_s)
+        for done in range(0, steps, self._every):
+            n = min(self._every, steps - done)
+            mujoco.mj_step(self.model, self.data, n)
+            if n == self._every:
+                self._look()
 
     def fingers(self, to: float, seconds: float = 0.25) -> None:
         """Command both fingers to an opening [m] and wait; beyond the part's surface the force limit rules."""
+        if self.fidelity == "contact" and not self._held and self._may_open(to):
+            self.data.qpos[self._fingers], self.data.ctrl[self._grip] = to, to
+            return self._pass(seconds)
         start = float(self.data.ctrl[self._grip])
         ticks = max(1, round(seconds / TICK_S))
         for i in range(1, ticks + 1):
@@ -115,9 +135,16 @@ class Robot:
 
         What the parts of a group exert on each other cancels.
         """
-        if not self._held:
-            return np.zeros(3)
-        return np.asarray((self._on_arm[self._held] - self._on_all[self._held]).sum(axis=0))
+        return np.asarray(self._net @ self._forces)
+
+    def memory(self) -> tuple[Any, ...]:
+        """What the controller knows, apart from the physics; for `remember`."""
+        return (self.q, self.T, self.stage, self._held, self._handled, self.peak_force_n, self.left_out_s)
+
+    def remember(self, memory: tuple[Any, ...]) -> None:
+        """Go on from where a `memory` was made, once the physics are where they were then."""
+        self.q, self.T, self.stage, held, self._handled, self.peak_force_n, self.left_out_s = memory
+        self.hold(*held)
 
     def load(self) -> float:
         """The weight that the gripper feels, [N]: of the held part and of what really hangs on it."""
@@ -125,7 +152,12 @@ class Robot:
 
     def hold(self, *parts: str) -> None:
         """Say which parts are in the hand: the held one and what it carries, or none."""
-        self._held = [self.scene.work.free.index(part) for part in parts]
+        free = self.scene.work.free
+        self._held = parts
+        self._net = np.zeros((3, self.model.nsensordata))
+        for i in map(free.index, parts):
+            self._net[:, 3 * (len(free) + i) : 3 * (len(free) + i) + 3] += np.eye(3)
+            self._net[:, 3 * i : 3 * i + 3] -= np.eye(3)
 
     def weld(self, part: str, on: bool) -> None:
         """The ideal gripper: hold the part exactly as it now is, or let go."""
@@ -138,18 +170,38 @@ class Robot:
             self.model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *q, 1)
         self.data.eq_active[weld] = int(on)
 
-    def _joint_path(self, line: Line) -> CubicSpline:
-        far = np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]) / KNOT_M
-        turn = np.linalg.norm(pose.log(pose.inverse(line.start) @ line.end)[3:]) / KNOT_RAD
-        s = np.linspace(0.0, 1.0, max(4, int(np.ceil(max(far, turn))) + 1))
-        q = [self.q]
-        for i, T in enumerate(line.poses(s[1:])):
-            guess = 2 * q[-1] - q[-2] if i else q[-1]
-            found = self.scene.kinematics.inverse(T, guess)
-            if found is None:
-                raise Halt(self.stage, "unreachable")
-            q.append(found)
-        return CubicSpline(s, np.array(q))
+    def _spans(self, line: Line, s: Array) -> list[tuple[int, int]]:
+        """Which steps of a line are simulated: all of them, or those where something is near; at last the end."""
+        n = len(s) - 1
+        if self.fidelity == "full":
+            return [(0, n)]
+        spans = near_spans(self.scene, self.data, self._moving(self.opening()), self._held, line, s)
+        return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
+
+    def _moving(self, opening: float) -> list[Moving]:
+        """The hand and what it holds, as they move with the tip."""
+        tip = pose.inverse(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
+        held = [Moving(self.scene.boxes[p], tip @ part_pose(self.scene.work, self.data, p)) for p in self._held]
+        return [Moving(gripper_boxes(self.scene.kinematics, self.arm, round(opening, 4)), np.eye(4)), *held]
+
+    def _leap(self, q: Array, velocity: Array, steps: int) -> None:
+        """Leave out steps on which nothing is near."""
+        joints, forward = (self._qpos, self._dof), self.scene.kinematics.forward
+        leap(self.scene.work, self.data, forward, joints, q - self.q, velocity, self._held)
+        self._pass(steps * self.step_s)
+
+    def _may_open(self, to: float) -> bool:
+        """Whether nothing is near the empty hand, neither as it is nor with its fingers somewhere else."""
+        return clear(self.scene, self.data, self._moving(max(to, self.opening())), (), self.T)
+
+    def _pass(self, seconds: float) -> None:
+        self.data.time += seconds
+        self.left_out_s += seconds
+
+    def _reached(self, q: Array | None) -> Array:
+        if q is None:
+            raise Halt(self.stage, "unreachable")
+        return q
 
     def _run(self, targets: Array, guard: Guard | None) -> int:
         """Step through joint targets (n, joints), one physics step each; returns how many were run."""
@@ -178,14 +230,15 @@ class Robot:
         if self.watch is not None:
             self.watch(self.data)
 
-    def _feel(self) -> Array:
+    def _feel(self) -> list[float]:
         """The force on the part in the hand, remembered if it is the largest so far."""
-        f = self.force()
-        self.peak_force_n = max(self.peak_force_n, math.sqrt(f @ f))
+        x, y, z = f = (self._net @ self._forces).tolist()
+        self.peak_force_n = max(self.peak_force_n, math.sqrt(x * x + y * y + z * z))
         return f
 
     def _pushed_back(self, guard: Guard) -> bool:
-        return bool(-(self._feel() @ guard.way) > guard.newton)
+        (x, y, z), (a, b, c) = self._feel(), guard.way.tolist()
+        return -(x * a + y * b + z * c) > guard.newton
 
     def _hardest_blow(self) -> tuple[str, float]:
         """The part that the arm strikes hardest without handling it, and the force, [N]."""
@@ -193,7 +246,7 @@ class Robot:
         if self._handled is not None:
             squares[self._handled] = 0.0
         i = int(squares.argmax())
-        return (*self.scene.work.free, *self.scene.work.fixed)[i], math.sqrt(squares[i])
+        return self._names[i], math.sqrt(squares[i])
 
     def handle(self, part: str | None) -> None:
         """Say which part the fingers may touch."""
@@ -208,7 +261,8 @@ class Robot:
     def _find_joints(self) -> None:
         model = self.model
         joints = [model.joint(f"arm/{name}").id for name in self.arm.joints]
-        self._qpos = model.jnt_qposadr[joints]
+        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self.step_s = float(model.opt.timestep)
         self._drives = [model.actuator(f"arm/{name}").id for name in self.arm.joints]
         self._grip = model.actuator(f"arm/{self.arm.grip}").id
         self._fingers = np.array([model.jnt_qposadr[model.joint(f"arm/{name}").id] for name in self.arm.fingers])

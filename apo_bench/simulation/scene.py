@@ -13,6 +13,7 @@ import mujoco
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.solid import Box
 from apo_bench.layout import layout_at
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
@@ -38,6 +39,8 @@ class Scene:
     grasp: Grasp
     arm: Arm
     physics: Physics
+    boxes: Mapping[str, tuple[Box, ...]]
+    """Part -> its boxes as it is made, with clearance."""
     shown: World
     """Parts and hands: where the human demonstrates."""
     work: World
@@ -68,6 +71,7 @@ def build_scene(
         grasp="weld" if grasp == "weld" else "friction",
         arm=found,
         physics=settings,
+        boxes={name: physical_boxes(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=_compiled(scenario, _compose(scenario, clearance, settings, None, grasp)),
         work=_compiled(scenario, _compose(scenario, clearance, settings, found, grasp)),
         kinematics=Kinematics(found),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -13,6 +15,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses, Snapshot
 
 Ints = NDArray[np.int64]
+SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
 @final
@@ -89,10 +92,27 @@ def unstable(data: Any) -> bool:
     return bool(data.warning.number.any() or not np.isfinite(data.qpos).all())
 
 
+@contextmanager
+def sleeping(world: World, allowed: bool) -> Iterator[None]:
+    """Whether parts that rest and that nothing moves against are left as they are, for a while."""
+    options = world.model.opt
+    before = int(options.enableflags)
+    options.enableflags = before | SLEEP if allowed else before & ~SLEEP
+    try:
+        yield
+    finally:
+        options.enableflags = before
+
+
+def awaken(world: World, data: Any) -> None:
+    """Bring all that follows from the positions up to date, contacts of parts that were left alone too."""
+    with sleeping(world, False):
+        mujoco.mj_fwdPosition(world.model, data)
+
+
 def snapshot(world: World, data: Any, start: Poses) -> Snapshot:
     """What the judge may see of the present state."""
-    model = world.model
-    mujoco.mj_fwdPosition(model, data)
+    awaken(world, data)
     poses = {part: part_pose(world, data, part) for part in world.free}
     poses.update({part: start[part] for part in world.fixed})
     speeds = [data.qvel[v : v + 3] for v in world.dof.values()]
