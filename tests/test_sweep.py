@@ -20,12 +20,15 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark import sweep as runner
+from apo_bench.benchmark import worker
+from apo_bench.benchmark.fingerprint import spec_hash
 from apo_bench.benchmark.grid import KEY, SweepSpec, load_all, row_key, trial_key, units
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.spec import ROW
 from apo_bench.correction.correct import CORRECTORS
 from apo_bench.errors import InputError
 from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.arm import find_arm
 
 METHODS = ("oracle", "none", "paper")
 SPEC = SweepSpec(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)
@@ -40,7 +43,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
     def build(scenario: Any, **_: Any) -> Any:
         did["scene"] += 1
-        return SimpleNamespace(scenario=scenario, arm=SimpleNamespace(mjcf=runner.find_arm("six_axis").mjcf))
+        return SimpleNamespace(scenario=scenario, arm=find_arm("six_axis"))
 
     def show(scene: Any, careless: float, seed: int, eye: str) -> str:
         did["demonstration"] += 1
@@ -50,21 +53,22 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["trial"] += 1
         assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
-        return {"schema": ROW, **dict(zip(KEY, key, strict=True)), "success": spec.seed % 2 == 0}
+        hashed = spec_hash(spec, content)
+        return {"schema": ROW, "spec_hash": hashed, **dict(zip(KEY, key, strict=True)), "success": spec.seed % 2 == 0}
 
     monkeypatch.setattr("apo_bench.benchmark.grid.load_scenario", LOAD)
-    monkeypatch.setattr(runner, "load_scenario", LOAD)
-    monkeypatch.setattr(runner, "build_scene", build)
-    monkeypatch.setattr(runner, "show", show)
-    monkeypatch.setattr(runner, "run_trial", run_trial)
+    monkeypatch.setattr(worker, "load_scenario", LOAD)
+    monkeypatch.setattr(worker, "build_scene", build)
+    monkeypatch.setattr(worker, "show", show)
+    monkeypatch.setattr(worker, "run_trial", run_trial)
     return did
 
 
 def test_the_grid_is_every_combination_once() -> None:
     two = ("stick_in_tower", "stick_on_castles")
     spec = SweepSpec(two, (0, 1, 1), (0, 1), METHODS, clearances_mm=(0.25, 0.5), trials=2)
-    loaded = load_all(spec)
-    keys = [trial_key(t, loaded[t.scenario].name) for unit in units(spec, loaded) for t in unit.trials]
+    loaded = load_all([spec])
+    keys = [trial_key(t, loaded[t.scenario].name) for unit in units([spec], loaded) for t in unit.trials]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
     assert {key[2] for key in keys} == {0, 1}
 
@@ -72,8 +76,8 @@ def test_the_grid_is_every_combination_once() -> None:
 def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None:
     spec = replace(SPEC, noises=("isotropic", "per-part"), relations=("given", "missed", "shifted:3.0", "shifted:3"))
     assert spec.relations == ("given", "missed", "shifted:3")
-    loaded = load_all(spec)
-    trials = [t for unit in units(spec, loaded) for t in unit.trials]
+    loaded = load_all([spec])
+    trials = [t for unit in units([spec], loaded) for t in unit.trials]
     keys = {trial_key(t, "stick_in_tower") for t in trials}
     assert len(keys) == len(trials) == 3 * (1 + 2 * 2 * (1 + 3))
     met = {m: {(t.noise, t.relations) for t in trials if t.method == m} for m in spec.methods}
@@ -89,15 +93,15 @@ def test_by_default_the_ceiling_the_raw_the_papers_way_and_contact_are_compared(
 
 
 def test_the_oracle_runs_once_per_seed() -> None:
-    loaded = load_all(SPEC)
-    oracle = [t for unit in units(SPEC, loaded) for t in unit.trials if t.method == "oracle"]
+    loaded = load_all([SPEC])
+    oracle = [t for unit in units([SPEC], loaded) for t in unit.trials if t.method == "oracle"]
     assert [(t.seed, t.level_mm, t.level_deg, t.careless) for t in oracle] == [(k, 0.0, 0.0, 0.0) for k in (10, 11, 12)]
 
 
 def test_each_scenario_has_its_own_clearance_by_default() -> None:
-    loaded = load_all(SPEC)
+    loaded = load_all([SPEC])
     clearance = loaded["stick_in_tower"].clearance_mm
-    assert {t.clearance_mm for unit in units(SPEC, loaded) for t in unit.trials} == {clearance}
+    assert {t.clearance_mm for unit in units([SPEC], loaded) for t in unit.trials} == {clearance}
 
 
 def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path: Path) -> None:
@@ -109,7 +113,7 @@ def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path
     assert {"trial_s", "demonstrate_s", "host", "worker"} <= set(timing[0])
     run = json.loads((tmp_path / "new" / "run" / "run.json").read_text())
     assert run["command"] == "apo-bench sweep ..."
-    assert run["specification"]["clearances_mm"] == {"stick_in_tower": [0.25]}
+    assert run["grids"][0]["clearances_mm"] == {"stick_in_tower": [0.25]}
     assert run["versions"]["mujoco"]
 
 
@@ -129,19 +133,19 @@ def test_an_interrupted_sweep_goes_on_where_it_was_left(
     counted: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = runner.sweep(SPEC, tmp_path / "whole")
-    quick = runner.run_trial
+    quick = worker.run_trial
 
     def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
         if (spec.seed, spec.method, spec.level_mm) == (11, "paper", 0.0):
             raise KeyboardInterrupt
         return quick(spec, scene, **more)
 
-    monkeypatch.setattr(runner, "run_trial", interrupted)
+    monkeypatch.setattr(worker, "run_trial", interrupted)
     with pytest.raises(KeyboardInterrupt):
         runner.sweep(SPEC, tmp_path / "part")
     left = read_rows(tmp_path / "part")
     assert 0 < len(left) < ROWS
-    monkeypatch.setattr(runner, "run_trial", quick)
+    monkeypatch.setattr(worker, "run_trial", quick)
     counted.clear()
     assert runner.sweep(SPEC, tmp_path / "part") == whole
     assert counted["trial"] == ROWS - len(left)
@@ -171,11 +175,11 @@ def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_pa
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"levels": (0.0, 2.0)}, "specification: levels was"),
-        ({"seed": 11}, "specification: seed was 10, now 11"),
-        ({"grasps": ("weld",)}, "specification: grasps"),
-        ({"clearances_mm": (0.5,)}, "specification: clearances_mm"),
-        ({"scenarios": ("stick_on_castles",)}, "content: stick_in_tower"),
+        ({"levels": (0.0, 2.0)}, "grid: levels was"),
+        ({"seed": 11}, "grid: seed was 10, now 11"),
+        ({"grasps": ("weld",)}, "grid: grasps"),
+        ({"clearances_mm": (0.5,)}, "grid: clearances_mm"),
+        ({"scenarios": ("stick_on_castles",)}, "grid: clearances_mm"),
     ],
 )
 def test_a_folder_of_another_sweep_is_refused(
@@ -286,8 +290,8 @@ def wait_for(true: Callable[[], bool], seconds: float = 60.0) -> None:
 
 def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp_path: Path) -> None:
     spec = replace(SPEC, eyes=("noise", "range"), noises=("isotropic", "camera"), methods=("oracle", "none"))
-    loaded = load_all(spec)
-    trials = [trial for unit in units(spec, loaded) for trial in unit.trials]
+    loaded = load_all([spec])
+    trials = [trial for unit in units([spec], loaded) for trial in unit.trials]
     seen = Counter((t.eye, t.noise, t.level_deg > 0.0) for t in trials if t.method == "none" and t.level_mm > 0.0)
     assert set(seen) == {("noise", "isotropic", True), ("noise", "camera", True), ("range", "range", False)}
     assert len(set(seen.values())) == 1

@@ -5,14 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, fields, is_dataclass
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from apo_bench import __version__, files
+from apo_bench.benchmark.code_version import code_files
 from apo_bench.benchmark.spec import ROW, TrialSpec
+from apo_bench.observation.empirical import PREFIX
 from apo_bench.observation.noise_file import noise_path
+from apo_bench.observation.relations import KINDS
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import scenario_names
@@ -23,28 +28,35 @@ SCHEMAS = (ROW, files.DEMONSTRATION, files.OBSERVATION, files.PLAN)
 def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> str:
     """16 hexadecimal digits over all that shapes a trial besides its specification.
 
-    The scenario (its file's bytes, or its numbers if it never was a file), the files of its parts, the arm and
-    the room, the judge's thresholds, the version of the package and of every schema.
+    The pieces of `content_pieces`, the code of the package, its version and that of every schema.
 
     Args:
         given: What `load_scenario` was given.
     """
-    digest = hashlib.sha256()
-    for piece in (
-        _scenario_bytes(scenario, given),
-        *(path.read_bytes() for _, path in sorted(scenario.part_files.items())),
-        (folder("assets") / "room.xml").read_bytes(),
-        Path(arm_file).read_bytes(),
-        json.dumps([asdict(scenario.thresholds), __version__, SCHEMAS], sort_keys=True).encode(),
-    ):
-        digest.update(len(piece).to_bytes(8, "big") + piece)
-    return digest.hexdigest()[:16]
+    said = [content_pieces(scenario, given, arm_file), dict(code_files()), __version__, SCHEMAS]
+    return _hash(json.dumps(said, sort_keys=True).encode())
+
+
+def content_pieces(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> dict[str, str]:
+    """What a trial of a scenario is made of -> 16 hexadecimal digits.
+
+    The scenario (its file's bytes, or its numbers if it never was a file), the files of its parts, the arm and the
+    room, the judge's thresholds.
+    """
+    pieces = {
+        "scenario": _scenario_bytes(scenario, given),
+        **{f"part {part}": path.read_bytes() for part, path in sorted(scenario.part_files.items())},
+        "room": (folder("assets") / "room.xml").read_bytes(),
+        "arm": Path(arm_file).read_bytes(),
+        "thresholds": json.dumps(asdict(scenario.thresholds), sort_keys=True).encode(),
+    }
+    return {name: _hash(piece) for name, piece in pieces.items()}
 
 
 def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
     """16 hexadecimal digits over the content and every setting but method, seed and the scenario's path.
 
-    A noise model that is a file counts by what stands in it as well.
+    A noise model that is a file, and noise, relations or an arm of one's own, count by what stands in the file as well.
 
     Rows with the same hash differ in method and seed alone, so they may be counted together or paired.
 
@@ -53,14 +65,39 @@ def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
         observation: The text of the observation's file, when it was not drawn.
     """
     settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario")}
-    text = json.dumps([content, settings, observation, *noise_content(spec.noise).values()], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    brought = {**noise_content(spec.noise), **own_content("relations", spec.relations), **own_content("arm", spec.arm)}
+    return _hash(json.dumps([content, settings, observation, *brought.values()], sort_keys=True).encode())
 
 
 def noise_content(*names: str) -> dict[str, str]:
-    """Of the noise models that are files: `noise NAME` -> 16 hexadecimal digits over the bytes of the file."""
+    """Of the noise models that are files or of one's own: `noise NAME` -> 16 hexadecimal digits over the file."""
     files = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
-    return {name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for name, path in files.items()}
+    return {name: _hash(path.read_bytes()) for name, path in files.items()} | own_content("noise", *names)
+
+
+def own_content(kind: str, *names: str) -> dict[str, str]:
+    """Of what is given as `module:name`: `KIND NAME` -> 16 hexadecimal digits over the file of the module.
+
+    What that module imports in turn does not count.
+    """
+    not_modules = (PREFIX, *(f"{wrong}:" for wrong in KINDS))
+    own = [name for name in names if ":" in name and not name.startswith(not_modules)]
+    return {f"{kind} {name}": hashed for name in own if (hashed := _module_hash(name.partition(":")[0])) is not None}
+
+
+@cache
+def _module_hash(module: str) -> str | None:
+    """Over the source file of a module as it was when it was first asked for; None if it has none."""
+    try:
+        found = find_spec(module)
+    except (ImportError, ValueError):
+        return None
+    path = Path(found.origin) if found is not None and found.has_location and found.origin else None
+    return _hash(path.read_bytes()) if path is not None and path.is_file() else None
+
+
+def _hash(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()[:16]
 
 
 def _scenario_bytes(scenario: Scenario, given: str | Path | Scenario) -> bytes:

@@ -1,9 +1,11 @@
-"""The grid of a sweep: which trials there are, and which of them share a demonstration."""
+"""The grids of a sweep: which trials there are, and which of them share a demonstration."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import product
+from numbers import Real
 from typing import Any, final
 
 from apo_bench.benchmark.spec import (
@@ -19,6 +21,7 @@ from apo_bench.benchmark.spec import (
     check_seed,
     checked_relations,
     knows_relations,
+    level_pair,
     refuse_noise,
 )
 from apo_bench.errors import InputError, unknown
@@ -30,7 +33,12 @@ METHODS = ("oracle", "none", "paper", "contact")
 LARGEST_TRIALS = 1_000_000
 AXES = ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes", "grasps")
 """What a sweep has several of."""
+MAY_BE_EMPTY = ("clearances_mm", "noises")
+SHARED = ("arm", "timestep_s", "fidelity")
+"""What all grids of a sweep have in common, so that no key tells trials apart by it."""
 
+Level = float | tuple[float, float]
+"""Mm and degrees, or the two apart."""
 Key = tuple[str, float, int, float, float, float, str, str, str, str]
 """What tells one trial of a sweep from another: the columns `KEY` of its row."""
 KEY = (
@@ -46,7 +54,7 @@ class SweepSpec:
 
     scenarios: tuple[str, ...]
     """Names, or paths of scenario files."""
-    levels: tuple[float, ...] = LEVELS
+    levels: tuple[Level, ...] = LEVELS
     careless: tuple[float, ...] = (0.0, 1.0)
     methods: tuple[str, ...] = METHODS
     clearances_mm: tuple[float, ...] = ()
@@ -70,9 +78,9 @@ class SweepSpec:
     def __post_init__(self) -> None:
         object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
         for name in AXES:
-            object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
+            object.__setattr__(self, name, tuple(dict.fromkeys(map(_plain, getattr(self, name)))))
         for name in AXES:
-            if name not in ("clearances_mm", "noises") and not getattr(self, name):
+            if name not in MAY_BE_EMPTY and not getattr(self, name):
                 raise InputError(f"no {name} were given for the sweep; at least one is needed.")
         if not 1 <= self.trials <= LARGEST_TRIALS:
             raise InputError(f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.")
@@ -84,8 +92,11 @@ class SweepSpec:
         if self.noises and not drawn:
             refuse_noise(*self.noises)
         object.__setattr__(self, "noises", self.noises or (USUAL,) * drawn)
-        for level in self.levels:
-            check_level(level, eye="noise" if drawn else RANGE)
+        for level, eye in product(self.levels, self.eyes):
+            if isinstance(level, tuple):
+                level_pair(level, eye)
+            else:
+                check_level(level, eye=eye)
         for careless in self.careless:
             check_careless(careless)
         for clearance in self.clearances_mm:
@@ -100,18 +111,28 @@ class SweepSpec:
 @final
 @dataclass(frozen=True)
 class Unit:
-    """The trials of one scenario, clearance and seed: they share layouts and demonstrations."""
+    """Trials of one scenario, clearance, seed, carelessness and eye: they share layout and demonstration."""
 
     trials: tuple[TrialSpec, ...]
 
 
-def load_all(spec: SweepSpec) -> Mapping[str, Scenario]:
+def check_grids(grids: Sequence[SweepSpec]) -> None:
+    """Raise an `InputError` unless there is a grid, and all have the same arm, time step and fidelity."""
+    if not grids:
+        raise InputError("no grid was given for the sweep; at least one is needed.")
+    for name in SHARED:
+        given = {getattr(grid, name): None for grid in grids}
+        if len(given) > 1:
+            raise InputError(f"{name} of a sweep is {' and '.join(map(str, given))}; run a sweep for each.")
+
+
+def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
     """Every scenario of a sweep by what was given for it.
 
     Raises:
         InputError: A scenario cannot be loaded, or two have the same name.
     """
-    loaded = {given: load_scenario(given) for given in spec.scenarios}
+    loaded = {given: load_scenario(given) for grid in grids for given in grid.scenarios}
     names = [scenario.name for scenario in loaded.values()]
     for name in names:
         if names.count(name) > 1:
@@ -119,27 +140,26 @@ def load_all(spec: SweepSpec) -> Mapping[str, Scenario]:
     return loaded
 
 
-def units(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
-    """All the work of a sweep, seeds first, so that an interrupted sweep has every cell about equally full.
+def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
+    """All the work of a sweep, each trial once, seeds first, so that every cell of an interrupted sweep is about
+    equally full.
 
     The oracle meets neither noise nor carelessness: it runs once per seed and grasp, recorded at level 0,
     carelessness 0 and the first noise model or eye. Neither it nor `none` asks what touches what: both are recorded
     with relations as given.
     """
+    begin, end = min(grid.seed for grid in grids), max(grid.seed + grid.trials for grid in grids)
     return tuple(
-        Unit(_trials(spec, given, clearance, seed))
-        for seed in range(spec.seed, spec.seed + spec.trials)
+        unit
+        for seed in range(begin, end)
         for given, scenario in loaded.items()
-        for clearance in spec.clearances_mm or (scenario.clearance_mm,)
+        for unit in _units([g for g in grids if g.seed <= seed < g.seed + g.trials], given, scenario, seed)
     )
 
 
-def described(spec: SweepSpec, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
-    """The specification as it stands in `run.json`, with scenarios by name and clearances filled in."""
-    values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(spec).items()}
-    names = {given: scenario.name for given, scenario in loaded.items()}
-    clearances = {s.name: list(spec.clearances_mm or (s.clearance_mm,)) for s in loaded.values()}
-    return {**values, "scenarios": [names[given] for given in spec.scenarios], "clearances_mm": clearances}
+def described(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
+    """The grids as they stand in `run.json`, with scenarios by name and clearances filled in."""
+    return [_described(grid, loaded) for grid in grids]
 
 
 def trial_key(trial: TrialSpec, name: str) -> Key:
@@ -157,44 +177,6 @@ def row_key(row: Mapping[str, Any]) -> Key:
     )
 
 
-def _trials(spec: SweepSpec, given: str, clearance_mm: float, seed: int) -> tuple[TrialSpec, ...]:
-    def trial(
-        method: str, level: float, careless: float, seen: tuple[str, str], relations: str, grasp: str
-    ) -> TrialSpec:
-        return TrialSpec(
-            scenario=given,
-            level_mm=level,
-            level_deg=level,
-            careless=careless,
-            clearance_mm=clearance_mm,
-            noise=seen[1],
-            grasp=grasp,
-            arm=spec.arm,
-            method=method,
-            seed=seed,
-            timestep_s=spec.timestep_s,
-            relations=relations,
-            eye=seen[0],
-            fidelity=spec.fidelity,
-        )
-
-    ways = [way for eye in spec.eyes for way in _ways(eye, spec.noises)]
-    ceiling = tuple(
-        trial(m, 0.0, 0.0, ways[0], "given", grasp) for m in spec.methods if m == "oracle" for grasp in spec.grasps
-    )
-    rest = tuple(
-        trial(method, level, careless, seen, relations, grasp)
-        for grasp in spec.grasps
-        for careless in spec.careless
-        for level in spec.levels
-        for seen in ways
-        for method in spec.methods
-        if method != "oracle"
-        for relations in (spec.relations if knows_relations(method) else ("given",))
-    )
-    return ceiling + rest
-
-
 def check_grasp(grasp: str) -> None:
     """Raise an `InputError` unless there is such a grasp."""
     from apo_bench.simulation.scene import GRASPS
@@ -203,6 +185,63 @@ def check_grasp(grasp: str) -> None:
         raise InputError(unknown("grasp", str(grasp), GRASPS))
 
 
+def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int) -> Iterator[Unit]:
+    """The trials of a scenario and a seed, by what they share."""
+    together: dict[tuple[float, float, str], dict[TrialSpec, None]] = {}
+    for grid in grids:
+        for clearance in (grid.clearances_mm or (scenario.clearance_mm,)) if given in grid.scenarios else ():
+            for trial in _trials(grid, given, clearance, seed):
+                together.setdefault((clearance, trial.careless, trial.eye), {})[trial] = None
+    return (Unit(tuple(trials)) for trials in together.values())
+
+
+def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int) -> Iterator[TrialSpec]:
+    def trial(
+        method: str, level: Level, careless: float, way: tuple[str, str], relations: str, grasp: str
+    ) -> TrialSpec:
+        mm, deg = level_pair(level, way[0])
+        return TrialSpec(
+            scenario=given,
+            level_mm=mm,
+            level_deg=deg,
+            careless=careless,
+            clearance_mm=clearance_mm,
+            noise=way[1],
+            grasp=grasp,
+            arm=grid.arm,
+            method=method,
+            seed=seed,
+            timestep_s=grid.timestep_s,
+            relations=relations,
+            eye=way[0],
+            fidelity=grid.fidelity,
+        )
+
+    ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]
+    if "oracle" in grid.methods:
+        yield from (trial("oracle", 0.0, 0.0, ways[0], "given", grasp) for grasp in grid.grasps)
+    for grasp, careless, level, way, method in product(grid.grasps, grid.careless, grid.levels, ways, grid.methods):
+        if method != "oracle":
+            for relations in grid.relations if knows_relations(method) else ("given",):
+                yield trial(method, level, careless, way, relations, grasp)
+
+
 def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:
     """Eye and noise model, of every way of seeing that an eye stands for."""
     return [(eye, RANGE)] if eye == RANGE else [(eye, noise) for noise in noises]
+
+
+def _described(grid: SweepSpec, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
+    values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
+    own = {loaded[given].name: loaded[given].clearance_mm for given in grid.scenarios}
+    clearances = {name: list(grid.clearances_mm or (clearance,)) for name, clearance in own.items()}
+    return {**values, "scenarios": list(own), "clearances_mm": clearances}
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as rows spell them, whatever kind of number was given: 2.0 for 2, and 0.0 for -0.0."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value) + 0.0
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return tuple(map(_plain, value))
+    return value

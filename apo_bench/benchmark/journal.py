@@ -1,76 +1,61 @@
 """The folder of a sweep: rows that are only ever appended, whole, and what the sweep was asked to do.
 
 trials.jsonl   one row per trial; nothing but what specification and seed determine
-timing.jsonl   one line per trial: wall times, host, worker
-run.json       specification, versions, command line
+timing.jsonl   one line per trial: wall times, host, worker; lines that are missing or torn do not matter
+run.json       grids, code, content, versions, command line
 torn.txt       half lines that an interrupted sweep left behind, if any
 """
 
 from __future__ import annotations
 
 import json
-import platform
+import os
 from collections.abc import Iterator, Mapping
-from importlib import metadata
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, final
+from typing import Any, final
 
 from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.grid import Key, row_key
 from apo_bench.benchmark.recognised import UNCOUNTED
+from apo_bench.benchmark.run_file import check_same, write_run
 from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
 
-RUN = "apo-bench/run/2"
 OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3", "apo-bench/row/4")
 """Rows that say less: nothing about the test of a correction and its posterior, the eye, the fidelity. Reports still
 read them."""
 UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full"}
 """What stands in place of what older rows do not say."""
-PACKAGES = (
-    *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),
-    *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
-)
-
-
-def run_record(specification: Mapping[str, Any], content: Mapping[str, str], command: str) -> dict[str, Any]:
-    """What `run.json` says.
-
-    Args:
-        content: Scenario name -> `content_hash`.
-    """
-    return {
-        "schema": RUN,
-        "specification": dict(specification),
-        "content": dict(content),
-        "versions": {package: metadata.version(package) for package in PACKAGES},
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-        "command": command,
-    }
+CHUNK = 1 << 16
 
 
 @final
 class Journal:
-    """Appends rows to the folder of a sweep; a context manager."""
+    """Appends rows to the folder of a sweep, and lets nobody else do so meanwhile; a context manager."""
 
     def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
         """Open a folder, made if it is not there.
 
         Raises:
-            InputError: The folder cannot be written, or holds trials of another sweep.
+            InputError: The folder cannot be written, is being written, or holds trials of another sweep.
         """
         self.folder = folder
+        self.finished: dict[Key, str] = {}
+        """The trials that have a row, and its `spec_hash`."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for name in ("trials.jsonl", "timing.jsonl"):
-                _set_torn_line_aside(folder / name)
-            self.rows = read_rows(folder) if (folder / "trials.jsonl").exists() else []
-            if self.rows:
-                _check_same(folder, run)
-            (folder / "run.json").write_text(json.dumps(run, indent=2) + "\n", encoding="utf-8")
-            self._trials: BinaryIO = (folder / "trials.jsonl").open("ab")
-            self._timing: BinaryIO = (folder / "timing.jsonl").open("ab")
+            self._trials = (folder / "trials.jsonl").open("ab", buffering=0)
+            try:
+                _lock(self._trials.fileno(), folder)
+                for name in ("trials.jsonl", "timing.jsonl"):
+                    _set_torn_line_aside(folder / name)
+                self._read(run)
+                write_run(folder, run)
+                self._timing = (folder / "timing.jsonl").open("ab", buffering=0)
+            except BaseException:
+                self._trials.close()
+                raise
         except OSError as error:
             raise InputError(
                 f"the folder '{folder}' cannot be written ({error.strerror}); choose another one with --out."
@@ -83,17 +68,37 @@ class Journal:
         self._trials.close()
         self._timing.close()
 
-    @property
-    def finished(self) -> frozenset[Key]:
-        """The trials that have a row."""
-        return frozenset(row_key(row) for row in self.rows)
-
     def append(self, row: Mapping[str, Any], timing: Mapping[str, Any]) -> None:
-        """Add a trial that has ended: each line in one write, then flushed."""
-        self.rows.append(dict(row))
-        for file, line in ((self._trials, row), (self._timing, timing)):
-            file.write(json.dumps(line, allow_nan=False).encode() + b"\n")
-            file.flush()
+        """Add a trial that has ended, each line in one write.
+
+        Raises:
+            RuntimeError: The row could not be written, such as on a full disk; what was written of it is taken back.
+        """
+        try:
+            _append(self._trials.fileno(), row)
+        except OSError as error:
+            raise RuntimeError(
+                f"a row could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); the "
+                f"{len(self.finished)} before it are kept, and the same command continues once there is room."
+            ) from error
+        self.finished[row_key(row)] = row["spec_hash"]
+        with suppress(OSError):
+            _append(self._timing.fileno(), timing)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """All rows of the folder."""
+        return read_rows(self.folder)
+
+    def _read(self, run: Mapping[str, Any]) -> None:
+        for row in each_row(self.folder):
+            if row["schema"] != ROW:
+                raise InputError(
+                    f"'{self.folder}' holds rows of schema '{row['schema']}', and this version writes '{ROW}'; "
+                    "choose another folder."
+                )
+            self.finished[row_key(row)] = row.get("spec_hash", "")
+        if self.finished:
+            check_same(self.folder, run)
 
 
 def read_rows(folder: str | Path) -> list[dict[str, Any]]:
@@ -135,40 +140,49 @@ def _row(line: bytes, path: Path, number: int) -> dict[str, Any]:
     return row
 
 
+def _lock(file: int, folder: Path) -> None:
+    """Nobody else may write until the file is closed or the process ends, in whatever way."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise InputError(
+            f"another sweep is writing to '{folder}'; wait until it has ended, or choose another folder."
+        ) from error
+    except OSError:
+        return
+
+
+def _append(file: int, line: Mapping[str, Any]) -> None:
+    """Add a line whole, or not at all."""
+    left = json.dumps(line, allow_nan=False).encode() + b"\n"
+    before = os.fstat(file).st_size
+    try:
+        while left:
+            left = left[os.write(file, left) :]
+    except OSError:
+        with suppress(OSError):
+            os.ftruncate(file, before)
+        raise
+
+
 def _set_torn_line_aside(path: Path) -> None:
+    """What follows the last end of a line is no row: a copy of it is kept, and it goes."""
     if not path.exists():
         return
-    text = path.read_bytes()
-    whole = text.rfind(b"\n") + 1
-    if whole == len(text):
-        return
-    with (path.parent / "torn.txt").open("ab") as torn:
-        torn.write(text[whole:] + b"\n")
     with path.open("rb+") as file:
-        file.truncate(whole)
-
-
-def _check_same(folder: Path, run: Mapping[str, Any]) -> None:
-    path = folder / "run.json"
-    try:
-        before = json.loads(path.read_text(encoding="utf-8"))
-        specification = before["specification"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"'{folder}' has trials but no readable run.json; choose another folder.") from error
-    now = json.loads(json.dumps(run))
-    for key in ("content", "versions"):
-        _refuse_other(folder, before.get(key), now[key], key)
-    _refuse_other(folder, specification, now["specification"], "specification")
-
-
-def _refuse_other(folder: Path, before: Any, now: Any, what: str) -> None:
-    """More trials of the same sweep are welcome; anything else that differs is another sweep."""
-    before = before if isinstance(before, dict) else {}
-    for key in sorted({*before, *now}):
-        old, new = before.get(key), now.get(key)
-        grown = (what, key) == ("specification", "trials") and isinstance(old, int) and new >= old
-        if old != new and not grown:
-            raise InputError(
-                f"'{folder}' holds trials of another sweep ({what}: {key} was {json.dumps(old)}, "
-                f"now {json.dumps(new)}); choose another folder."
-            )
+        end = file.seek(0, os.SEEK_END)
+        at = end
+        tail = b""
+        while at > 0 and b"\n" not in tail:
+            at = max(0, at - CHUNK)
+            file.seek(at)
+            tail = file.read(end - at)
+        torn = tail[tail.rfind(b"\n") + 1 :]
+        if torn:
+            with (path.parent / "torn.txt").open("ab") as aside:
+                aside.write(torn + b"\n")
+            file.truncate(end - len(torn))

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
+from apo_bench.benchmark.row import Row
 from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
-from apo_bench.benchmark.trial import Row, eye_of, run_measured, run_trial
+from apo_bench.benchmark.trial import eye_of, run_measured, run_trial
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
 from apo_bench.observed import observed, read_stated

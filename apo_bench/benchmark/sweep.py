@@ -1,247 +1,183 @@
-"""Many trials: spread over processes, each row written as its trial ends, resumed where it was left."""
+"""Many trials: spread over processes or machines, each row written as its trial ends, resumed where it was left."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import platform
-import queue
-import signal
-import sys
-import time
-import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
-from apo_bench.benchmark.fingerprint import content_hash, noise_content
-from apo_bench.benchmark.grid import KEY, SweepSpec, Unit, described, load_all, trial_key, units
-from apo_bench.benchmark.journal import Journal, run_record
+from apo_bench.benchmark.code_version import code_files
+from apo_bench.benchmark.crew import spread
+from apo_bench.benchmark.fingerprint import content_hash, content_pieces, noise_content, own_content, spec_hash
+from apo_bench.benchmark.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
+from apo_bench.benchmark.journal import Journal
+from apo_bench.benchmark.progress import progress
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
-from apo_bench.benchmark.spec import TrialSpec
-from apo_bench.benchmark.stages import Shown, show
-from apo_bench.benchmark.trial import Row, run_trial
+from apo_bench.benchmark.row import Row
+from apo_bench.benchmark.run_file import run_record
+from apo_bench.benchmark.spec import level_pair
+from apo_bench.benchmark.stopping import Check, listening
+from apo_bench.benchmark.terms import Terms, versions
+from apo_bench.benchmark.worker import Emit, Timing, Worker
 from apo_bench.correction.correct import CORRECTORS
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, unknown
 from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.arm import find_arm
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.scenario import Scenario
+from apo_bench.scenario_file import scenario_names
+from apo_bench.simulation.arm import Arm, find_arm
+from apo_bench.simulation.physics import physics
 
 LARGEST_WORKERS = 256
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+LONGEST_TRIAL_S = 1e6
+BACKENDS = ("local", "ray")
 
-Emit = Callable[[Row, dict[str, Any]], None]
 
-
-def sweep(spec: SweepSpec, out: str | Path, *, workers: int = 1, command: str = "") -> list[Row]:
+def sweep(
+    grids: SweepSpec | Sequence[SweepSpec],
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    limit_s: float = 600.0,
+    backend: str = "local",
+    address: str | None = None,
+    command: str = "",
+) -> list[Row]:
     """Run every trial of a sweep that has no row yet.
 
-    The rows depend on neither the number of workers nor the order in which trials end. With more than one worker
-    the processes are spawned, so a script that calls this needs the usual `if __name__ == "__main__":`.
+    The rows depend on neither the number of workers, nor where they run, nor the order in which trials end.
 
     Args:
+        grids: One, or several whose trials are united.
         out: The folder of the rows; made if it is not there, continued if it holds rows of the same sweep.
+        workers: Processes; they are spawned, so a script that calls this needs the usual
+            `if __name__ == "__main__":`. None stands for this process with `local`: then nothing survives a corrector
+            that ends the process, and no trial has a limit. With `ray`, None stands for all that the cluster has.
+        limit_s: Wall time that a trial may take in a worker; what takes longer is a failed row.
+        backend: `local`, or `ray` for a cluster.
+        address: Of a cluster that runs already.
         command: What to note in `run.json` as the command line.
 
     Returns:
-        All rows of the folder.
+        All rows of the folder, in the order in which they ended.
 
     Raises:
         InputError: A setting that is not allowed, or a folder with trials of another sweep.
-        RuntimeError: A worker died.
-        KeyboardInterrupt: Passed on after the rows of the trials that had ended were written.
+        RuntimeError: A trial could not be run, or a row could not be written.
+        KeyboardInterrupt: After Ctrl-C or a signal, when the rows of the trials that had ended were written.
     """
-    if not 1 <= workers <= LARGEST_WORKERS:
+    grids = (grids,) if isinstance(grids, SweepSpec) else tuple(grids)
+    _check_spread(workers, limit_s, backend, address)
+    loaded, arm = _checked(grids)
+    terms = Terms({given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}, versions())
+    files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
+    run = run_record(described(grids, loaded), _content(grids, loaded, arm), code_files(), terms, files, command)
+    with listening() as check, Journal(Path(out), run) as journal:
+        work = _left(units(grids, loaded), loaded, terms, journal)
+        with progress(sum(len(unit.trials) for unit in work)) as tell:
+
+            def emit(row: Row, timing: Timing) -> None:
+                journal.append(row, timing)
+                tell(row)
+
+            if backend == "ray":
+                from apo_bench.benchmark.on_ray import spread as spread_on_ray
+
+                spread_on_ray(work, terms, workers=workers, limit_s=limit_s, emit=emit, check=check, address=address)
+            elif workers is None:
+                _here(work, terms, emit, check)
+            else:
+                spread(work, terms, workers=workers, limit_s=limit_s, emit=emit, check=check)
+        return journal.rows()
+
+
+def _here(work: Sequence[Unit], terms: Terms, emit: Emit, check: Check) -> None:
+    """Run the work in this process."""
+    worker = Worker(0, terms)
+    for unit in work:
+        worker.run(unit, emit, began=lambda spec: check())
+    check()
+
+
+def _left(work: Sequence[Unit], loaded: Mapping[str, Scenario], terms: Terms, journal: Journal) -> list[Unit]:
+    """The trials that have no row yet; the rows that there are must be what those trials would give."""
+    left, hashes = [], {}
+    for unit in work:
+        trials = []
+        for trial in unit.trials:
+            row_hash = journal.finished.get(trial_key(trial, loaded[trial.scenario].name))
+            if row_hash is None:
+                trials.append(trial)
+                continue
+            cell = (trial.scenario, *(getattr(trial, name) for name in _CELL))
+            if cell not in hashes:
+                hashes[cell] = spec_hash(trial, terms.content[trial.scenario])
+            if row_hash != hashes[cell]:
+                raise InputError(
+                    f"'{journal.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                    f"{trial.seed}, that was made with other code or settings; choose another folder."
+                )
+        if trials:
+            left.append(Unit(tuple(trials)))
+    return left
+
+
+_CELL = ("clearance_mm", "careless", "level_mm", "level_deg", "noise", "relations", "grasp", "eye")
+
+
+def _check_spread(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
+    if workers is not None and not 1 <= workers <= LARGEST_WORKERS:
         raise InputError(f"{workers} workers were given; a whole number from 1 to {LARGEST_WORKERS} is allowed.")
-    loaded = load_all(spec)
-    for noise in spec.noises:
-        make_noise(noise, Level(max(spec.levels), max(spec.levels)))
-    for relations in spec.relations:
+    if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_TRIAL_S):
+        raise InputError(
+            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {LONGEST_TRIAL_S:g} is allowed."
+        )
+    if backend not in BACKENDS:
+        raise InputError(unknown("backend", backend, BACKENDS))
+    if address is not None and backend != "ray":
+        raise InputError(f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.")
+    if backend == "ray":
+        from apo_bench.benchmark.on_ray import check_ray
+
+        check_ray(address)
+
+
+def _checked(grids: Sequence[SweepSpec]) -> tuple[Mapping[str, Scenario], Arm]:
+    """Everything that has a name, found before a folder is made or a process started."""
+    check_grids(grids)
+    loaded = load_all(grids)
+    for grid in grids:
+        largest = max(max(level_pair(level)) for level in grid.levels)
+        for noise in grid.noises:
+            make_noise(noise, Level(largest, largest))
+    for relations in {relations: None for grid in grids for relations in grid.relations}:
         if relations not in RECOGNISED:
             make_relations(relations)
-    arm = find_arm(spec.arm)
-    for method in spec.methods:
+    for method in _methods(grids):
         if method not in ("oracle", "none"):
             resolve(method, CORRECTORS, "corrector")
-    content = {given: content_hash(scenario, given, arm.mjcf) for given, scenario in loaded.items()}
-    by_name = {loaded[given].name: hashed for given, hashed in content.items()} | noise_content(*spec.noises)
-    with Journal(Path(out), run_record(described(spec, loaded), by_name, command)) as journal:
-        finished = journal.finished
-        work = [
-            Unit(tuple(t for t in unit.trials if trial_key(t, loaded[t.scenario].name) not in finished))
-            for unit in units(spec, loaded)
-        ]
-        work = [unit for unit in work if unit.trials]
-        with _progress(sum(len(unit.trials) for unit in work)) as tick:
-
-            def emit(row: Row, timing: dict[str, Any]) -> None:
-                journal.append(row, timing)
-                tick()
-
-            if workers == 1:
-                worker = Worker(0)
-                for unit in work:
-                    worker.run(unit, emit)
-            else:
-                _spread(work, min(workers, max(1, len(work))), emit)
-        return journal.rows
+    physics(grids[0].timestep_s)
+    return loaded, find_arm(grids[0].arm)
 
 
-@final
-class Worker:
-    """Runs units of work; compiles each scene once."""
-
-    def __init__(self, number: int) -> None:
-        self.number = number
-        self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
-
-    def run(self, unit: Unit, emit: Emit, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Run the trials of a unit, demonstrations shared, and emit each row with its timing."""
-        demonstrations: dict[tuple[float, str], Shown] = {}
-        for spec in unit.trials:
-            if stopped():
-                return
-            began = time.perf_counter()
-            scene, content = self._scene(spec)
-            ready = time.perf_counter()
-            key = (spec.careless, spec.eye)
-            if key not in demonstrations:
-                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
-            shown = time.perf_counter()
-            row = run_trial(spec, scene, shown=demonstrations[key], content=content)
-            emit(row, self._timing(row, began, ready, shown, time.perf_counter()))
-
-    def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:
-        key = (spec.scenario, spec.clearance_mm, spec.grasp)
-        if key not in self._scenes:
-            scene = build_scene(
-                load_scenario(spec.scenario),
-                clearance_mm=spec.clearance_mm,
-                grasp=spec.grasp,
-                arm=spec.arm,
-                timestep_s=spec.timestep_s,
-            )
-            self._scenes[key] = (scene, content_hash(scene.scenario, spec.scenario, scene.arm.mjcf))
-        return self._scenes[key]
-
-    def _timing(self, row: Row, began: float, ready: float, shown: float, ended: float) -> dict[str, Any]:
-        """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
-        return {
-            **{key: row[key] for key in KEY},
-            "compile_s": ready - began,
-            "demonstrate_s": shown - ready,
-            "trial_s": ended - shown,
-            "host": platform.node(),
-            "worker": self.number,
-        }
+def _content(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario], arm: Arm) -> dict[str, Any]:
+    """What the trials are made of besides the package, piece by piece, so that a change can be named."""
+    pieces: dict[str, Any] = {}
+    for given, scenario in loaded.items():
+        made_of = content_pieces(scenario, given, arm.mjcf)
+        pieces |= {f"{scenario.name}, {piece}": hashed for piece, hashed in made_of.items()}
+    noises = {noise: None for grid in grids for noise in grid.noises}
+    relations = {relations: None for grid in grids for relations in grid.relations}
+    return {
+        **pieces,
+        **noise_content(*noises),
+        **own_content("relations", *relations),
+        **own_content("method", *_methods(grids)),
+        **own_content("arm", grids[0].arm),
+    }
 
 
-def _spread(work: list[Unit], workers: int, emit: Emit) -> None:
-    context = multiprocessing.get_context("spawn")
-    tasks: Any = context.Queue()
-    said: Any = context.Queue()
-    stop = context.Event()
-    for unit in [*work, *[None] * workers]:
-        tasks.put(unit)
-    crew = [context.Process(target=_work, args=(i, tasks, said, stop), daemon=True) for i in range(workers)]
-    with _one_thread_each():
-        for process in crew:
-            process.start()
-    try:
-        _listen(crew, said, emit)
-    except BaseException:
-        stop.set()
-        _write_what_ended(crew, said, emit)
-        raise
-    finally:
-        tasks.cancel_join_thread()
-        for process in crew:
-            process.join(timeout=5.0)
-            if process.is_alive():
-                process.terminate()
-
-
-def _listen(crew: list[Any], said: Any, emit: Emit) -> None:
-    """Take rows until every worker has said that it is done."""
-    working = len(crew)
-    while working:
-        try:
-            kind, *news = said.get(timeout=1.0)
-        except queue.Empty:
-            for process in crew:
-                if process.exitcode not in (None, 0):
-                    raise RuntimeError(
-                        f"a worker ended with exit code {process.exitcode}; "
-                        "the same command continues, with fewer workers if memory was short"
-                    ) from None
-            continue
-        if kind == "row":
-            emit(*news)
-        elif kind == "done":
-            working -= 1
-        elif kind == "refused":
-            raise InputError(news[0])
-        else:
-            raise RuntimeError(f"a trial could not be run:\n{news[0]}")
-
-
-def _write_what_ended(crew: list[Any], said: Any, emit: Emit) -> None:
-    """After a stop: wait for the trials under way, and write their rows."""
-    deadline = time.monotonic() + 10.0
-    while time.monotonic() < deadline:
-        try:
-            kind, *news = said.get(timeout=0.2)
-        except queue.Empty:
-            if not any(process.is_alive() for process in crew):
-                return
-            continue
-        if kind == "row":
-            emit(*news)
-
-
-def _work(number: int, tasks: Any, said: Any, stop: Any) -> None:
-    """The life of a worker process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    worker = Worker(number)
-    parent = multiprocessing.parent_process()
-
-    def stopped() -> bool:
-        """Asked to stop, or alone: rows of a process whose parent was killed would be written by nobody."""
-        return stop.is_set() or (parent is not None and not parent.is_alive())
-
-    try:
-        while not stopped() and (unit := tasks.get()) is not None:
-            worker.run(unit, lambda row, timing: said.put(("row", row, timing)), stopped)
-        said.put(("done",))
-    except InputError as error:
-        said.put(("refused", str(error)))
-    except Exception:
-        said.put(("failed", traceback.format_exc()))
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Children inherit one thread per linear algebra library: the processes already fill the cores."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[], Any]]:
-    """A bar with an estimate on a terminal's stderr; silent anywhere else."""
-    from tqdm import tqdm
-
-    with tqdm(total=total, unit="trial", file=sys.stderr, disable=not sys.stderr.isatty(), smoothing=0.05) as bar:
-        yield bar.update
+def _methods(grids: Sequence[SweepSpec]) -> tuple[str, ...]:
+    return tuple({method: None for grid in grids for method in grid.methods})

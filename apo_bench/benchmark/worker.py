@@ -1,0 +1,135 @@
+"""What a worker does, in whatever process on whatever machine: units of work become rows."""
+
+from __future__ import annotations
+
+import platform
+import re
+import time
+from collections.abc import Callable
+from typing import Any, final
+
+from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+from apo_bench.benchmark.grid import KEY, Unit
+from apo_bench.benchmark.row import Row, head, result
+from apo_bench.benchmark.spec import TrialSpec
+from apo_bench.benchmark.stages import Ending, Shown, show
+from apo_bench.benchmark.terms import Terms
+from apo_bench.benchmark.trial import run_trial
+from apo_bench.correction.correct import Misbehaved
+from apo_bench.outcomes import sentence
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.scene import Scene, build_scene
+
+Timing = dict[str, Any]
+"""One line of `timing.jsonl`: what no specification determines."""
+Emit = Callable[[Row, Timing], None]
+"""Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
+ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
+LONGEST_SENTENCE = 1000
+
+
+@final
+class Worker:
+    """Runs units of work; compiles each scene once."""
+
+    def __init__(self, number: int, terms: Terms) -> None:
+        """Args:
+        number: Tells workers apart in `timing.jsonl`.
+
+        Raises:
+            InputError: Packages of other versions are installed here.
+        """
+        terms.check_versions()
+        self.number = number
+        self._terms = terms
+        self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
+
+    def run(
+        self,
+        unit: Unit,
+        emit: Emit,
+        stopped: Callable[[], bool] = lambda: False,
+        began: Callable[[TrialSpec], None] = lambda spec: None,
+    ) -> None:
+        """Run the trials of a unit in their order, demonstrations shared, and emit each row with its timing.
+
+        Args:
+            stopped: Asked between trials; what is not begun then is left.
+            began: Told of each trial when its scene is compiled: from here on its time counts.
+
+        Raises:
+            InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
+        """
+        demonstrations: dict[tuple[float, str], Shown] = {}
+        for spec in unit.trials:
+            if stopped():
+                return
+            start = time.perf_counter()
+            scene, content = self._scene(spec)
+            ready = time.perf_counter()
+            began(spec)
+            key = (spec.careless, spec.eye)
+            if key not in demonstrations:
+                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
+            shown = time.perf_counter()
+            try:
+                row = run_trial(spec, scene, shown=demonstrations[key], content=content)
+            except Misbehaved as error:
+                row = misbehaved(spec, content, demonstrations[key].demonstration.code, str(error))
+            spent = (ready - start, shown - ready, time.perf_counter() - shown)
+            emit(row, timing(row, self.number, *spent))
+
+    def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:
+        key = (spec.scenario, spec.clearance_mm, spec.grasp)
+        if key not in self._scenes:
+            scene = build_scene(
+                load_scenario(spec.scenario),
+                clearance_mm=spec.clearance_mm,
+                grasp=spec.grasp,
+                arm=spec.arm,
+                timestep_s=spec.timestep_s,
+            )
+            content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+            self._terms.check_content(spec.scenario, content)
+            self._scenes[key] = (scene, content)
+        return self._scenes[key]
+
+
+def lost(spec: TrialSpec, content: str, code: str) -> Row:
+    """The failed row of a trial whose worker died (`worker_died`) or was ended (`time_limit`).
+
+    Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
+
+    Args:
+        content: From the terms of the sweep: `terms.content[spec.scenario]`.
+    """
+    return _failed(spec, content, None, Ending("worker", code, None, sentence(code)))
+
+
+def misbehaved(spec: TrialSpec, content: str, demonstration: str, said: str) -> Row:
+    """The failed row of a trial whose corrector raised an error or returned what it must not.
+
+    Args:
+        said: What it did; addresses of objects, which differ from run to run, are left out.
+    """
+    said = ADDRESS.sub("0x...", said)[:LONGEST_SENTENCE]
+    return _failed(spec, content, demonstration, Ending("correct", "raised", None, said))
+
+
+def timing(
+    row: Row, worker: int, compile_s: float | None, demonstrate_s: float | None, trial_s: float | None
+) -> Timing:
+    """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
+    return {
+        **{key: row[key] for key in KEY},
+        "compile_s": compile_s,
+        "demonstrate_s": demonstrate_s,
+        "trial_s": trial_s,
+        "host": platform.node(),
+        "worker": worker,
+    }
+
+
+def _failed(spec: TrialSpec, content: str, demonstration: str | None, end: Ending) -> Row:
+    first = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
+    return first | {"demonstration": demonstration} | result(end, success=False)
