@@ -19,7 +19,20 @@ LEFT_OUT = (
         for name in (
             *("adjust", "area", "bounded", "calibration", "compare", "confusion", "crew", "crew_member", "curve"),
             *("effort", "eye_one", "half_level", "journal", "mcnemar", "misgivings", "on_ray", "one", "paired"),
-            *("parquet", "plan_lines", "power", "progress", "replay_command", "report", "slim", "statistics"),
+            *(
+                "parcel",
+                "ray_crew",
+                "ray_driver",
+                "ray_hand",
+                "parquet",
+                "plan_lines",
+                "power",
+                "progress",
+                "replay_command",
+                "report",
+                "slim",
+                "statistics",
+            ),
             *("stopping", "summary", "sweep", "sweep_file", "terminal"),
         )
     ),

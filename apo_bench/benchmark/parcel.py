@@ -7,11 +7,11 @@ import site
 import sys
 import sysconfig
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
-from apo_bench.benchmark.fingerprint import noise_content
+from apo_bench.benchmark.fingerprint import noise_content, own_content
 from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import RANGE
@@ -39,8 +39,8 @@ class Wanted:
     methods: tuple[str, ...]
     relations: tuple[str, ...]
     noises: tuple[str, ...]
-    noise_content: Mapping[str, str]
-    """From `noise_content`, where the sweep was started."""
+    content: Mapping[str, str]
+    """Hashes of noise files and of the user's own modules, where the sweep was started."""
 
 
 def wanted(work: Sequence[Unit]) -> Wanted:
@@ -50,19 +50,28 @@ def wanted(work: Sequence[Unit]) -> Wanted:
     def each(names: Iterable[str]) -> tuple[str, ...]:
         return tuple(sorted(set(names)))
 
-    noises = each(trial.noise for trial in trials if trial.eye != RANGE)
-    return Wanted(
+    asked = Wanted(
         scenarios=each(trial.scenario for trial in trials),
         arms=each(trial.arm for trial in trials),
         methods=each(trial.method for trial in trials),
         relations=each(trial.relations for trial in trials),
-        noises=noises,
-        noise_content=noise_content(*noises),
+        noises=each(trial.noise for trial in trials if trial.eye != RANGE),
+        content={},
     )
+    return replace(asked, content=_content(asked))
+
+
+def _content(asked: Wanted) -> dict[str, str]:
+    return {
+        **noise_content(*asked.noises),
+        **own_content("relations", *asked.relations),
+        **own_content("method", *asked.methods),
+        **own_content("arm", *asked.arms),
+    }
 
 
 def check_here(asked: Wanted) -> None:
-    """Raise an `InputError` unless everything that is named can be had on this machine, noise files as they were."""
+    """Raise an `InputError` unless everything that is named can be had on this machine, from the same files."""
     for scenario in asked.scenarios:
         load_scenario(scenario)
     for arm in asked.arms:
@@ -75,10 +84,10 @@ def check_here(asked: Wanted) -> None:
             make_relations(relations)
     for noise in asked.noises:
         make_noise(noise, Level(1.0, 1.0))
-    here = noise_content(*asked.noises)
-    for name, content in asked.noise_content.items():
-        if here[name] != content:
-            raise InputError(f"the file of the {name} is another one here; use the same everywhere.")
+    here = _content(asked)
+    for name, content in asked.content.items():
+        if here.get(name) != content:
+            raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
 
 
 def parcel(asked: Wanted) -> dict[str, Path]:
