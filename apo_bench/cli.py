@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
     except (Interrupted, KeyboardInterrupt) as error:
-        return _complain(str(error) or "interrupted.", INTERRUPTED)
+        return _complain(str(error) or "interrupted.", getattr(error, "code", INTERRUPTED))
     except RuntimeError as error:
         return _complain(str(error), NO_RESULT)
     except Exception as error:

@@ -1,15 +1,21 @@
-"""One command: `apo-bench sweep`, many trials, resumed where they were left."""
+"""One command: `apo-bench sweep`, many trials out of flags or a file, resumed where they were left."""
 
 from __future__ import annotations
 
 import shlex
+import signal
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from apo_bench.arguments import cores, numbers, path_given, words
+from apo_bench.errors import InputError
+
+if TYPE_CHECKING:
+    from apo_bench.benchmark.grid import SweepSpec
 
 NOISE = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name"
 RELATIONS = (
@@ -18,10 +24,27 @@ RELATIONS = (
 )
 EYE = "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)"
 FIDELITY = "full, or contact: only the part of each motion in which things may touch is simulated."
+AXES: Mapping[str, tuple[str, Callable[[str, str], tuple[Any, ...]]]] = {
+    "levels": ("levels", numbers),
+    "careless": ("careless", numbers),
+    "methods": ("methods", words),
+    "clearance": ("clearances_mm", numbers),
+    "grasp": ("grasps", words),
+    "noise": ("noises", words),
+    "relations": ("relations", words),
+    "eye": ("eyes", words),
+}
+"""What a sweep has several of: option -> key of a sweep file, and how the option is read."""
+KILLED = 128
+"""And the number of the signal: the exit code of a process that one has ended."""
 
 
 class Interrupted(Exception):
-    """Ctrl-C, told apart from what the command line library makes of a `KeyboardInterrupt`."""
+    """Asked to stop, told apart from what the command line library makes of a `KeyboardInterrupt`."""
+
+    def __init__(self, sentence: str, code: int) -> None:
+        super().__init__(sentence)
+        self.code = code
 
 
 def register(app: typer.Typer) -> None:
@@ -30,57 +53,98 @@ def register(app: typer.Typer) -> None:
 
 
 def sweep(
-    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Names, or scenario files.")],
+    scenarios: Annotated[
+        list[str], typer.Argument(metavar="SCENARIO... | FILE.toml", help="Names, scenario files, or one sweep file.")
+    ],
     out: Annotated[
         Path,
         typer.Option(
             parser=path_given, metavar="<path>", help="Folder of the rows; one that was interrupted is continued."
         ),
     ],
-    levels: Annotated[str, typer.Option(help="Noise levels, mm and degrees.")] = "0,0.1,0.25,0.5,1,2,4",
-    careless: Annotated[str, typer.Option(help="Carelessness of the human.")] = "0,1",
-    methods: Annotated[str, typer.Option(help="oracle, none and correctors.")] = "oracle,none,paper,contact",
-    trials: Annotated[int, typer.Option(help="Trials per cell; the same seeds in every cell.")] = 100,
-    seed: Annotated[int, typer.Option(help="First seed.")] = 0,
+    levels: Annotated[
+        str | None, typer.Option(help="Noise levels, mm and degrees; default: 0,0.1,0.25,0.5,1,2,4.")
+    ] = None,
+    careless: Annotated[str | None, typer.Option(help="Carelessness of the human; default: 0,1.")] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="oracle, none and correctors; default: oracle,none,paper,contact.")
+    ] = None,
+    trials: Annotated[int | None, typer.Option(help="Per cell, the same seeds in every cell; default: 100.")] = None,
+    seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
     clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,
-    grasp: Annotated[str, typer.Option(help="friction, or weld for an ideal gripper; both with a comma.")] = "friction",
-    arm: Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")] = "six_axis",
+    grasp: Annotated[
+        str | None, typer.Option(help="friction, or weld for an ideal gripper, or both; default: friction.")
+    ] = None,
+    arm: Annotated[str | None, typer.Option(help="Name of the arm, or package.module:name; default: six_axis.")] = None,
     noise: Annotated[str | None, typer.Option(help=f"{NOISE}; several with commas; default: isotropic.")] = None,
-    relations: Annotated[str, typer.Option(help=f"{RELATIONS}; several with commas.")] = "given",
-    eye: Annotated[str, typer.Option(help=f"{EYE}; several with commas.")] = "noise",
-    timestep_ms: Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables.")] = 1.0,
-    fidelity: Annotated[str, typer.Option(help=FIDELITY)] = "full",
+    relations: Annotated[str | None, typer.Option(help=f"{RELATIONS}; several with commas; default: given.")] = None,
+    eye: Annotated[str | None, typer.Option(help=f"{EYE}; several with commas; default: noise.")] = None,
+    timestep_ms: Annotated[
+        float | None, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check; default: 1.")
+    ] = None,
+    fidelity: Annotated[str | None, typer.Option(help=f"{FIDELITY} Default: full.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
+    trial_limit: Annotated[
+        float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
+    ] = 600.0,
+    backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
 ) -> None:
-    """Run every combination and print success rates with Wilson 95 % intervals."""
-    from apo_bench.benchmark import sweep as runner
-    from apo_bench.benchmark.grid import SweepSpec
+    """Run every combination, or the grids of a file, and print success rates with Wilson 95 % intervals."""
     from apo_bench.benchmark.statistics import tally
+    from apo_bench.benchmark.sweep import sweep as run
     from apo_bench.benchmark.terminal import print_cells, print_prediction
 
-    spec = SweepSpec(
-        scenarios=tuple(scenarios),
-        levels=numbers(levels, "--levels"),
-        careless=numbers(careless, "--careless"),
-        methods=words(methods, "--methods"),
-        clearances_mm=() if clearance is None else numbers(clearance, "--clearance"),
-        trials=trials,
-        seed=seed,
-        noises=() if noise is None else words(noise, "--noise"),
-        relations=words(relations, "--relations"),
-        eyes=words(eye, "--eye"),
-        grasps=words(grasp, "--grasp"),
-        arm=arm,
-        timestep_s=timestep_ms * 1e-3,
-        fidelity=fidelity,
-    )
+    axes = {
+        "levels": levels,
+        "careless": careless,
+        "methods": methods,
+        "clearance": clearance,
+        "grasp": grasp,
+        "noise": noise,
+        "relations": relations,
+        "eye": eye,
+    }
+    settings = {"trials": trials, "seed": seed, "arm": arm, "timestep_ms": timestep_ms, "fidelity": fidelity}
+    grids = _grids(scenarios, axes, {name: value for name, value in settings.items() if value is not None})
+    crew = cores() if workers is None and backend == "local" else workers
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     try:
-        rows = runner.sweep(spec, out, workers=cores() if workers is None else workers, command=command)
+        rows = run(grids, out, workers=crew, limit_s=trial_limit, backend=backend, address=address, command=command)
     except KeyboardInterrupt as error:
-        raise Interrupted("interrupted; what had ended is kept, and the same command continues.") from error
+        number = int(getattr(error, "number", signal.SIGINT))
+        said = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+        raise Interrupted(
+            f"{said}; what had ended is kept, and the same command continues.", KILLED + number
+        ) from error
     print_cells(tally(rows))
     print_prediction(rows)
     typer.echo(
         f"{len(rows)} rows in {out / 'trials.jsonl'}; table and figure: apo-bench report {shlex.quote(str(out))}"
     )
+
+
+def _grids(scenarios: list[str], axes: Mapping[str, str | None], settings: Mapping[str, Any]) -> tuple[SweepSpec, ...]:
+    """The grid of the flags, or those of a sweep file with some settings replaced."""
+    from apo_bench.benchmark.grid import SweepSpec
+    from apo_bench.benchmark.sweep_file import is_sweep_file, read_sweep
+
+    given = {option: text for option, text in axes.items() if text is not None}
+    files = [name for name in scenarios if is_sweep_file(name)]
+    if not files:
+        several: dict[str, Any] = {
+            AXES[option][0]: AXES[option][1](text, f"--{option}") for option, text in given.items()
+        }
+        alone = {name: value for name, value in settings.items() if name != "timestep_ms"}
+        step = {"timestep_s": settings["timestep_ms"] * 1e-3} if "timestep_ms" in settings else {}
+        return (SweepSpec(tuple(scenarios), **several, **alone, **step),)
+    if len(scenarios) > 1:
+        raise InputError(
+            f"the sweep file {files[0]} was given together with {len(scenarios) - 1} more; name scenarios in the file, "
+            "and run one file at a time."
+        )
+    for option in given:
+        raise InputError(
+            f"--{option} was given together with the sweep file {files[0]}; write {AXES[option][0]} into the file."
+        )
+    return read_sweep(files[0], settings)
