@@ -105,7 +105,7 @@ class SweepSpec:
             check_method(method)
         for grasp in self.grasps:
             check_grasp(grasp)
-        check_fidelity(self.fidelity)
+        check_fidelity(self.fidelity, *self.grasps)
 
 
 @final

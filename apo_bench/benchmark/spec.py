@@ -60,7 +60,7 @@ class TrialSpec:
         check_clearance(self.clearance_mm)
         check_method(self.method)
         check_seed(self.seed)
-        check_fidelity(self.fidelity)
+        check_fidelity(self.fidelity, self.grasp)
         object.__setattr__(self, "relations", checked_relations(self.relations))
         if self.eye == RANGE:
             if self.noise not in (USUAL, RANGE):
@@ -113,10 +113,15 @@ def check_eye(eye: str) -> None:
         raise InputError(unknown("eye", str(eye), EYES))
 
 
-def check_fidelity(fidelity: str) -> None:
-    """Raise an `InputError` unless there is such a fidelity."""
+def check_fidelity(fidelity: str, *grasps: str) -> None:
+    """Raise an `InputError` unless there is such a fidelity, and its verdicts are known to be those of `full`."""
     if not isinstance(fidelity, str) or fidelity not in FIDELITIES:
         raise InputError(unknown("fidelity", str(fidelity), FIDELITIES))
+    if fidelity == "contact" and "weld" in grasps:
+        raise InputError(
+            "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
+            "use the grasp friction, or full."
+        )
 
 
 def refuse_noise(*noises: object) -> Never:

@@ -18,6 +18,7 @@ from apo_bench.benchmark.trial import run_trial
 from apo_bench.correction.correct import Misbehaved
 from apo_bench.outcomes import sentence
 from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.branches import Branches
 from apo_bench.simulation.scene import Scene, build_scene
 
 Timing = dict[str, Any]
@@ -51,7 +52,9 @@ class Worker:
         stopped: Callable[[], bool] = lambda: False,
         began: Callable[[TrialSpec], None] = lambda spec: None,
     ) -> None:
-        """Run the trials of a unit in their order, demonstrations shared, and emit each row with its timing.
+        """Run the trials of a unit in their order, and emit each row with its timing.
+
+        Demonstrations and the beginnings of replays are shared.
 
         Args:
             stopped: Asked between trials; what is not begun then is left.
@@ -61,6 +64,7 @@ class Worker:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
         """
         demonstrations: dict[tuple[float, str], Shown] = {}
+        branches = Branches()
         for spec in unit.trials:
             if stopped():
                 return
@@ -73,7 +77,7 @@ class Worker:
                 demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
             shown = time.perf_counter()
             try:
-                row = run_trial(spec, scene, shown=demonstrations[key], content=content)
+                row = run_trial(spec, scene, shown=demonstrations[key], content=content, branches=branches)
             except Misbehaved as error:
                 row = misbehaved(spec, content, demonstrations[key].demonstration.code, str(error))
             spent = (ready - start, shown - ready, time.perf_counter() - shown)
