@@ -1,4 +1,4 @@
-"""The command line: `apo-bench scenarios | graph | explain | correct | scene | replay | sweep | report`.
+"""The command line: `apo-bench scenarios | graph | explain | correct | scene | replay | sweep | report | ..`.
 
 Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
 request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees.
@@ -22,6 +22,7 @@ from apo_bench import (
     cli_plan,
     cli_power,
     cli_recognition,
+    cli_report,
     cli_show,
     cli_sweep,
 )
@@ -139,7 +140,9 @@ def graph(
             typer.echo(f"\nWrote {out}")
 
 
-for commands in (cli_correction, cli_eye, cli_noise, cli_plan, cli_power, cli_recognition, cli_show, cli_sweep):
+for commands in (
+    *(cli_correction, cli_eye, cli_noise, cli_plan, cli_power, cli_recognition, cli_show, cli_sweep, cli_report),
+):
     commands.register(app)
 
 
@@ -228,25 +231,6 @@ def replay(
         typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
     if row["success"] is None:
         raise typer.Exit(NO_RESULT)
-
-
-@app.command()
-def report(folder: Annotated[Path, typer.Argument(help="The folder that `sweep --out` wrote.")]) -> None:
-    """Write the table (CSV), the success-over-level figure (PNG) and a page with both."""
-    from apo_bench.benchmark.journal import read_rows
-    from apo_bench.benchmark.report import report as write_report
-    from apo_bench.benchmark.statistics import tally
-    from apo_bench.benchmark.terminal import print_cells, print_prediction
-
-    made = write_report(folder)
-    rows = read_rows(folder)
-    print_cells(tally(rows))
-    print_prediction(rows)
-    figures = " ".join(str(path) for path in (made.figure, made.tightness) if path is not None)
-    typer.echo(f"Table:  {made.table}\nPredictions: {made.confusion}\nPairs:  {made.paired}")
-    if made.recognised is not None:
-        typer.echo(f"Recognised contacts: {made.recognised[0]} {made.recognised[1]}")
-    typer.echo(f"Figure: {figures}\nReport: {made.page}")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ from apo_bench.simulation.eye.rays import Sight
 from apo_bench.simulation.eye.tv import Change, TvCamera
 from apo_bench.simulation.hands import Hands
 from apo_bench.simulation.scene import Scene, build_scene
+from tests import pages
 
 TWO = ("stick_in_tower", "carried_bridge")
 
@@ -230,7 +231,7 @@ def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
     more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--workers", "1", "--out", str(out)]
     assert main(["sweep", "block_on_block", *asked, *more]) == 0
     assert main(["report", str(out)]) == 0
-    said, page = capsys.readouterr().out, (out / "report.md").read_text(encoding="utf-8")
+    said, page = capsys.readouterr().out, pages.words(out / "report.html")
     for text in (said, page):
         assert "0.5 mm per ray" in text
         assert "0 deg" not in text
@@ -266,9 +267,9 @@ def test_a_sweep_has_both_eyes(tmp_path: Path, drawn: dict[str, set[str]]) -> No
     assert main(["report", str(out)]) == 0
     both = "level: standard deviation of the seen poses [mm and degrees]; range finder: of a ray [mm]"
     assert both in drawn["success_over_level.png"]
-    page = (out / "report.md").read_text(encoding="utf-8")
+    page = pages.words(out / "report.html")
     assert "L mm and L degrees per axis" in page
-    assert "seen by the range finder (noise `range`), of L mm per ray" in page
+    assert "seen by the range finder (noise range), of L mm per ray" in page
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from scipy.stats import multinomial, ttest_rel
 from apo_bench.benchmark.paired import paired, tango
 from apo_bench.benchmark.paired_table import COLUMNS, paired_lines, write_paired
 from apo_bench.benchmark.report import report
+from tests import pages
 from tests.test_statistics import row, write
 
 Z2 = 1.959963984540054**2
@@ -140,7 +141,7 @@ def test_the_report_holds_the_pairs(tmp_path: Path) -> None:
     table = list(csv.DictReader(made.paired.open()))
     assert tuple(table[0]) == COLUMNS
     assert len(table) == len(paired(rows()))
-    assert "| contact | paper | 10 | 2 | 1 | +10.0 (" in made.page.read_text()
+    assert "| contact | paper | 1 | 10 | 6 | 2 | 1 | 1 | +10.0 (" in pages.lines(made.page)
     write_paired((), tmp_path / "empty.csv")
     assert (tmp_path / "empty.csv").read_text().strip() == ",".join(COLUMNS)
     assert paired_lines(()) == ["No two methods share a cell."]

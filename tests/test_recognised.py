@@ -19,6 +19,7 @@ from apo_bench.benchmark.stages import Shown, show
 from apo_bench.benchmark.trial import run_trial
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
+from tests import pages
 
 SEEN = str(Path(__file__).parent.parent / "docs" / "seen.csv")
 SPEC = TrialSpec("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)
@@ -101,10 +102,10 @@ def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.Captu
         ("contact", "recognised"),
     ]
     assert cli.main(["report", str(out)]) == 0
-    page = (out / "report.md").read_text(encoding="utf-8")
+    page = pages.lines(out / "report.html")
     assert "| block_on_block | isotropic | recognised | 0 | 0.5 | 1 of 1 |" in page
-    assert (out / "recognised.csv").exists()
-    assert (out / "recognised.png").exists()
+    assert (out / "tables" / "recognised.csv").exists()
+    assert (out / "figures" / "recognised.png").exists()
     capsys.readouterr()
 
 

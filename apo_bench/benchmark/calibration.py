@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.statistics import rank, rank_relations
 
 WORDS = (
@@ -17,9 +18,8 @@ WORDS = (
     "often the wrong relation, if it is one of those that were told, is in the ambiguity set of a failed test."
 )
 HEADER = (
-    "| scenario | noise | relations | method | covered | fixed error | over clearance | free error | test fails "
-    "| culprit |",
-    "|---|---|---|---|---|---|---|---|---|---|",
+    *("scenario", "noise", "relations", "method", "n", "covered", "fixed error", "over clearance", "free error"),
+    *("test fails", "culprit"),
 )
 
 
@@ -42,6 +42,8 @@ class Calibration:
     noise: str
     relations: str
     method: str
+    planned: int
+    """Trials that had a plan whose error is known."""
     covered: Share
     fixed_mm: float | None
     """Root mean square error of planned goals in directions that contacts fix; None if nothing was planned."""
@@ -61,9 +63,14 @@ def calibrations(rows: Iterable[Mapping[str, Any]]) -> tuple[Calibration, ...]:
     return tuple(_calibration(*key, groups[key]) for key in order)
 
 
+def calibration_table(found: Sequence[Calibration]) -> Table:
+    """For people."""
+    return Table(HEADER, [_line(c) for c in found], words=4)
+
+
 def calibration_lines(found: Sequence[Calibration]) -> list[str]:
-    """A Markdown table, or a sentence where there is nothing to say."""
-    return [*HEADER, *map(_line, found)] if found else ["No method was tried."]
+    """The same in Markdown, or a sentence where there is nothing to say."""
+    return calibration_table(found).markdown("No method was tried.")
 
 
 def _calibration(
@@ -81,6 +88,7 @@ def _calibration(
         noise=noise,
         relations=relations,
         method=method,
+        planned=len(planned),
         covered=Share(sum(covered), len(covered)),
         fixed_mm=_rms(fixed),
         fixed_over_clearance=_rms(tight),
@@ -90,13 +98,10 @@ def _calibration(
     )
 
 
-def _line(c: Calibration) -> str:
+def _line(c: Calibration) -> tuple[object, ...]:
     errors = (_number(c.fixed_mm, " mm"), _number(c.fixed_over_clearance, ""), _number(c.free_mm, " mm"))
     told = c.relations if c.method != "none" else "any"
-    return (
-        f"| {c.scenario} | {c.noise} | {told} | {c.method} | {c.covered} | {' | '.join(errors)} "
-        f"| {c.failed_tests} | {c.culprits} |"
-    )
+    return (c.scenario, c.noise, told, c.method, c.planned, c.covered, *errors, c.failed_tests, c.culprits)
 
 
 def _rms(numbers: Sequence[float]) -> float | None:

@@ -18,7 +18,18 @@ LEFT_OUT = (
         f"benchmark/{name}.py"
         for name in (
             *("adjust", "area", "bounded", "calibration", "compare", "confusion", "crew", "crew_member", "curve"),
-            *("effort", "eye_one", "half_level", "journal", "mcnemar", "misgivings", "on_ray", "one", "paired"),
+            *(
+                "effort",
+                "eye_one",
+                "failure_pictures",
+                "half_level",
+                "journal",
+                "mcnemar",
+                "misgivings",
+                "on_ray",
+                "one",
+                "paired",
+            ),
             *(
                 "parcel",
                 "ray_crew",

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from apo_bench.benchmark.confusion import Confusion
+from apo_bench.benchmark.page.markup import Table
 
 COLUMNS = (
     *("scenario", "method", "predicted_fit_fitted", "predicted_fit_failed", "predicted_fail_fitted"),
     *("predicted_fail_failed", "agreement", "same_operation", "stopped", "not_executed", "excluded"),
 )
 HEADER = (
-    "| scenario | method | fit: fitted | fit: failed | fail: fitted | fail: failed | agreement | right operation "
-    "| not executed | excluded |",
-    "|---|---|---|---|---|---|---|---|---|---|",
+    *("scenario", "method", "n", "fit: fitted", "fit: failed", "fail: fitted", "fail: failed", "agreement"),
+    *("right operation", "not executed", "excluded"),
 )
 WORDS = (
     "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides (strict). An operation "
@@ -33,9 +33,14 @@ def write_confusions(found: Sequence[Confusion], path: Path) -> None:
             writer.writerow([c.scenario, c.method, *counts, c.same_operation, c.stopped, c.not_executed, c.excluded])
 
 
+def confusion_table(found: Sequence[Confusion]) -> Table:
+    """For people."""
+    return Table(HEADER, [_line(c) for c in found], words=2)
+
+
 def confusion_lines(found: Sequence[Confusion]) -> list[str]:
-    """A Markdown table."""
-    return [*HEADER, *map(_line, found)]
+    """The same in Markdown."""
+    return confusion_table(found).markdown()
 
 
 def summary(c: Confusion) -> str:
@@ -48,8 +53,8 @@ def summary(c: Confusion) -> str:
     )
 
 
-def _line(c: Confusion) -> str:
+def _line(c: Confusion) -> tuple[object, ...]:
     agreement = "–" if c.agreement is None else f"{100 * c.agreement:.1f} %"
     operation = f"{c.same_operation} of {c.stopped}" if c.stopped else "–"
-    counts = f"{c.fit_fitted} | {c.fit_failed} | {c.fail_fitted} | {c.fail_failed}"
-    return f"| {c.scenario} | {c.method} | {counts} | {agreement} | {operation} | {c.not_executed} | {c.excluded} |"
+    counts = (c.fit_fitted, c.fit_failed, c.fail_fitted, c.fail_failed)
+    return (c.scenario, c.method, c.executed, *counts, agreement, operation, c.not_executed, c.excluded)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from statistics import fmean, median
 from typing import Any, final
 
+from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.statistics import rank
 
 WORDS = (
@@ -41,19 +42,14 @@ def efforts(rows: Iterable[Mapping[str, Any]]) -> tuple[Effort, ...]:
     return tuple(_effort(*key, groups[key]) for key in order)
 
 
-def effort_lines(found: Sequence[Effort]) -> list[str]:
-    """A Markdown table, or a sentence where nothing was right."""
-    if not found:
-        return ["No trial was right."]
-    return [
-        "| scenario | method | right | extra operations | simulated | pushed at most |",
-        "|---|---|---|---|---|---|",
-        *(
-            f"| {e.scenario} | {e.method} | {e.trials} | {e.extra_operations:.1f} | {e.sim_seconds:.0f} s "
-            f"| {e.pushed_mm:.2f} mm |"
-            for e in found
-        ),
+def effort_table(found: Sequence[Effort]) -> Table:
+    """For people."""
+    head = ("scenario", "method", "right", "extra operations", "simulated", "pushed at most")
+    rows: list[tuple[object, ...]] = [
+        (e.scenario, e.method, e.trials, f"{e.extra_operations:.1f}", f"{e.sim_seconds:.0f} s", f"{e.pushed_mm:.2f} mm")
+        for e in found
     ]
+    return Table(head, rows, words=2)
 
 
 def _effort(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Effort:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.benchmark.figure import level_label
+from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.recognised import KINDS
 from apo_bench.benchmark.statistics import wilson
 
@@ -19,9 +20,8 @@ COLUMNS = (
     *("rate", "low_95", "high_95", "right", "missed", "false", "precision", "recall"),
 )
 HEADER = (
-    "| scenario | noise | relations | careless | level | all right | 95 % interval | precision | recall | missed "
-    "| false |",
-    "|---|---|---|---|---|---|---|---|---|---|---|",
+    *("scenario", "noise", "relations", "careless", "level", "all right", "95 % interval", "precision", "recall"),
+    *("missed", "false"),
 )
 WORDS = (
     "Contacts that were recognised, against those of the scenario: how many demonstrations had all right and none too "
@@ -84,9 +84,14 @@ def recognitions(rows: Iterable[Mapping[str, Any]]) -> tuple[Recognition, ...]:
     return tuple(_counted(place, groups[place]) for place in sorted(groups, key=_order))
 
 
+def recognition_table(found: Sequence[Recognition]) -> Table:
+    """For people."""
+    return Table(HEADER, [_line(r) for r in found], words=4)
+
+
 def recognition_lines(found: Sequence[Recognition]) -> list[str]:
-    """A Markdown table, or a sentence where nothing was recognised."""
-    return [*HEADER, *map(_line, found)] if found else [NONE]
+    """The same in Markdown, or a sentence where nothing was recognised."""
+    return recognition_table(found).markdown(NONE)
 
 
 def write_recognitions(found: Sequence[Recognition], path: Path) -> None:
@@ -112,15 +117,14 @@ def _order(place: Place) -> tuple[Any, ...]:
     return (place.scenario == ALL, place.scenario, place.noise, place.eye, kind, place.careless, *place[-2:])
 
 
-def _line(r: Recognition) -> str:
+def _line(r: Recognition) -> tuple[object, ...]:
     p, interval = r.place, wilson(r.complete, r.demonstrations)
     noise = p.noise if p.eye == "noise" else p.eye
     level = level_label(p.level, p.level_deg, p.noise)
-    return (
-        f"| {p.scenario} | {noise} | {p.relations} | {p.careless:g} | {level} | {r.complete} of {r.demonstrations} "
-        f"| {100 * interval.low:.1f} to {100 * interval.high:.1f} % | {_share(r.precision)} | {_share(r.recall)} "
-        f"| {r.missed} | {r.false} |"
-    )
+    complete = f"{r.complete} of {r.demonstrations}"
+    between = f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %"
+    where = (p.scenario, noise, p.relations, f"{p.careless:g}", level)
+    return (*where, complete, between, _share(r.precision), _share(r.recall), r.missed, r.false)
 
 
 def _share(x: float | None) -> str:

@@ -1,4 +1,4 @@
-"""The report of a sweep: a table, a figure, and a page that shows both."""
+"""The report of a sweep: one page that answers, tables and figures beside it."""
 
 from __future__ import annotations
 
@@ -7,198 +7,186 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.benchmark.calibration import WORDS as CALIBRATION
-from apo_bench.benchmark.calibration import calibration_lines, calibrations
-from apo_bench.benchmark.confusion import confusions
-from apo_bench.benchmark.confusion_table import WORDS, confusion_lines, write_confusions
-from apo_bench.benchmark.effort import WORDS as EFFORT
-from apo_bench.benchmark.effort import effort_lines, efforts
-from apo_bench.benchmark.figure import draw, level_label
+from apo_bench.benchmark.confusion import Confusion, confusions
+from apo_bench.benchmark.confusion_table import write_confusions
+from apo_bench.benchmark.failure_pictures import failure_pictures, sample
+from apo_bench.benchmark.figure import draw, rows_of
 from apo_bench.benchmark.figure_tightness import draw_tightness, varies
-from apo_bench.benchmark.journal import read_rows
-from apo_bench.benchmark.paired import paired
-from apo_bench.benchmark.paired_table import WORDS as PAIRED
-from apo_bench.benchmark.paired_table import paired_lines, write_paired
+from apo_bench.benchmark.page.figures import figures_of, methods_of, write_figures
+from apo_bench.benchmark.page.gaps import gaps, write_gaps
+from apo_bench.benchmark.page.halves import write_areas, write_halves
+from apo_bench.benchmark.page.ran import read_run, scenario_files
+from apo_bench.benchmark.page.report_page import Found, report_page
+from apo_bench.benchmark.page.settings import members, settings
+from apo_bench.benchmark.page.times import read_timing, times, write_times
+from apo_bench.benchmark.paired_table import write_paired
+from apo_bench.benchmark.parquet import parquet_beside, write_columns
+from apo_bench.benchmark.rate_text import failures
 from apo_bench.benchmark.recognised_picture import draw_recognitions
-from apo_bench.benchmark.recognised_table import WORDS as RECOGNISED
-from apo_bench.benchmark.recognised_table import recognition_lines, recognitions, write_recognitions
-from apo_bench.benchmark.spec import RANGE, knows_relations
-from apo_bench.benchmark.statistics import Cell, tally
+from apo_bench.benchmark.recognised_table import recognitions, write_recognitions
+from apo_bench.benchmark.slim import COLUMNS as KEPT
+from apo_bench.benchmark.slim import slim_rows
+from apo_bench.benchmark.statistics import Cell
+from apo_bench.benchmark.summary import Summary, summary
 from apo_bench.errors import InputError
 
 COLUMNS = (
     *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method"),
-    *("trials", "successes", "rate", "low_95", "high_95", "loose_successes", "loose_rate", "excluded", "failures"),
+    *("grasp", "fidelity", "trials", "successes", "rate", "low_95", "high_95", "executed", "executed_rate"),
+    *("executed_low_95", "executed_high_95", "loose_successes", "loose_rate", "excluded", "failures"),
 )
+MOST_PANELS = 16
+"""Of a PNG; laying out more takes minutes."""
+PAGE, TABLES, FIGURES = "report.html", "tables", "figures"
 
 
 class Report(NamedTuple):
     """Where the report of a sweep was written."""
 
-    table: Path
-    figure: Path
     page: Path
-    confusion: Path
+    table: Path
+    """Cells: rates with their intervals."""
     paired: Path
+    confusion: Path
+    figure: Path | None
+    """Success over level, as PNG; None of a sweep with more than `MOST_PANELS` panels, which has it as SVG alone."""
     tightness: Path | None
     """The figure over tightness; None where a sweep has one clearance per scenario."""
-    recognised: tuple[Path, Path] | None = None
+    recognised: tuple[Path, Path] | None
     """Table and figure of recognised contacts; None where a sweep was given all of them."""
+    tables: tuple[Path, ...]
+    """All, as CSV; beside each is the same as Parquet."""
+    figures: tuple[Path, ...]
+    """All that are drawn as SVG."""
+    cells: tuple[Cell, ...]
+    confusions: tuple[Confusion, ...]
+    pictures: int
+    """Failures that were drawn."""
+    no_pictures: tuple[str, ...]
+    """Why others were not."""
 
 
-def report(folder: str | Path) -> Report:
-    """Write tables, figures and the page that shows them beside the rows of a sweep.
+def report(folder: str | Path, pictures: int = 0) -> Report:
+    """Write the page, tables and figures beside the rows of a sweep.
+
+    Args:
+        pictures: So many failures are drawn at most; most are run again for it, which takes as long as it took.
 
     Raises:
         InputError: No rows there, or the folder cannot be written.
     """
     folder = Path(folder)
-    rows = read_rows(folder)
+    rows = slim_rows(folder)
     if not rows:
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
-    cells = tally(rows)
-    made = Report(
-        table=folder / "table.csv",
-        figure=folder / "success_over_level.png",
-        page=folder / "report.md",
-        confusion=folder / "confusion.csv",
-        paired=folder / "paired.csv",
-        tightness=folder / "success_over_tightness.png" if varies(cells) else None,
-        recognised=(folder / "recognised.csv", folder / "recognised.png") if recognitions(rows) else None,
-    )
+    found = summary(rows)
     try:
-        _write_table(cells, made.table)
-        write_confusions(confusions(rows), made.confusion)
-        write_paired(paired(rows), made.paired)
-        draw(cells, made.figure)
-        if made.tightness is not None:
-            draw_tightness(cells, made.tightness)
-        if made.recognised is not None:
-            write_recognitions(recognitions(rows), made.recognised[0])
-            draw_recognitions(recognitions(rows), made.recognised[1])
-        made.page.write_text(_page(rows, cells, made), encoding="utf-8")
+        for name in (TABLES, FIGURES):
+            (folder / name).mkdir(exist_ok=True)
+        return _written(folder, rows, found, pictures)
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
+
+
+def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures: int) -> Report:
+    run, timing = read_run(folder), read_timing(folder)
+    files, told, wrong = scenario_files(run), recognitions(rows), confusions(rows)
+    gap, took = gaps(rows), times(timing)
+    grouped = members(settings(found.cells), found.cells)
+    figures = figures_of(found, grouped, gap, took)
+    drawn = _drawn(folder / FIGURES, found.cells, told)
+    tables = _tables(folder / TABLES, found, told)
+    write_gaps(gap, tables.setdefault("gaps", folder / TABLES / "gaps.csv"))
+    write_confusions(wrong, tables.setdefault("confusion", folder / TABLES / "confusion.csv"))
+    if took:
+        write_times(took, tables.setdefault("times", folder / TABLES / "times.csv"))
+    made = [path for table in tables.values() for path in (table, parquet_beside(table))]
+    made.append(_rows(rows, folder / TABLES / "rows.parquet"))
+    svg = write_figures(figures, methods_of(found.cells), folder / FIGURES)
+    taken, missed = failure_pictures(sample(rows, pictures), folder, files) if pictures else ([], [])
+    page = Found(
+        name=folder.resolve().name,
+        rows=rows,
+        summary=found,
+        grouped=grouped,
+        figures=figures,
+        gaps=gap,
+        confusions=wrong,
+        recognitions=told,
+        timing=timing,
+        run=run,
+        files=files,
+        pictures=taken,
+        no_pictures=missed,
+        drawn=drawn,
+        tables=[str(path.relative_to(folder)) for path in (*made, *drawn.values(), *svg)],
+    )
+    (folder / PAGE).write_text(report_page(page), encoding="utf-8")
+    recognised = (tables["recognised"], drawn["recognised"]) if told else None
+    return Report(
+        page=folder / PAGE,
+        table=tables["cells"],
+        paired=tables["pairs"],
+        confusion=tables["confusion"],
+        figure=drawn.get("success_over_level"),
+        tightness=drawn.get("success_over_tightness"),
+        recognised=recognised,
+        tables=tuple(tables.values()),
+        figures=tuple(svg),
+        cells=found.cells,
+        confusions=wrong,
+        pictures=len(taken),
+        no_pictures=tuple(missed),
+    )
+
+
+def _drawn(folder: Path, cells: Sequence[Cell], told: Sequence[Any]) -> dict[str, Path]:
+    """Figures as PNG."""
+    made: dict[str, Path] = {}
+    few = len(rows_of(cells)) * len({c.careless for c in cells if c.method != "oracle"}) <= MOST_PANELS
+    if few:
+        made["success_over_level"] = folder / "success_over_level.png"
+        draw(cells, made["success_over_level"])
+    if few and varies(cells):
+        made["success_over_tightness"] = folder / "success_over_tightness.png"
+        draw_tightness(cells, made["success_over_tightness"])
+    if told:
+        made["recognised"] = folder / "recognised.png"
+        draw_recognitions(told, made["recognised"])
     return made
 
 
-def percent(rate: float | None) -> str:
-    """`97.0 %`, or a dash where nothing counted."""
-    return "–" if rate is None else f"{100 * rate:.1f} %"
+def _tables(folder: Path, found: Summary, told: Sequence[Any]) -> dict[str, Path]:
+    names = ("cells", "pairs", "half_levels", "areas", *(("recognised",) if told else ()))
+    made = {name: folder / f"{name}.csv" for name in names}
+    _write_cells(found.cells, made["cells"])
+    write_paired(found.pairs, made["pairs"])
+    write_halves(found.half_levels, made["half_levels"])
+    write_areas(found.areas, found.area_differences, made["areas"])
+    if told:
+        write_recognitions(told, made["recognised"])
+    return made
 
 
-def interval(cell: Cell) -> str:
-    """`91.5 to 99.0 %`."""
-    low, high = cell.interval
-    return f"{100 * low:.1f} to {100 * high:.1f} %"
-
-
-def failures(cell: Cell, most: int = 3) -> str:
-    """`attach: force_stop 12, judge: gap 3`: the most frequent endings of trials that failed."""
-    return ", ".join(f"{why} {count}" for why, count in list(cell.failures.items())[:most])
-
-
-def _write_table(cells: Sequence[Cell], path: Path) -> None:
+def _write_cells(cells: Sequence[Cell], path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for c in cells:
-            where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg)
-            loose = (c.loose_successes, c.loose_rate)
-            writer.writerow(
-                [
-                    *where,
-                    c.tightness,
-                    c.method,
-                    c.trials,
-                    c.successes,
-                    c.rate,
-                    *c.interval,
-                    *loose,
-                    c.excluded,
-                    failures(c, 99),
-                ]
-            )
+        writer.writerows(_line(cell) for cell in cells)
 
 
-def _page(rows: Sequence[Mapping[str, Any]], cells: Sequence[Cell], made: Report) -> str:
-    excluded = {(r["scenario"], r["seed"], r["careless"]) for r in rows if r["demonstration"] != "ok"}
-    shown = {(r["scenario"], r["seed"], r["careless"]) for r in rows}
-    grasps = ", ".join(sorted({r["grasp"] for r in rows}))
-    lines = [
-        "# Success of replayed demonstrations",
-        "",
-        f"{len(rows)} trials; grasp {grasps}. {_level(rows)}",
-        "`oracle` replays the drawn layout and meets neither noise nor carelessness; `none` replays what was seen. "
-        "Neither is told what touches what, so wrong relations are met by correctors alone.",
-        f"{len(excluded)} of {len(shown)} demonstrations were not right themselves and are left out of every method.",
-        "",
-        f"![Success over level]({made.figure.name})",
-        "",
-        *([] if made.tightness is None else [f"![Success over tightness]({made.tightness.name})", ""]),
-        "| scenario | clearance | noise | relations | careless | level | method | strict success | 95 % interval | n "
-        "| excluded | loose | failures |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-        *(_line(cell) for cell in cells),
-        "",
-        "Strict and loose are the judge's; intervals are Wilson's; the same numbers stand in "
-        f"[{made.table.name}]({made.table.name}). Excluded are trials whose demonstration was not right.",
-        "",
-        "## Pairs",
-        "",
-        PAIRED,
-        "",
-        *paired_lines(paired(rows)),
-        "",
-        "## Prediction and physics",
-        "",
-        WORDS,
-        "",
-        *confusion_lines(confusions(rows)),
-        "",
-        "## What it takes",
-        "",
-        EFFORT,
-        "",
-        *effort_lines(efforts(rows)),
-        "",
-        "## Calibration",
-        "",
-        CALIBRATION,
-        "",
-        *calibration_lines(calibrations(rows)),
-        *_recognised(rows, made),
-    ]
-    return "\n".join(lines) + "\n"
+def _line(c: Cell) -> tuple[object, ...]:
+    where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg, c.tightness, c.method)
+    strict = (c.grasp, c.fidelity, c.trials, c.successes, c.rate, *c.interval)
+    executed = (c.executed.trials, c.executed.rate, *c.executed.interval)
+    return (*where, *strict, *executed, c.loose_successes, c.loose_rate, c.excluded, failures(c, 99))
 
 
-def _level(rows: Sequence[Mapping[str, Any]]) -> str:
-    """What a level is, for the eyes that looked."""
-    noises = {row["noise"] for row in rows}
-    if noises == {RANGE}:
-        return "A level of L is a standard deviation of L mm per ray of the range finder."
-    also = "; seen by the range finder (noise `range`), of L mm per ray" if RANGE in noises else ""
-    return (
-        "A level of L is a standard deviation of L mm and L degrees per axis, times what the noise model makes of it "
-        f"in a direction or for a part{also}."
-    )
-
-
-def _recognised(rows: Sequence[Mapping[str, Any]], made: Report) -> list[str]:
-    """The section on recognised contacts; nothing where all were given."""
-    if made.recognised is None:
-        return []
-    table, figure = (path.name for path in made.recognised)
-    words = f"{RECOGNISED} The same numbers stand in [{table}]({table})."
-    lines = recognition_lines(recognitions(rows))
-    return ["", "## Recognised contacts", "", words, "", f"![Recognised contacts]({figure})", "", *lines]
-
-
-def _line(c: Cell) -> str:
-    ceiling = c.method == "oracle"
-    noise, relations = "any" if ceiling else c.noise, c.relations if knows_relations(c.method) else "any"
-    return (
-        f"| {c.scenario} | {c.clearance_mm:g} mm | {noise} | {relations} | {'any' if ceiling else f'{c.careless:g}'} "
-        f"| {'any' if ceiling else level_label(c.level, c.level_deg, c.noise)} | {c.method} | {percent(c.rate)} "
-        f"| {interval(c)} | {c.trials} | {c.excluded} | {percent(c.loose_rate)} | {failures(c)} |"
-    )
+def _rows(rows: Sequence[Mapping[str, Any]], path: Path) -> Path:
+    """The rows themselves, what was predicted in columns of its own."""
+    plain = [name for name in KEPT if name != "predicted"]
+    columns = [[row.get(name) for row in rows] for name in plain]
+    said = ("fails", "operation", "code")
+    foretold = [[None if (p := row.get("predicted")) is None else p[key] for row in rows] for key in said]
+    write_columns([*plain, *(f"predicted_{key}" for key in said)], [*columns, *foretold], path)
+    return path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -12,10 +12,13 @@ from rich.table import Table
 from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.figure import level_label
-from apo_bench.benchmark.report import failures, interval, percent
+from apo_bench.benchmark.rate_text import failures, interval, percent
 from apo_bench.benchmark.spec import RANGE, knows_relations
 from apo_bench.benchmark.statistics import Cell
 from apo_bench.scenario import Scenario
+
+if TYPE_CHECKING:
+    from apo_bench.benchmark.report import Report
 
 
 def print_scenarios(scenarios: Sequence[Scenario]) -> None:
@@ -56,6 +59,18 @@ def print_cells(cells: Sequence[Cell]) -> None:
     excluded = sum(c.excluded for c in cells)
     if excluded:
         _console().print(f"{excluded} rows are left out, since the demonstration itself was not right.")
+
+
+def print_report(made: Report) -> None:
+    """Where everything was written, and in one line how often plans foretold what happened."""
+    say = _console().print
+    say(summary(made.confusions[-1]))
+    if made.no_pictures:
+        say(f"{made.pictures} failures were drawn; of others: {'; '.join(made.no_pictures)}")
+    say(f"Tables:  {' '.join(map(str, made.tables))} (the same as .parquet)")
+    pictures = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
+    say(f"Figures: {' '.join(map(str, (*pictures, *made.figures)))}")
+    say(f"Report:  {made.page}")
 
 
 def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:

@@ -1,0 +1,220 @@
+"""Pictures of a sample of trials that failed, made by running them again.
+
+A trial is run again only where specification, assets and code are those of its row, by its hash; else the parts are
+drawn where the row says that they ended.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.benchmark.replay_command import Files
+from apo_bench.benchmark.spec import TrialSpec
+from apo_bench.benchmark.statistics import rank
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.solid import extent
+from apo_bench.program import Poses
+
+WIDTH, HEIGHT, QUALITY = 640, 480, 82
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.22, 1.15, 128.0, -24.0
+SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
+"""A trial that was run again is the same if these are."""
+
+Row = Mapping[str, Any]
+
+
+class FailurePicture(NamedTuple):
+    """Of one trial."""
+
+    row: Row
+    jpeg: bytes
+    words: str
+    """How it was made."""
+
+
+def sample(rows: Iterable[Row], most: int) -> list[Row]:
+    """Failures to be drawn: kinds of failure by turns, the most frequent first, methods and scenarios varied.
+
+    The same rows, in any order, give the same sample. Trials that were not carried out have nothing to be seen.
+    """
+    kinds: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        if row["success"] is False and row.get("sim_seconds") and row["level"] is not None:
+            kinds.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
+    queues = [
+        sorted(found, key=_order) for _, found in sorted(kinds.items(), key=lambda kind: (-len(kind[1]), kind[0]))
+    ]
+    chosen: list[Row] = []
+    while len(chosen) < most and any(queues):
+        for queue in queues:
+            if queue and len(chosen) < most:
+                chosen.append(queue.pop(_newest(queue, chosen)))
+    return chosen
+
+
+def _order(row: Row) -> tuple[Any, ...]:
+    where = (row["scenario"], row["clearance_mm"], row["noise"], row["relations"], row["careless"], row["level"])
+    return (row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)
+
+
+def _newest(queue: Sequence[Row], chosen: Sequence[Row]) -> int:
+    """The first one of a method and scenario that was chosen least."""
+    methods, scenarios = [row["method"] for row in chosen], [row["scenario"] for row in chosen]
+    met: dict[tuple[str, str], int] = {}
+    for i, row in enumerate(queue):
+        met.setdefault((row["method"], row["scenario"]), i)
+    best = min(met, key=lambda pair: (methods.count(pair[0]) + scenarios.count(pair[1]), met[pair]))
+    return met[best]
+
+
+def failure_pictures(
+    chosen: Sequence[Row], folder: Path, files: Files | None = None
+) -> tuple[list[FailurePicture], list[str]]:
+    """The pictures that could be made, and sentences on what could not.
+
+    Args:
+        folder: Of the sweep, whose rows say where parts ended.
+    """
+    made: list[FailurePicture] = []
+    missed: list[str] = []
+    scenes: dict[tuple[Any, ...], Any] = {}
+    for row in chosen:
+        try:
+            made.append(_made(row, folder, files or {}, scenes))
+        except (InputError, RuntimeError, OSError, ValueError) as error:
+            missed.append(str(error).splitlines()[0] if str(error) else type(error).__name__)
+            if "no picture can be drawn here" in missed[-1]:
+                break
+    return made, list(dict.fromkeys(missed))
+
+
+def _made(row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any]) -> FailurePicture:
+    from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+    from apo_bench.simulation.render import picture
+
+    spec = spec_of(row, files)
+    scene = _scene(spec, scenes)
+    picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    if spec_hash(spec, content) == row.get("spec_hash"):
+        image = _again(row, spec, scene, content)
+        if image is not None:
+            return FailurePicture(row, _jpeg(image), "how the replay ended, run again for this picture")
+    whole = whole_row(folder, row)
+    poses = _poses(whole.get("reached"))
+    if not poses:
+        raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
+    image = picture(scene, poses, WIDTH, HEIGHT, _camera(scene, row, poses))
+    return FailurePicture(
+        row,
+        _jpeg(image),
+        "where the parts ended, as the row says; other code or assets made it, so it was not run again",
+    )
+
+
+def spec_of(row: Row, files: Files) -> TrialSpec:
+    """The specification of the trial that a row is of."""
+    return TrialSpec(
+        scenario=files.get(row["scenario"], row["scenario"]),
+        level_mm=row["level"],
+        level_deg=row["level_deg"],
+        careless=row["careless"],
+        clearance_mm=row["clearance_mm"],
+        noise=row["noise"],
+        grasp=row["grasp"],
+        arm=row.get("arm", "six_axis"),
+        method=row["method"],
+        seed=row["seed"],
+        timestep_s=row.get("timestep_s", 0.001),
+        relations=row["relations"],
+        eye=row.get("eye", "noise"),
+        fidelity=row.get("fidelity", "full"),
+    )
+
+
+def whole_row(folder: Path, row: Row) -> dict[str, Any]:
+    """The row as it stands in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
+    wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["spec_hash"]).encode())
+    with (folder / "trials.jsonl").open("rb") as file:
+        for line in file:
+            if all(part in line for part in wanted):
+                found = json.loads(line)
+                if found["method"] == row["method"] and found["scenario"] == row["scenario"]:
+                    return dict(found)
+    return {}
+
+
+def _scene(spec: TrialSpec, scenes: dict[tuple[Any, ...], Any]) -> Any:
+    from apo_bench.scenario_file import load_scenario
+    from apo_bench.simulation.scene import build_scene
+
+    key = (spec.scenario, spec.clearance_mm, spec.grasp, spec.arm, spec.timestep_s)
+    if key not in scenes:
+        scenes[key] = build_scene(
+            load_scenario(spec.scenario),
+            clearance_mm=spec.clearance_mm,
+            grasp=spec.grasp,
+            arm=spec.arm,
+            timestep_s=spec.timestep_s,
+        )
+    return scenes[key]
+
+
+def _again(row: Row, spec: TrialSpec, scene: Any, content: str) -> Any:
+    """The last moment of the replay, with the arm; None if it ended in another way."""
+    from apo_bench.benchmark.trial import run_trial
+    from apo_bench.simulation.render import picture_with_arm
+
+    last: list[Any] = []
+
+    def keep(data: Any) -> None:
+        last[:] = [np.array(data.qpos)]
+
+    done = run_trial(spec, scene, content=content, watch=keep)
+    if not last or any(done.get(name) != row.get(name) for name in SAME):
+        return None
+    poses = _poses(done["reached"]) or {}
+    camera = _camera(scene, row, poses)
+    fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
+    return picture_with_arm(scene, fixed, last[0], WIDTH, HEIGHT, camera)
+
+
+def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:
+    """Part -> (4, 4), world frame, [m], of what a row says in mm."""
+    if not reached:
+        return None
+    return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in reached.items()}
+
+
+def _camera(scene: Any, row: Row, poses: Poses) -> Any:
+    """One that sees what failed: the parts of the operation, else all that were assembled."""
+    from apo_bench.simulation.render import view
+
+    assembly = scene.scenario.assembly
+    k = row.get("failure_operation")
+    asked = assembly.operations if k is None else assembly.operations[k - 1 : k]
+    near = {part for o in asked for part in (*o.moves, *(c.environment.part for c in o.contacts))}
+    parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
+    if not parts:
+        return view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, AZIMUTH_DEG, ELEVATION_DEG)
+    boxes = {part: assembly.solids[part].boxes for part in parts}
+    ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
+    at = np.array([poses[part][:3, 3] for part in parts])
+    low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+    far = NEAREST_M + FARTHER * float(np.linalg.norm(high - low))
+    return view((low + high) / 2, min(far, 1.2), AZIMUTH_DEG, ELEVATION_DEG)
+
+
+def _jpeg(image: Any) -> bytes:
+    import imageio.v3 as imageio
+
+    file = io.BytesIO()
+    imageio.imwrite(file, image, extension=".jpg", quality=QUALITY)
+    return file.getvalue()

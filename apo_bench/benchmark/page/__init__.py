@@ -1,0 +1,1 @@
+"""Pages that a browser opens without a network: HTML, style, script and drawings in one file."""

@@ -1,0 +1,75 @@
+"""The headline: for every setting a matrix of methods over levels, with a button for each cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from apo_bench.benchmark.page.markup import Html, joined, tag
+from apo_bench.benchmark.page.settings import Setting, at, level_of, level_unit, level_words, levels_of
+from apo_bench.benchmark.rate_text import interval, percent
+from apo_bench.benchmark.statistics import Cell, Place
+
+
+def matrices(grouped: Mapping[Setting, Sequence[Cell]], numbers: Mapping[Place, int]) -> Html:
+    """One table per setting.
+
+    Args:
+        grouped: From `members`.
+        numbers: Cell's place -> its number among all cells.
+    """
+    made = []
+    opened: set[int] = set()
+    for setting, cells in grouped.items():
+        made.append(tag("h3", setting.title()))
+        made.append(_matrix(setting, cells, numbers, opened))
+    return joined(made)
+
+
+def _matrix(setting: Setting, cells: Sequence[Cell], numbers: Mapping[Place, int], opened: set[int]) -> Html:
+    levels = levels_of(cells)
+    spread = max(1, len(levels))
+    words = [level_words(level, setting.noise) for level in levels] or ["any"]
+    corner = tag("th", f"method, {level_unit(setting.noise)}" if levels else "method", scope="col")
+    head = tag("tr", corner, *(tag("th", word, scope="col", class_="number") for word in words))
+    lines = []
+    for method in dict.fromkeys(c.method for c in cells):
+        own = {level_of(c): c for c in cells if c.method == method}
+        if method == "oracle":
+            (ceiling,) = own.values()
+            boxes = [tag("td", _button(ceiling, setting, numbers, opened), colspan=spread)]
+        else:
+            boxes = [
+                tag("td", _button(own[level], setting, numbers, opened))
+                if level in own
+                else tag("td", "not run", class_="gone")
+                for level in levels
+            ]
+        lines.append(tag("tr", tag("th", method, scope="row"), *boxes))
+    table = tag("table", tag("thead", head), tag("tbody", *lines), class_="matrix")
+    return tag("div", table, class_="scroll", tabindex=0, role="region", aria_label=setting.title())
+
+
+def _button(cell: Cell, setting: Setting, numbers: Mapping[Place, int], opened: set[int]) -> Html:
+    """What a cell says; a cell that stands in several matrices has its anchor in the first."""
+    number = numbers[at(cell)]
+    level = "" if cell.method == "oracle" else f", level {level_words(level_of(cell), cell.noise)}"
+    said = f"{cell.method}{level}: {percent(cell.rate)}, {cell.successes} of {cell.trials}"
+    anchor = None if number in opened else f"cell-{number}"
+    opened.add(number)
+    tip = f"{setting.title()}; {said}; 95 %: {interval(cell)}; excluded {cell.excluded}"
+    small = [tag("small", interval(cell)), tag("small", f"n {cell.trials}")]
+    if cell.not_executed:
+        done = cell.executed
+        small.append(tag("small", f"of executed: {percent(done.rate)}, n {done.trials}"))
+    return tag(
+        "button",
+        *(tag("b", percent(cell.rate)), *small),
+        type="button",
+        class_="cell",
+        id=anchor,
+        data_cell=number,
+        data_title=f"{setting.title()}: {said}",
+        title=tip,
+        aria_expanded="false",
+        style=f"--share:{cell.rate or 0.0:.3f}",
+    )

@@ -1,0 +1,75 @@
+"""What was run: specification, versions and command out of `run.json`, whatever of it there is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from apo_bench.benchmark.page.markup import Html, Table, joined, tag
+
+LONG = 400
+"""Longer values are cut; they stand in the file."""
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """What `run.json` says; nothing if it is not there or is something else."""
+    try:
+        said = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return said if isinstance(said, dict) else {}
+
+
+def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
+    """Scenarios that were given as files: name -> path."""
+    files = run.get("files")
+    return {str(k): str(v) for k, v in files.items()} if isinstance(files, dict) else {}
+
+
+def ran(run: Mapping[str, Any], rows: Mapping[str, Any]) -> Html:
+    """Tables of the specification and the versions.
+
+    Args:
+        rows: What the rows themselves say, by what it is called.
+    """
+    made = [_table("rows", rows)]
+    if not run:
+        made.append(
+            tag("p", "There is no run.json beside the rows, so versions and command are not known.", class_="none")
+        )
+        return joined(made)
+    if run.get("command"):
+        made.append(tag("p", tag("code", run["command"])))
+    plain = {k: v for k, v in run.items() if not isinstance(v, (dict, list)) and k != "command"}
+    if plain:
+        made.append(_table("run", plain))
+    for name, values in run.items():
+        if isinstance(values, dict) and values:
+            made.append(_folded(name, _table(name, values), len(values)))
+        elif isinstance(values, list) and values:
+            numbered = {str(i): value for i, value in enumerate(values, start=1)}
+            made.append(_folded(name, _table(name, numbered), len(values)))
+    return joined(made)
+
+
+def _folded(name: str, table: Html, entries: int) -> Html:
+    is_open = {"open": ""} if entries <= 20 else {}
+    return tag("details", tag("summary", name.replace("_", " ")), table, **is_open)
+
+
+def _table(name: str, values: Mapping[str, Any]) -> Html:
+    rows: list[tuple[object, ...]] = [(key, tag("span", words(value))) for key, value in values.items()]
+    return Table((name.replace("_", " "), "value"), rows, words=2).html()
+
+
+def words(value: Any) -> str:
+    """A value as a person reads it: lists with commas, the rest as JSON."""
+    if isinstance(value, str):
+        said = value
+    elif isinstance(value, (list, tuple)) and not any(isinstance(x, (dict, list)) for x in value):
+        said = ", ".join(x if isinstance(x, str) else json.dumps(x) for x in value) or "–"
+    else:
+        said = json.dumps(value)
+    return said if len(said) <= LONG else said[:LONG] + " …"

@@ -1,0 +1,82 @@
+"""Where trials ended: for every method and level a bar of shares, success first, then the stages that failed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+
+from apo_bench.benchmark.page.chart import WIDTH, Entry, Panel, patch
+from apo_bench.benchmark.page.markup import Html, html
+from apo_bench.benchmark.page.paint import stage_paint, stages_in_order
+from apo_bench.benchmark.page.settings import Setting, level_of, level_words
+from apo_bench.benchmark.rate_text import percent
+from apo_bench.benchmark.statistics import Cell
+
+LEFT, RIGHT, HIGH, STEP, APART = 138, 46, 11, 14, 5
+"""Where bars begin and end, their height, from one to the next, and between methods, px."""
+
+
+def stages_of(cell: Cell) -> Counter[str]:
+    """Stage -> failures."""
+    found: Counter[str] = Counter()
+    for why, count in cell.failures.items():
+        found[why.partition(":")[0]] += count
+    return found
+
+
+def stage_entries(cells: Iterable[Cell]) -> list[Entry]:
+    """The legend: success, and every stage at which a trial failed."""
+    found = stages_in_order({stage for cell in cells for stage in stages_of(cell)})
+    return [Entry(patch("var(--ok)"), "success"), *(Entry(patch(stage_paint(stage)), stage) for stage in found)]
+
+
+def stack_panels(grouped: Mapping[Setting, Sequence[Cell]]) -> list[Panel]:
+    """A panel per setting that has a trial that counts."""
+    return [_panel(s, [c for c in cells if c.trials]) for s, cells in grouped.items() if any(c.trials for c in cells)]
+
+
+def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
+    y, said, before = 6.0, [], ""
+    for cell in cells:
+        if cell.method != before:
+            y += APART
+            said.append(f'<text x="0" y="{y + HIGH - 2:.0f}">{html(_short(cell.method))}</text>')
+            before = cell.method
+        said.append(_bar(cell, setting, y))
+        y += STEP
+    ends = "".join(
+        f'<text class="soft" x="{_x(share):.1f}" y="{y + 12:.0f}" text-anchor="middle">{100 * share:.0f} %</text>'
+        for share in (0.0, 0.5, 1.0)
+    )
+    middle = (LEFT + WIDTH - RIGHT) / 2
+    what = f'<text class="soft" x="{middle}" y="{y + 26:.0f}" text-anchor="middle">share of trials</text>'
+    return Panel(setting.title(), Html("".join(said) + ends + what), int(y + 32))
+
+
+def _bar(cell: Cell, setting: Setting, y: float) -> str:
+    level = "" if cell.method == "oracle" else level_words(level_of(cell), setting.noise)
+    said = [f'<text class="soft" x="{LEFT - 6}" y="{y + HIGH - 2:.0f}" text-anchor="end">{html(level)}</text>']
+    found, done = stages_of(cell), 0
+    pieces = [("success", cell.successes, "var(--ok)")]
+    pieces += [(stage, found[stage], stage_paint(stage)) for stage in stages_in_order(found)]
+    for stage, count, paint in pieces:
+        if count:
+            left, right = _x(done / cell.trials), _x((done + count) / cell.trials)
+            at = f"{cell.method}{f', level {level}' if level else ''}"
+            tip = f"{at}: {stage} {count} of {cell.trials} ({percent(count / cell.trials)})"
+            said.append(
+                f'<rect x="{left:.1f}" y="{y:.0f}" width="{right - left:.1f}" height="{HIGH}" '
+                f'style="fill:{paint}"><title>{html(tip)}</title></rect>'
+            )
+            done += count
+    said.append(f'<text class="soft" x="{WIDTH - RIGHT + 5}" y="{y + HIGH - 2:.0f}">n {cell.trials}</text>')
+    return "".join(said)
+
+
+def _x(share: float) -> float:
+    return LEFT + (WIDTH - LEFT - RIGHT) * share
+
+
+def _short(name: str, letters: int = 16) -> str:
+    """A name that fits beside its bars."""
+    return name if len(name) <= letters else name[: letters - 1] + "…"

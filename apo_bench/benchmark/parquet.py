@@ -1,0 +1,37 @@
+"""Tables as Parquet: of a CSV file, and of the rows of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+WORDS = (
+    *("scenario", "noise", "relations", "method", "reference", "grasp", "fidelity", "eye", "arm", "failures"),
+    *("host", "worker", "command"),
+)
+"""Columns of words, also where they look like numbers."""
+
+
+def parquet_beside(table: Path) -> Path:
+    """Write the columns of a CSV file as `.parquet` beside it; an empty field is null."""
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    how = csv.ConvertOptions(column_types=dict.fromkeys(WORDS, pa.string()))
+    made = csv.read_csv(table, convert_options=how)
+    for i, field in enumerate(made.schema):
+        if pa.types.is_null(field.type):
+            made = made.set_column(i, field.name, made.column(i).cast(pa.float64()))
+    parquet.write_table(made, table.with_suffix(".parquet"))
+    return table.with_suffix(".parquet")
+
+
+def write_columns(names: Sequence[str], columns: Sequence[Sequence[Any]], path: Path) -> None:
+    """Write columns as Parquet; lists of a column are lists there."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    arrays = [pa.array(column, from_pandas=False) for column in columns]
+    arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]
+    parquet.write_table(pa.table(arrays, names=list(names)), path, compression="zstd")

@@ -1,0 +1,73 @@
+"""The command that runs the trial of a row again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+from apo_bench.benchmark.spec import RANGE, USUAL
+from apo_bench.errors import InputError
+
+Files = Mapping[str, str]
+"""Scenarios that were given as files: name -> path."""
+
+
+def replay_command(row: Mapping[str, Any], files: Files | None = None) -> str:
+    """`apo-bench replay SCENARIO .. --seed N`, quoted for a shell; only what is not a default of `replay` is said."""
+    return f"{without_seed(row, files)} --seed {row['seed']}"
+
+
+def without_seed(row: Mapping[str, Any], files: Files | None = None) -> str:
+    """The same without the seed: what the trials of a cell have in common."""
+    given = (files or {}).get(row["scenario"], row["scenario"])
+    return shlex.join(["apo-bench", "replay", str(given), *_options(row, str(given))])
+
+
+def _options(row: Mapping[str, Any], given: str) -> list[str]:
+    said: list[str] = []
+
+    def say(option: str, value: object, default: object) -> None:
+        if value != default:
+            said.extend((option, number(value) if isinstance(value, float) else str(value)))
+
+    measured = row["eye"] == RANGE
+    if measured or row["level"] == row["level_deg"]:
+        say("--level", float(row["level"]), 1.0)
+    else:
+        say("--level-mm", float(row["level"]), 1.0)
+        say("--level-deg", float(row["level_deg"]), 1.0)
+    say("--careless", float(row["careless"]), 1.0)
+    say("--noise", row["noise"], RANGE if measured else USUAL)
+    say("--relations", row["relations"], "given")
+    say("--eye", row["eye"], "noise")
+    say("--clearance", float(row["clearance_mm"]), _own_clearance(given))
+    say("--grasp", row["grasp"], "friction")
+    say("--arm", row["arm"], "six_axis")
+    say("--timestep-ms", milli(row["timestep_s"]), 1.0)
+    say("--fidelity", row["fidelity"], "full")
+    say("--method", row["method"], "none")
+    return said
+
+
+def number(x: float) -> str:
+    """The shortest text that is read as the same number."""
+    return str(int(x)) if x == int(x) and abs(x) < 1e15 else repr(x)
+
+
+def milli(seconds: float) -> float:
+    """In thousandths, such that these times 1e-3 are the same number again wherever there are such."""
+    rounded = float(f"{seconds * 1e3:.12g}")
+    return rounded if rounded * 1e-3 == seconds else seconds * 1e3
+
+
+@lru_cache(maxsize=1024)
+def _own_clearance(given: str) -> float | None:
+    """What `replay` takes if nothing is said; None if the scenario cannot be read here."""
+    from apo_bench.scenario_file import load_scenario
+
+    try:
+        return float(load_scenario(given).clearance_mm)
+    except (InputError, OSError):
+        return None
