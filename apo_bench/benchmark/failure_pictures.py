@@ -23,7 +23,7 @@ from apo_bench.geometry.solid import extent
 from apo_bench.program import Poses
 
 WIDTH, HEIGHT, QUALITY = 640, 480, 82
-NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.22, 1.15, 128.0, -24.0
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
 SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
 """A trial that was run again is the same if these are."""
 

@@ -93,7 +93,7 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
     files, told, wrong = scenario_files(run), recognitions(rows), confusions(rows)
     gap, took = gaps(rows), times(timing)
     grouped = members(settings(found.cells), found.cells)
-    figures = figures_of(found, grouped, gap, took)
+    figures = figures_of(found, grouped, gap, wrong, took)
     drawn = _drawn(folder / FIGURES, found.cells, told)
     tables = _tables(folder / TABLES, found, told)
     write_gaps(gap, tables.setdefault("gaps", folder / TABLES / "gaps.csv"))

@@ -12,8 +12,9 @@ from apo_bench.benchmark.page.paint import dash, marker
 
 WIDTH, HEIGHT = 360, 230
 LEFT, RIGHT, TOP, BOTTOM = 48, 12, 10, 42
-DODGE = 0.05
-"""Methods stand this far from each other at one level, so that equal values do not hide each other."""
+DODGE, SPREAD = 0.05, 0.32
+"""Methods stand this far from each other at one level, so that equal values do not hide each other; and all of them
+within this part of the way to the next level."""
 
 
 class Panel(NamedTuple):
@@ -84,7 +85,8 @@ def panel(title: str, axes: Axes, lines: Lines, looks: Mapping[str, tuple[int, S
     """
     drawn = [_scaffold(axes)]
     order = [method for method in looks if lines.get(method)]
-    aside = {method: DODGE * (i - (len(order) - 1) / 2) for i, method in enumerate(order)}
+    apart = min(DODGE, SPREAD / len(order)) if order else 0.0
+    aside = {method: apart * (i - (len(order) - 1) / 2) for i, method in enumerate(order)}
     drawn += [_band(axes, lines[m], aside[m], looks[m][0]) for m in order]
     drawn += [_line(axes, lines[m], aside[m], *looks[m], m) for m in order]
     return Panel(title, Html("".join(drawn)))

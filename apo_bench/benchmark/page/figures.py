@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from apo_bench.benchmark.confusion import Confusion
 from apo_bench.benchmark.page import gaps as gap
 from apo_bench.benchmark.page.chart import Entry, Panel, entries, legend
 from apo_bench.benchmark.page.curves import difference_panels, looks_of, success_panels
 from apo_bench.benchmark.page.markup import Html, joined, tag
 from apo_bench.benchmark.page.settings import Setting, members
+from apo_bench.benchmark.page.shades import shade_panels
 from apo_bench.benchmark.page.sheet import write_sheet
 from apo_bench.benchmark.page.stacks import stack_panels, stage_entries
 from apo_bench.benchmark.page.times import Times, time_panels
@@ -32,7 +34,11 @@ class Figure(NamedTuple):
 
 
 def figures_of(
-    found: Summary, grouped: Mapping[Setting, Sequence[Cell]], gaps: Sequence[gap.Gap], times: Sequence[Times]
+    found: Summary,
+    grouped: Mapping[Setting, Sequence[Cell]],
+    gaps: Sequence[gap.Gap],
+    confusions: Sequence[Confusion],
+    times: Sequence[Times],
 ) -> dict[str, Figure]:
     """Those that have something to show, by the name of their file."""
     methods = methods_of(found.cells)
@@ -50,11 +56,12 @@ def figures_of(
             gap.gap_panels(members(where, gaps), looks),
             [*gap.SEEN, *entries({m: look for m, look in keen.items() if any(g.place.method == m for g in gaps)})],
         ),
+        "prediction": Figure("Predicted against real failure", shade_panels(confusions), []),
         "timing": Figure("Wall time of a trial", time_panels(times), []),
     }
     pairs = members(where, found.pairs)
     for reference in dict.fromkeys(p.reference for p in found.pairs):
-        shown = {m: look for m, look in looks.items() if m != reference}
+        shown = {m: look for m, look in looks.items() if m not in (reference, "none")}
         panels = difference_panels(pairs, reference, shown)
         title = f"Difference of success to {reference}, same seeds"
         made[f"difference_to_{reference}"] = Figure(title, panels, entries(shown))

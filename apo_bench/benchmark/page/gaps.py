@@ -107,7 +107,7 @@ def _panel(setting: Setting, found: Sequence[Gap], looks: Mapping[str, tuple[int
         beside="gap [mm]",
         low=float(low),
         high=float(high),
-        ticks=[(10.0**k, f"{10.0**k:g}") for k in range(low, high + 1, step)],
+        ticks=[(10.0**k, _power(k)) for k in range(low, high + 1, step)],
         place=_log,
     )
     lines = {m: [_point(g, g.planned, "as planned") for g in found if g.place.method == m] for m in looks}
@@ -135,6 +135,13 @@ def _point(g: Gap, q: Quantiles, what: str) -> Point:
     level = level_words(level_of(g), g.place.noise)
     tip = f"level {level}, {what}: median {q.median:.2g} mm, 95 % below {q.high:.2g} mm, n {g.trials}"
     return Point(level_of(g), q.median, q.low, q.high, tip)
+
+
+def _power(k: int) -> str:
+    """`0.01`, or `10⁻⁴`."""
+    if -2 <= k <= 3:
+        return f"{10.0**k:g}"
+    return "10" + str(k).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _log(mm: float) -> float:

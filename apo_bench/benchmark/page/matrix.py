@@ -9,6 +9,9 @@ from apo_bench.benchmark.page.settings import Setting, at, level_of, level_unit,
 from apo_bench.benchmark.rate_text import interval, percent
 from apo_bench.benchmark.statistics import Cell, Place
 
+MANY = 12
+"""With more settings than this, those of a scenario are folded."""
+
 
 def matrices(grouped: Mapping[Setting, Sequence[Cell]], numbers: Mapping[Place, int]) -> Html:
     """One table per setting.
@@ -17,12 +20,20 @@ def matrices(grouped: Mapping[Setting, Sequence[Cell]], numbers: Mapping[Place, 
         grouped: From `members`.
         numbers: Cell's place -> its number among all cells.
     """
-    made = []
     opened: set[int] = set()
-    for setting, cells in grouped.items():
-        made.append(tag("h3", setting.title()))
-        made.append(_matrix(setting, cells, numbers, opened))
-    return joined(made)
+    made = {s: joined([tag("h3", s.title()), _matrix(s, cells, numbers, opened)]) for s, cells in grouped.items()}
+    return joined(made.values()) if len(made) <= MANY else folded(made)
+
+
+def folded(made: Mapping[Setting, Html]) -> Html:
+    """What there is of each setting, by scenario: one of them unfolded."""
+    by_scenario: dict[str, list[Html]] = {}
+    for setting, piece in made.items():
+        by_scenario.setdefault(setting.scenario, []).append(piece)
+    return joined(
+        tag("details", tag("summary", f"{name}: {len(own)} settings"), *own, **({"open": ""} if i == 0 else {}))
+        for i, (name, own) in enumerate(by_scenario.items())
+    )
 
 
 def _matrix(setting: Setting, cells: Sequence[Cell], numbers: Mapping[Place, int], opened: set[int]) -> Html:
@@ -60,7 +71,9 @@ def _button(cell: Cell, setting: Setting, numbers: Mapping[Place, int], opened: 
     small = [tag("small", interval(cell)), tag("small", f"n {cell.trials}")]
     if cell.not_executed:
         done = cell.executed
-        small.append(tag("small", f"of executed: {percent(done.rate)}, n {done.trials}"))
+        small.append(
+            tag("small", f"executed: {percent(done.rate)}, n {done.trials}" if done.trials else "none executed")
+        )
     return tag(
         "button",
         *(tag("b", percent(cell.rate)), *small),

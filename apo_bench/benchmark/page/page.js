@@ -53,26 +53,26 @@
 
   function line(found, cell, one) {
     const row = made("tr");
+    const again = made("td");
+    again.append(copyButton(one.command));
     const seed = row.appendChild(made("th", one.seed, { scope: "row", className: "number" }));
     const picture = found.pictures[`${cell}:${one.seed}`];
     if (picture !== undefined) {
       seed.append(" ", made("a", "picture", { href: `#picture-${picture}` }));
     }
-    row.append(made("td", one.verdict), made("td", one.why || "–"), made("td", one.sentence, { className: "wide" }));
+    row.append(again, made("td", one.verdict), made("td", one.why || "–"), made("td", one.sentence, { className: "wide" }));
     row.append(made("td", one.predicted || "–"));
     for (const x of one.numbers) row.append(made("td", x === null ? "–" : String(x), { className: "number" }));
-    const box = made("div", null, { className: "command" });
-    box.append(copyButton(one.command), made("code", one.command));
-    row.appendChild(made("td")).append(box);
+    row.appendChild(made("td")).append(made("code", one.command));
     return row;
   }
 
   function head(found) {
     const row = made("tr");
-    const words = ["seed", "verdict", "stage: code", "in words", "predicted"];
+    const words = ["seed", "again", "verdict", "stage: code", "in words", "predicted"];
     for (const text of words) row.append(made("th", text, { scope: "col" }));
     for (const [, label] of found.numbers) row.append(made("th", label, { scope: "col", className: "number" }));
-    row.append(made("th", "the same trial again", { scope: "col" }));
+    row.append(made("th", "command of the same trial", { scope: "col" }));
     const top = made("thead");
     top.append(row);
     return top;
@@ -164,9 +164,14 @@
   });
 
   function linked() {
-    const button = location.hash.startsWith("#cell-") && document.getElementById(location.hash.slice(1));
-    if (button && button.getAttribute("aria-expanded") !== "true") open(button);
+    const target = location.hash.length > 1 && document.getElementById(location.hash.slice(1));
+    if (!target) return;
+    for (let box = target.closest("details"); box; box = box.parentElement.closest("details")) box.open = true;
+    if (target.matches("button.cell") && target.getAttribute("aria-expanded") !== "true") open(target);
   }
   window.addEventListener("hashchange", linked);
+  window.addEventListener("beforeprint", () => {
+    for (const box of document.querySelectorAll("details")) box.open = true;
+  });
   linked();
 })();

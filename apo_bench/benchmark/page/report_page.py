@@ -26,7 +26,6 @@ from apo_bench.benchmark.page.matrix import matrices
 from apo_bench.benchmark.page.pairs import pair_table
 from apo_bench.benchmark.page.ran import ran
 from apo_bench.benchmark.page.settings import Setting, at, setting_of
-from apo_bench.benchmark.page.shades import shades
 from apo_bench.benchmark.paired_table import WORDS as PAIRED
 from apo_bench.benchmark.recognised_table import WORDS as RECOGNISED
 from apo_bench.benchmark.recognised_table import Recognition, recognition_table
@@ -197,9 +196,7 @@ def _pictures(found: Found) -> Html:
         told = f"{where}, seed {one.row['seed']}: {one.row.get('sentence') or ''}. ({one.words})"
         command = replay_command(one.row, found.files)
         button = tag("button", "copy", type="button", class_="copy", data_command=command)
-        image = tag(
-            "img", src=f"data:image/jpeg;base64,{base64.b64encode(one.jpeg).decode()}", alt=told, loading="lazy"
-        )
+        image = tag("img", src=f"data:image/jpeg;base64,{base64.b64encode(one.jpeg).decode()}", alt=told)
         caption = tag("figcaption", title, " ", told, tag("div", button, tag("code", command), class_="command"))
         made.append(tag("figure", image, caption, id=f"picture-{k}"))
     missed = [tag("p", f"Not drawn: {'; '.join(found.no_pictures)}", class_="none")] if found.no_pictures else []
@@ -215,7 +212,10 @@ def _gaps(found: Found) -> Html:
 
 
 def _prediction(found: Found) -> Html:
-    return joined([prose(CONFUSION), shades(found.confusions), confusion_table(found.confusions).html()])
+    figure = found.figures.get("prediction")
+    none = tag("p", "No trial was executed, so nothing was predicted.", class_="none")
+    drawn = none if figure is None else figure.html()
+    return joined([prose(CONFUSION), drawn, confusion_table(found.confusions).html()])
 
 
 def _calibration(found: Found) -> Html:
@@ -234,13 +234,18 @@ def _timing(found: Found) -> Html:
         return tag("p", "There is no timing.jsonl beside the rows, so times are not known.", class_="none")
     known, done = times.times(found.timing), times.work(found.timing)
     rate = sum(w.rows_per_minute for w in done)
+    crew = f"{_many(len(done), 'worker')} on {_many(len({w.host for w in done}), 'host')}"
     words = (
-        f"{len(found.timing):,} trials timed, {len(done)} workers on {len({w.host for w in done})} hosts, each counted "
-        f"over the time in which it was busy: {rate:.1f} rows per minute together. Times of a trial are without "
-        "compilation and demonstration; lines reach from the 5th to the 95th percentile, dots are medians."
+        f"{len(found.timing):,} trials timed, {crew}, each counted over the time in which it was busy: {rate:.1f} rows "
+        "per minute together. Times of a trial are without compilation and demonstration; lines reach from the 5th to "
+        "the 95th percentile, dots are medians."
     )
     figure = found.figures["timing"].html() if "timing" in found.figures else ""
     return joined([prose(words), figure, times.time_table(known).html(), times.work_table(done).html()])
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"
 
 
 def _ran(found: Found) -> Html:

@@ -6,19 +6,14 @@ from collections.abc import Sequence
 
 from apo_bench.benchmark.confusion import ALL, Confusion
 from apo_bench.benchmark.page.chart import Panel
-from apo_bench.benchmark.page.markup import Html, tag
+from apo_bench.benchmark.page.markup import Html
 
 SIDE, TOP, LEFT = 74, 34, 108
 """Of a square; where the first begins, px."""
 
 
-def shades(found: Sequence[Confusion]) -> Html:
-    """A panel per method over all scenarios, and one of all."""
-    return tag("div", *(one.figure() for one in shade_panels(found)), class_="panels")
-
-
 def shade_panels(found: Sequence[Confusion]) -> list[Panel]:
-    """Methods of which something was predicted."""
+    """A panel per method of which something was predicted, over all scenarios, and one of all methods."""
     groups: dict[str, list[Confusion]] = {}
     for one in found:
         groups.setdefault("all methods" if one.method == ALL else one.method, []).append(one)

@@ -105,7 +105,7 @@ def write_times(found: Sequence[Times], path: Path) -> None:
 
 def time_panels(found: Sequence[Times]) -> list[Panel]:
     """A panel per scenario, with one axis for all."""
-    most = max((t.high for t in found), default=0.0) or 1.0
+    most = _round(max((t.high for t in found), default=0.0))
     by_scenario: dict[str, list[Times]] = {}
     for t in found:
         by_scenario.setdefault(t.scenario, []).append(t)
@@ -128,11 +128,17 @@ def _panel(scenario: str, own: Sequence[Times], most: float) -> Panel:
         y += STEP
     for share in (0.0, 0.5, 1.0):
         at = f'x="{LEFT + (WIDTH - LEFT - RIGHT) * share:.1f}" y="{y + 8}" text-anchor="middle"'
-        said.append(f'<text class="soft" {at}>{most * share:.2g}</text>')
+        said.append(f'<text class="soft" {at}>{most * share:g}</text>')
     middle = (LEFT + WIDTH - RIGHT) / 2
     said.append(f'<text class="soft" x="{middle}" y="{y + 22}" text-anchor="middle">wall time of a trial [s]</text>')
     low, high = min(t.trials for t in own), max(t.trials for t in own)
     return Panel(f"{scenario}; n {low if low == high else f'{low} to {high}'}", Html("".join(said)), y + 28)
+
+
+def _round(x: float) -> float:
+    """The next larger of 0.1, 0.2, 0.4, 1, 2, 4, 10, .."""
+    size = next(10.0**k for k in range(-1, 12) if 10.0**k * 10 > x)
+    return next(size * step for step in (1, 2, 4, 10) if size * step >= x)
 
 
 def _times(scenario: str, method: str, seconds: Sequence[float]) -> Times:
