@@ -84,6 +84,12 @@ def weights(levels: Array) -> Array:
     return np.asarray((np.r_[widths, 0.0] + np.r_[0.0, widths]) / (2.0 * widths.sum()))
 
 
+def reach(apart: Array, levels: Array) -> Array:
+    """(...) how far apart the two areas of a seed that was not seen may be: as far as any that was, (..., n), and at
+    least as far as one level makes. Bounds of -1 and 1 would be true too, but cover in 99 of 100."""
+    return np.asarray(np.maximum(np.abs(apart).max(axis=-1), weights(levels).max()))
+
+
 def _areas_by_seed(curve: Curve, levels: Array) -> Array:
     """(n,) NaN for a seed without a result somewhere; rounded, so that sums in another order are the same number."""
     return np.asarray(np.round(curve.at(levels) @ weights(levels), 12))
@@ -102,7 +108,8 @@ def _difference(ours: Curve, theirs: Curve, reference: str) -> AreaDifference:
     a, b = (dict(zip(c.seeds, _areas_by_seed(c, levels).tolist(), strict=True)) for c in (ours, theirs))
     apart = np.round([a[seed] - b[seed] for seed in sorted(set(a) & set(b))], 12)
     apart = apart[~np.isnan(apart)]
-    between = mean_interval(apart, -1.0, 1.0)
+    most = float(reach(apart, levels)) if len(apart) else 1.0
+    between = mean_interval(apart, -most, most)
     return AreaDifference(ours.setting, reference, tuple(levels.tolist()), len(apart), _mean(apart), between)
 
 

@@ -25,7 +25,9 @@ def threshold(seeds: int) -> float:
     return float(fdtri(1, seeds - 1, CONFIDENCE)) if seeds > 1 else float("inf")
 
 
-def surprise(values: Array, counts: Array, mean: Array | float, low: float = 0.0, high: float = 1.0) -> Array:
+def surprise(
+    values: Array, counts: Array, mean: Array | float, low: Array | float = 0.0, high: Array | float = 1.0
+) -> Array:
     """Twice the log likelihood ratio of a mean.
 
     The likeliest weights are n_i / (n (1 + a (x_i - mean))); what they leave over lies on a bound. Twice the log ratio
@@ -34,7 +36,7 @@ def surprise(values: Array, counts: Array, mean: Array | float, low: float = 0.0
     Args:
         values: (..., k) from `low` to `high`.
         counts: (..., k) how many seeds had each value.
-        mean: (...), strictly between `low` and `high`.
+        mean: (...), strictly between `low` and `high`, which are (...) too, or numbers.
 
     Returns:
         (...), 0 where the mean is that of the sample.

@@ -1,0 +1,114 @@
+"""Success that falls with the logarithm of the level, fitted by likelihood: a curve below a ceiling, lopsided or not.
+
+Success at level L is c g(b (log h - log L) + s): h is the level at which it is one half, b the steepness, c the ceiling
+(a share 1 - c fails whatever the level: lapses; F. A. Wichmann and N. J. Hill, The psychometric function I, Perception
+and Psychophysics 63, 2001, 1293-1313), and s is such that one half is at h. The shape g is a logistic function to a
+power, or one minus its mirror image to a power: from curves that leave the ceiling early to such that reach the floor
+early. The likelihood is looked up on a grid of (h, b, c, g), so data that fall from all to nothing between two levels,
+whose steepness has no largest likelihood, are no special case.
+
+Levels of a seed share its luck, which a likelihood of independent trials does not know. Twice its log ratio is divided
+by how much more the score of h varies from seed to seed than the likelihood says (J. N. K. Rao and A. J. Scott, Annals
+of Statistics 12, 1984, 46-60; here never by less than 1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+
+STEEPNESS = np.geomspace(0.4, 40.0, 18)
+"""Per unit of the natural logarithm: from hardly falling to a step."""
+CEILINGS = np.array([1.0, 0.98, 0.95, 0.9, 0.82, 0.7, 0.6])
+POWERS = np.array([-12.0, -3.0, 1.0, 3.0, 12.0])
+"""Of the shape; those of the mirror image are negative."""
+OTHERS = tuple(x.ravel() for x in np.meshgrid(STEEPNESS, CEILINGS, POWERS, indexing="ij"))
+"""(m,) steepness, ceiling and power of every curve that has a half level."""
+PER_UNIT = 40
+"""Half levels per unit of the logarithm, between the smallest and the largest level."""
+OUTSIDE = np.array([0.05, 0.2, 0.5, 1.0, 2.0, 4.0])
+"""How far beyond them others lie: enough to know that the likeliest is there."""
+LEAST, STEP = 1e-9, 1e-4
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """How surprising every half level is."""
+
+    log_half: Array
+    """(m,) rising logarithms of half levels."""
+    surprise: Array
+    """(..., m) twice the log likelihood ratio to the likeliest, the luck of seeds allowed for."""
+
+
+def profile(log_levels: Array, success: Array) -> Profile:
+    """The profile of the half level.
+
+    Args:
+        log_levels: (k,) rising.
+        success: (..., n, k) of n seeds: 1, 0, or NaN where there is no result.
+    """
+    known = ~np.isnan(success)
+    right = np.where(known, success, 0.0)
+    k, wrong = right.sum(axis=-2), (known - right).sum(axis=-2)
+    log_half, log_p, log_q = _table(tuple(log_levels.tolist()))
+    likelihood = (k @ log_p + wrong @ log_q).reshape(*k.shape[:-1], len(log_half), len(OTHERS[0]))
+    best, which = likelihood.max(axis=-1), likelihood.argmax(axis=-1)
+    at = best.argmax(axis=-1)[..., None]
+    likeliest = np.take_along_axis(which, at, axis=-1)
+    more = variation(log_levels, right, known, log_half[at], tuple(x[likeliest] for x in OTHERS))
+    return Profile(log_half, 2.0 * (best.max(axis=-1, keepdims=True) - best) / more[..., None])
+
+
+def curve(log_levels: Array, log_half: Array, steepness: Array, ceiling: Array, power: Array) -> Array:
+    """Success at levels; everything is broadcast together."""
+    from scipy.special import expit, logit
+
+    half = 0.5 / ceiling
+    mirrored, n = power < 0, np.abs(power)
+    shift = np.where(mirrored, -logit((1.0 - half) ** (1.0 / n)), logit(half ** (1.0 / n)))
+    x = steepness * (log_half - log_levels) + shift
+    return np.asarray(ceiling * np.where(mirrored, 1.0 - expit(-x) ** n, expit(x) ** n))
+
+
+def variation(log_levels: Array, right: Array, known: Array, log_half: Array, others: tuple[Array, ...]) -> Array:
+    """(...) how much more the score of the half level varies between seeds than if trials were independent.
+
+    Args:
+        right, known: (..., n, k).
+        log_half: (..., 1) of the likeliest curve, and `others` (..., 1) its steepness, ceiling and power.
+    """
+    steepness, ceiling, power = others
+
+    def at(half: float, steeper: float) -> Array:
+        return curve(log_levels, log_half + half, steepness * (1.0 + steeper), ceiling, power)
+
+    p = np.clip(at(0.0, 0.0), LEAST, 1.0 - LEAST)
+    by_half, by_steepness = (at(STEP, 0.0) - at(-STEP, 0.0), at(0.0, STEP) - at(0.0, -STEP))
+    by_half, by_steepness = by_half / (2 * STEP), by_steepness / (2 * STEP)
+    weight = known.sum(axis=-2) / (p * (1.0 - p))
+    hh, hs, ss = (
+        (weight * x).sum(axis=-1, keepdims=True) for x in (by_half**2, by_half * by_steepness, by_steepness**2)
+    )
+    free = np.where(ss > LEAST, hs / np.maximum(ss, LEAST), 0.0)
+    direction = (by_half - free * by_steepness) / (p * (1.0 - p))
+    scores = (np.where(known, right - p[..., None, :], 0.0) * direction[..., None, :]).sum(axis=-1)
+    expected, seen = (hh - free * hs)[..., 0], (scores**2).sum(axis=-1)
+    return np.asarray(np.maximum(1.0, np.where(expected > LEAST, seen / np.maximum(expected, LEAST), 1.0)))
+
+
+@lru_cache(maxsize=8)
+def _table(log_levels: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    """The half levels (m,), and (k, m * others) the logarithms of success and failure of every curve."""
+    x = np.array(log_levels)
+    inside = np.linspace(x[0], x[-1], 2 + int(PER_UNIT * (x[-1] - x[0])))
+    h = np.unique(np.r_[x[0] - OUTSIDE, inside, x[-1] + OUTSIDE])
+    p = curve(x[:, None, None], h[:, None], *OTHERS)
+    p = np.clip(p, LEAST, 1.0 - LEAST).reshape(len(x), -1)
+    return h, np.log(p), np.log1p(-p)
