@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,7 @@ Folder = Annotated[Path, typer.Argument(help="The folder that `sweep --out` wrot
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
     app.command()(report)
+    app.command()(compare)
 
 
 def report(
@@ -31,3 +33,27 @@ def report(
     made = write_report(folder, pictures)
     print_cells(made.cells)
     print_report(made)
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="The folder of a sweep.")],
+    second: Annotated[Path, typer.Argument(help="Another one, of the same seeds.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the page and its tables; default: comparison.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Compare two sweeps trial by trial: two versions, machines or fidelities; write compare.html."""
+    from apo_bench.benchmark.compare import compare as compared
+    from apo_bench.benchmark.compare_text import comparison_form
+    from apo_bench.benchmark.page.compare_page import write_comparison
+    from apo_bench.benchmark.terminal import print_comparison
+
+    found = compared(first, second)
+    if out is None and not as_json:
+        out = Path("comparison")
+    made = None if out is None else write_comparison(found, out)
+    if as_json:
+        typer.echo(json.dumps(comparison_form(found), allow_nan=False))
+    else:
+        print_comparison(found)
+        if made is not None:
+            typer.echo(f"Page: {made.page}")

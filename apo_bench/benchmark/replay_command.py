@@ -10,6 +10,8 @@ from typing import Any
 from apo_bench.benchmark.spec import RANGE, USUAL
 from apo_bench.errors import InputError
 
+USUALLY = {"grasp": "friction", "arm": "six_axis", "timestep_s": 0.001}
+"""What a row that does not say means."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
@@ -21,8 +23,9 @@ def replay_command(row: Mapping[str, Any], files: Files | None = None) -> str:
 
 def without_seed(row: Mapping[str, Any], files: Files | None = None) -> str:
     """The same without the seed: what the trials of a cell have in common."""
-    given = (files or {}).get(row["scenario"], row["scenario"])
-    return shlex.join(["apo-bench", "replay", str(given), *_options(row, str(given))])
+    given = str((files or {}).get(row["scenario"], row["scenario"]))
+    usual = {"eye": RANGE if row["noise"] == RANGE else "noise", "fidelity": "full", **USUALLY}
+    return shlex.join(["apo-bench", "replay", given, *_options({**usual, **row}, given)])
 
 
 def _options(row: Mapping[str, Any], given: str) -> list[str]:

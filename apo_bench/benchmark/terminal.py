@@ -18,7 +18,11 @@ from apo_bench.benchmark.statistics import Cell
 from apo_bench.scenario import Scenario
 
 if TYPE_CHECKING:
+    from apo_bench.benchmark.compare import Comparison
     from apo_bench.benchmark.report import Report
+
+MOST_NAMES = 8
+"""Settings that differ, named on the terminal."""
 
 
 def print_scenarios(scenarios: Sequence[Scenario]) -> None:
@@ -71,6 +75,23 @@ def print_report(made: Report) -> None:
     pictures = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
     say(f"Figures: {' '.join(map(str, (*pictures, *made.figures)))}")
     say(f"Report:  {made.page}")
+
+
+def print_comparison(found: Comparison) -> None:
+    """How far two sweeps agree, and what is not the same in them."""
+    from apo_bench.benchmark.compare_text import agreement_table, in_words
+
+    table = Table(box=None, pad_edge=False)
+    said = agreement_table(found)
+    for i, name in enumerate(said.head):
+        table.add_column(name, justify="left" if i < said.words else "right")
+    for row in said.rows:
+        table.add_row(*("–" if x is None else str(x) for x in row))
+    _console().print(in_words(found))
+    _console().print(table)
+    names = [d.what for d in found.differences]
+    more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
+    _console().print(f"Not the same: {', '.join(names[:MOST_NAMES])}{more}" if names else "Made with the same.")
 
 
 def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:

@@ -12,7 +12,6 @@ from apo_bench.benchmark.page.markup import Html
 from apo_bench.benchmark.page.settings import at
 from apo_bench.benchmark.replay_command import Files, without_seed
 from apo_bench.benchmark.slim import NUMBERS
-from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Cell, by_place
 
 FAILED, RIGHT, LOOSE, EXCLUDED = "failed", "right", "loosely right", "excluded"
@@ -57,7 +56,7 @@ def behind(
             columns["predicted"].append(words["predicted"].number(foretold(row.get("predicted"))))
             asked = _asked(row)
             if asked not in commands:
-                commands[asked] = words["command"].number(without_seed(_whole(row), files))
+                commands[asked] = words["command"].number(without_seed(row, files))
             columns["command"].append(commands[asked])
             for name in NUMBERS:
                 columns[name].append(rounded(row.get(name)))
@@ -107,12 +106,6 @@ def rounded(x: Any) -> float | int | None:
         return x
     near = float(f"{x:.{DIGITS}g}")
     return int(near) if near == int(near) else near
-
-
-def _whole(row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """With the columns of which nothing was said, as they were."""
-    usual = {"eye": RANGE if row["noise"] == RANGE else "noise", "arm": "six_axis", "timestep_s": 0.001}
-    return {**usual, "fidelity": "full", "grasp": "friction", **row}
 
 
 def _asked(row: Mapping[str, Any]) -> tuple[Any, ...]:
