@@ -121,7 +121,15 @@ def _carry_out(
 
 
 def _until_rest(robot: Robot) -> None:
-    """The arm stands by until nothing moves at two looks in a row, with bounded patience; then the judge looks."""
+    """The arm stands by until nothing moves at two looks in a row, with bounded patience; then the judge looks.
+
+    Meanwhile nothing sleeps: a stick in its slot that is put to sleep and wakes in turn would rock on.
+    """
+    with sleeping(robot.scene.work, False):
+        _stand_by(robot)
+
+
+def _stand_by(robot: Robot) -> None:
     parts = np.array([np.arange(v, v + 6) for v in robot.scene.work.dof.values()])
     quiet = 0
     for _ in range(round(PATIENCE_S / LOOK_S)):
