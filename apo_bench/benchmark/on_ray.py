@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 import multiprocessing
 import os
+import pickle
 import re
 import socket
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,10 @@ from apo_bench.benchmark.parcel import parcel, wanted
 from apo_bench.benchmark.ray_driver import GRACE_S, Job, drive
 from apo_bench.benchmark.stopping import Check, never
 from apo_bench.benchmark.terms import Terms
-from apo_bench.benchmark.worker import Emit
+from apo_bench.benchmark.worker import Emit, lost, timing
 from apo_bench.errors import InputError
+
+Take = Callable[[tuple[Any, ...]], bool]
 
 TURN_S = 0.2
 JOINING_S = 30.0
@@ -28,6 +32,9 @@ JOINING_S = 30.0
 STARTING_S = 120.0
 """What a cluster on this machine gets to start."""
 TOUCH_S = 5.0
+"""What its port gets to open."""
+NO_TOKEN = "InvalidAuthToken"
+"""In what Ray writes when a cluster wants a token."""
 
 
 def check_ray(address: str | None) -> None:
@@ -39,8 +46,8 @@ def check_ray(address: str | None) -> None:
     """
     if importlib.util.find_spec("ray") is None:
         raise InputError("the backend 'ray' needs a package that is not installed; pip install 'apo_bench[ray]'.")
-    named = os.environ.get("RAY_ADDRESS", "") if address in (None, "auto") else address or ""
-    if named in ("", "auto", "local"):
+    named = (os.environ.get("RAY_ADDRESS") or "auto") if address in (None, "auto") else str(address)
+    if named in ("auto", "local"):
         return
     found = re.fullmatch(r"\[?([^\[\]/]+)\]?:(\d{1,5})", named)
     if found is None or not 0 < int(found[2]) < 2**16:
@@ -83,7 +90,30 @@ def spread(
         return
     check_ray(address)
     asked = wanted(work)
-    job = Job(tuple(work), terms, asked, parcel(asked), address, workers, limit_s)
+    job = Job(tuple(work), pickle.dumps((terms, asked)), parcel(asked), address, workers, limit_s)
+
+    def take(news: tuple[Any, ...]) -> bool:
+        """Emit what is a row, or what stands for one; False for anything else."""
+        kind, *said = news
+        if kind == "row":
+            emit(*said)
+        elif kind == "lost":
+            spec, code, number, seconds, place = said
+            row = lost(spec, terms.content[spec.scenario], code)
+            emit(row, timing(row, number, None, None, seconds) | place)
+        return kind in ("row", "lost")
+
+    try:
+        _drive(job, take, check)
+    except _TokenWanted:
+        _drive(replace(job, token=True), take, check)
+
+
+class _TokenWanted(Exception):
+    """The cluster does not let anybody in."""
+
+
+def _drive(job: Job, take: Take, check: Check) -> None:
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     with tempfile.TemporaryDirectory() as folder:
@@ -92,9 +122,10 @@ def spread(
         process.start()
         there.close()
         try:
-            _listen(here, process, job, emit, check, log)
+            _wait(here, process, job, check, log)
+            _listen(here, take, check, log)
         except KeyboardInterrupt:
-            _end_cleanly(here, emit)
+            _end_cleanly(here, take)
             raise
         finally:
             here.close()
@@ -103,60 +134,70 @@ def spread(
             process.join()
 
 
-def _listen(pipe: Any, process: Any, job: Job, emit: Emit, check: Check, log: Path) -> None:
-    """Take rows until the last word."""
-    limit_s = JOINING_S if job.address not in (None, "local") or "RAY_ADDRESS" in os.environ else STARTING_S
+def _wait(pipe: Any, process: Any, job: Job, check: Check, log: Path) -> None:
+    """Until the process has something to say: that it has joined the cluster, or why it cannot."""
+    named = job.address or os.environ.get("RAY_ADDRESS")
+    limit_s = STARTING_S if named in (None, "local") else JOINING_S
     deadline = time.monotonic() + limit_s
+    while not pipe.poll(TURN_S):
+        check()
+        if NO_TOKEN in _text(log):
+            process.kill()
+            if job.token or "RAY_AUTH_MODE" in os.environ:
+                raise InputError(
+                    "the Ray cluster wants another token; have the ~/.ray/auth_token of its head here, and "
+                    "RAY_AUTH_MODE=token or unset."
+                )
+            raise _TokenWanted
+        if time.monotonic() > deadline:
+            process.kill()
+            raise InputError(
+                f"no Ray cluster answered at {named or 'this machine'} within {limit_s:g} s; look there with: ray "
+                "status, or give --address local for one of your own."
+            )
+
+
+def _listen(pipe: Any, take: Take, check: Check, log: Path) -> None:
+    """Take rows until the last word."""
     while True:
         check()
         if not pipe.poll(TURN_S):
-            if time.monotonic() > deadline:
-                process.kill()
-                raise InputError(_no_answer(job.address, limit_s))
             continue
         try:
-            kind, *said = pipe.recv()
+            news = pipe.recv()
         except (EOFError, OSError) as error:
             raise RuntimeError(
                 f"the Ray cluster was lost{_last_line(log)}; finished rows are kept, and the same command continues."
             ) from error
-        deadline = float("inf")
-        if kind == "row":
-            emit(*said)
-        elif kind == "done":
-            return
-        elif kind == "refused":
-            raise InputError(said[0])
-        elif kind == "failed":
-            raise RuntimeError(said[0])
+        if take(news) or news[0] == "connected":
+            continue
+        if news[0] == "refused":
+            raise InputError(news[1])
+        if news[0] == "failed":
+            raise RuntimeError(news[1])
+        return
 
 
-def _end_cleanly(pipe: Any, emit: Emit) -> None:
+def _end_cleanly(pipe: Any, take: Take) -> None:
     """After a stop: no new trials, and the rows of those that end in time."""
     with suppress(EOFError, OSError):
         pipe.send("stop")
         deadline = time.monotonic() + 2 * GRACE_S
         while time.monotonic() < deadline:
             if pipe.poll(TURN_S):
-                kind, *said = pipe.recv()
-                if kind == "row":
-                    emit(*said)
-                elif kind != "connected":
+                news = pipe.recv()
+                if not take(news) and news[0] != "connected":
                     return
-
-
-def _no_answer(address: str | None, limit_s: float) -> str:
-    at = address or os.environ.get("RAY_ADDRESS") or "this machine"
-    return (
-        f"no Ray cluster answered at {at} within {limit_s:g} s; look there with: ray status, "
-        "or give --address local for one of your own."
-    )
 
 
 def _last_line(log: Path) -> str:
     """What Ray said last, if anything."""
+    lines = [line.strip() for line in _text(log).splitlines() if line.strip()]
+    return f" ({lines[-1][:200]})" if lines else ""
+
+
+def _text(log: Path) -> str:
     try:
-        lines = [line.strip() for line in log.read_text(errors="replace").splitlines() if line.strip()]
+        return log.read_text(errors="replace")
     except OSError:
         return ""
-    return f" ({lines[-1][:200]})" if lines else ""

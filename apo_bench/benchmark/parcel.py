@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import site
 import sys
@@ -106,8 +107,8 @@ def parcel(asked: Wanted) -> dict[str, Path]:
     own = [Path(path) for path in _installed()]
     found = {}
     for path in files:
-        whole = here / path
-        if whole.is_relative_to(here) and ".." not in whole.parts and not any(map(whole.is_relative_to, own)):
+        whole = Path(os.path.normpath(here / path))
+        if whole.is_relative_to(here) and not any(map(whole.is_relative_to, own)):
             found[whole.relative_to(here).as_posix()] = whole
     return dict(sorted(found.items()))
 

@@ -12,13 +12,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
 
-from apo_bench.benchmark.crew_member import STARTING_S
 from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.spec import TrialSpec
-from apo_bench.benchmark.terms import Terms
-from apo_bench.benchmark.worker import Emit, lost, timing
 from apo_bench.errors import InputError
 
+Tell = Callable[[tuple[Any, ...]], None]
+"""Takes ("row", row, timing), or ("lost", spec, code, number, seconds, place) of a trial that will have no row."""
+STARTING_S = 300.0
+"""What a worker gets to compile a scene."""
 TURN_S = 0.2
 LOOK_S = 5.0
 """How often the cluster is asked for its size."""
@@ -59,7 +60,7 @@ class Crew:
     """Gives units to workers, one worker per CPU; to be asked for a turn as long as it is busy."""
 
     def __init__(
-        self, work: Sequence[Unit], terms: Terms, make: Callable[[int], Any], size: Callable[[], int], limit_s: float
+        self, work: Sequence[Unit], make: Callable[[int], Any], size: Callable[[], int], limit_s: float
     ) -> None:
         """Args:
         make: Makes the actor of a number.
@@ -67,7 +68,7 @@ class Crew:
         """
         self.posts: list[Post] = []
         self._waiting = deque(list(unit.trials) for unit in work)
-        self._terms, self._make, self._ask_size, self._limit_s = terms, make, size, limit_s
+        self._make, self._ask_size, self._limit_s = make, size, limit_s
         self._size, self._looked = size(), time.monotonic()
         self._deaths: Counter[TrialSpec] = Counter()
         self._made = self._false_starts = 0
@@ -78,7 +79,7 @@ class Crew:
         """Whether there are trials without a row."""
         return bool(self._waiting or any(post.unit for post in self.posts))
 
-    def turn(self, emit: Emit) -> None:
+    def turn(self, tell: Tell) -> None:
         """Hear what there is to hear, and act on it.
 
         Raises:
@@ -94,9 +95,9 @@ class Crew:
         self._tick()
         for post in list(self.posts):
             if post.call in answered:
-                self._hear(post, emit)
+                self._hear(post, tell)
             elif self._overdue(post) and _alive(post):
-                self._drop(post, "time_limit", emit)
+                self._drop(post, "time_limit", tell)
 
     def stop(self) -> None:
         """Begin no other trial."""
@@ -134,40 +135,42 @@ class Crew:
             self.posts.append(Post(self._made, actor, actor.where.remote()))
             self._made += 1
 
-    def _hear(self, post: Post, emit: Emit) -> None:
+    def _hear(self, post: Post, tell: Tell) -> None:
         import ray
         from ray.exceptions import ActorUnavailableError, ObjectLostError, RayActorError, RayTaskError
 
         try:
             answer = ray.get(post.call)
         except (ActorUnavailableError, ObjectLostError):
-            self._ask_again(post, emit)
+            self._ask_again(post, tell)
             return
         except RayActorError as error:
             own = _alive(post) and not error.preempted
-            self._drop(post, "worker_died" if own else None, emit, str(error))
+            self._drop(post, "worker_died" if own else None, tell, str(error))
             return
         except RayTaskError as error:
             raise RuntimeError(f"a worker on '{post.host}' could not answer:\n{error}") from error
         post.away = None
         if post.node is None:
-            post.node, post.host = answer
+            post.node, post.host, refusal = answer
+            if refusal is not None:
+                raise InputError(refusal)
             self._next(post)
         else:
             post.heard += len(answer)
             for news in answer:
-                self._take(post, news, emit)
+                self._take(post, news, tell)
         if post in self.posts:
             post.call = post.actor.news.remote(post.heard, WAIT_S)
 
-    def _take(self, post: Post, news: tuple[Any, ...], emit: Emit) -> None:
+    def _take(self, post: Post, news: tuple[Any, ...], tell: Tell) -> None:
         kind, *said = news
         if kind == "began":
             post.since, self._false_starts = self._clock, 0
         elif kind == "row":
             del post.unit[0]
             post.since, post.ready = None, self._clock
-            emit(*said)
+            tell(news)
         elif kind == "done":
             post.unit.clear()
             self._next(post)
@@ -184,17 +187,17 @@ class Crew:
         post.unit, post.ready = self._waiting.popleft(), self._clock
         post.actor.take.remote(Unit(tuple(post.unit)))
 
-    def _ask_again(self, post: Post, emit: Emit) -> None:
+    def _ask_again(self, post: Post, tell: Tell) -> None:
         """It is out of reach: perhaps its node was lost, perhaps only a word."""
         now = time.monotonic()
         post.away = post.away or now
         if now - post.away > AWAY_S:
-            self._drop(post, None, emit)
+            self._drop(post, None, tell)
             return
         time.sleep(TURN_S)
         post.call = post.actor.where.remote() if post.node is None else post.actor.news.remote(post.heard, WAIT_S)
 
-    def _drop(self, post: Post, code: str | None, emit: Emit, why: str = "") -> None:
+    def _drop(self, post: Post, code: str | None, tell: Tell, why: str = "") -> None:
         """A worker is gone, or has to go; its trial under way is lost if that was the trial's own doing."""
         self._discharge(post)
         rest, since = post.unit, post.since
@@ -203,16 +206,16 @@ class Crew:
         elif since is not None and code == "worker_died":
             self._deaths[rest[0]] += 1
         if since is not None and (code == "time_limit" or self._deaths[rest[0]] >= DEATHS):
-            spec = rest.pop(0)
-            row = lost(spec, self._terms.content[spec.scenario], code or "worker_died")
-            where = {"host": post.host, "node": post.node}
-            emit(row, timing(row, post.number, None, None, self._clock - since) | where)
+            place = {"host": post.host, "node": post.node}
+            tell(("lost", rest.pop(0), code, post.number, self._clock - since, place))
         if rest:
             self._waiting.appendleft(rest)
 
     def _count_false_start(self, why: str) -> None:
         self._false_starts += 1
         if self._false_starts >= FALSE_STARTS:
+            if "all references to the actor were removed" in why:
+                why = "the cluster was started without a token and this machine has one; set RAY_AUTH_MODE=disabled"
             why = " ".join(why.split()) or f"no trial began within {STARTING_S:g} s"
             raise RuntimeError(f"workers on the Ray cluster end before they have begun a trial: {why}")
 

@@ -7,31 +7,26 @@ it has a process of its own. What is worth saying goes through a pipe to the swe
 from __future__ import annotations
 
 import os
-import pickle
 import shutil
 import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, final
 
-from apo_bench.benchmark.crew_member import THREADS
 from apo_bench.benchmark.grid import Unit
-from apo_bench.benchmark.parcel import Wanted
 from apo_bench.benchmark.ray_crew import Crew
 from apo_bench.benchmark.stopping import SIGNALS
-from apo_bench.benchmark.terms import Terms
 from apo_bench.errors import InputError
 
 GRACE_S = 5.0
 """After a stop: what trials under way get to end."""
-ANSWER_S = 120.0
-"""What a node gets to start a process and to import the package."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 OBJECT_STORE = 100 * 2**20
 """Bytes, of a cluster that is started here; rows are small."""
 SETTINGS = {
@@ -48,23 +43,27 @@ class Job:
     """What the sweep wants of the cluster."""
 
     work: Sequence[Unit]
-    terms: Terms
-    wanted: Wanted
+    packed: bytes
+    """The pickled `Terms` and `Wanted`, for the workers."""
     files: Mapping[str, Path]
     """From `parcel`."""
     address: str | None
     workers: int | None
     """At most so many; None for as many as the cluster has CPUs."""
     limit_s: float
+    token: bool = False
+    """Show the token of this machine's user, as Ray does by itself only where no address is named."""
 
 
 def drive(pipe: Any, job: Job, log: str) -> None:
-    """The life of the process: connect, have the nodes checked, spread the work, say one last word.
+    """The life of the process: connect, spread the work, say one last word.
 
-    Sends ("connected",), ("row", row, timing), and last ("done",), ("refused", sentence) or ("failed", text); ends
-    early when it is sent anything, or when the sweep is gone.
+    Sends ("connected",), what a `Crew` tells, and last ("done",), ("refused", sentence) or ("failed", text); ends early
+    when it is sent anything, or when the sweep is gone.
     """
     _live_apart(log)
+    if job.token:
+        os.environ["RAY_AUTH_MODE"] = "token"
     with suppress(EOFError, OSError):
         pipe.send(_last_word(pipe, job))
 
@@ -96,7 +95,6 @@ def _last_word(pipe: Any, job: Job) -> tuple[str, ...]:
     try:
         _connect(job)
         pipe.send(("connected",))
-        _check_nodes(job)
         _work(pipe, job)
     except InputError as error:
         return ("refused", str(error))
@@ -111,6 +109,7 @@ def _last_word(pipe: Any, job: Job) -> tuple[str, ...]:
 def _connect(job: Job) -> None:
     """Join the cluster that was named, or the one that runs here, or start one for the time of the sweep."""
     import ray
+    from ray.exceptions import RayError
 
     with tempfile.TemporaryDirectory() as folder:
         runtime: dict[str, Any] = {"env_vars": dict.fromkeys(THREADS, "1")}
@@ -126,84 +125,67 @@ def _connect(job: Job) -> None:
             if job.address != "local":
                 ray.init(address=job.address or "auto", **quiet)
                 return
-        except (ConnectionError, ValueError, RuntimeError) as error:
+        except (ConnectionError, ValueError, RuntimeError, RayError) as error:
             if job.address is not None or not isinstance(error, ConnectionError):
                 raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
         cpus = max(job.workers or 1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
         ray.init(address="local", num_cpus=cpus, include_dashboard=False, object_store_memory=OBJECT_STORE, **quiet)
 
 
-def _check_nodes(job: Job) -> None:
-    """Every node that may get work must have the same code, packages and files."""
-    import ray
-    from ray.exceptions import GetTimeoutError, RayError
-    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
-
-    packed = pickle.dumps((job.terms, job.wanted))
-    task = ray.remote(num_cpus=0, max_retries=0)(_question())
-    asked = [
-        (
-            node,
-            task.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)).remote(packed),
-        )
-        for node in ray.nodes()
-        if node["Alive"] and node["Resources"].get("CPU", 0.0) >= 1.0
-    ]
-    for node, answer in asked:
-        host = node["NodeManagerHostname"]
-        try:
-            refusal = ray.get(answer, timeout=ANSWER_S)
-        except GetTimeoutError as error:
-            raise InputError(
-                f"the node '{host}' of the Ray cluster did not answer within {ANSWER_S:g} s; mend it or take it out."
-            ) from error
-        except RayError as error:
-            if not any(other["Alive"] and other["NodeID"] == node["NodeID"] for other in ray.nodes()):
-                continue
-            said = " ".join(str(error).split())
-            raise InputError(f"the node '{host}' of the Ray cluster cannot work: {said[:500]}") from error
-        if refusal is not None:
-            raise InputError(refusal)
-
-
-def _question() -> Callable[[bytes], str | None]:
-    """A function that travels as a whole, to nodes that may have no such package."""
-
-    def question(packed: bytes) -> str | None:
-        try:
-            from apo_bench.benchmark.ray_hand import refusal
-        except ImportError as error:
-            import platform
-            import sys
-
-            return (
-                f"the node '{platform.node()}' cannot import this version of apo_bench ({error}); "
-                f"install it for {sys.executable}, which Ray runs there."
-            )
-        return refusal(packed)
-
-    return question
-
-
 def _work(pipe: Any, job: Job) -> None:
     import ray
 
-    from apo_bench.benchmark.ray_hand import Hand
-
-    kind = ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0, max_concurrency=4)(Hand)
-    crew = Crew(job.work, job.terms, lambda number: kind.remote(number, job.terms), lambda: _size(job), job.limit_s)
-
-    def emit(row: dict[str, Any], timing: dict[str, Any]) -> None:
-        pipe.send(("row", row, timing))
-
+    kind = ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0, max_concurrency=4)(_hand())
+    crew = Crew(job.work, lambda number: kind.remote(number, job.packed), lambda: _size(job), job.limit_s)
     deadline = float("inf")
     while crew.busy and time.monotonic() < deadline:
-        crew.turn(emit)
+        crew.turn(pipe.send)
         if pipe.poll():
             pipe.recv()
             crew.stop()
             deadline = time.monotonic() + GRACE_S
     crew.end()
+
+
+def _hand() -> type:
+    """The actor. It is made here, so that it travels as a whole, to nodes that may have no such package."""
+
+    class Hand:
+        def __init__(self, number: int, packed: bytes) -> None:
+            import platform
+            import sys
+
+            self.host = platform.node()
+            try:
+                from apo_bench.benchmark import ray_hand
+            except ImportError as error:
+                self.refusal: str | None = (
+                    f"the node '{self.host}' cannot import this version of apo_bench ({error}); "
+                    f"install it for {sys.executable}, which Ray runs there."
+                )
+            else:
+                self.refusal = ray_hand.refusal(packed)
+                if self.refusal is None:
+                    self.hand = ray_hand.Hand(number, packed, self._node())
+
+        def _node(self) -> Any:
+            import ray
+
+            return ray.get_runtime_context().get_node_id()
+
+        def where(self) -> tuple[Any, ...]:
+            return self._node(), self.host, self.refusal
+
+        def take(self, unit: Any) -> None:
+            self.hand.take(unit)
+
+        def stop(self) -> None:
+            self.hand.stop()
+
+        def news(self, heard: int, wait_s: float) -> Any:
+            return self.hand.news(heard, wait_s)
+
+    return Hand
 
 
 def _size(job: Job) -> int:

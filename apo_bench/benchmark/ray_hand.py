@@ -50,27 +50,26 @@ def _unpacked(packed: bytes) -> tuple[Terms, Wanted]:
 
 @final
 class Hand:
-    """An actor. Its trials run in one thread of their own, so that it can be asked and stopped meanwhile.
+    """What an actor does. Trials run in one thread of their own, so that it can be asked and stopped meanwhile.
 
     News are numbered and kept until the next question shows that they have arrived: an answer that is lost on its way
     is asked for again.
     """
 
-    def __init__(self, number: int, terms: Terms) -> None:
-        self._number, self._terms, self._node = number, terms, ""
+    def __init__(self, number: int, packed: bytes, node: str) -> None:
+        """Args:
+        number: Tells workers apart in `timing.jsonl`.
+        packed: As in `refusal`.
+        node: The id of the node that it is on.
+        """
+        self._number, self._node = number, node
+        self._terms, _ = _unpacked(packed)
         self._orders: queue.SimpleQueue[Unit] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._news: deque[News] = deque()
         self._arrived = 0
         self._more = threading.Condition()
         threading.Thread(target=self._live, daemon=True).start()
-
-    def where(self) -> tuple[str, str]:
-        """The id of its node, and the name of its host."""
-        import ray
-
-        self._node = ray.get_runtime_context().get_node_id()
-        return self._node, platform.node()
 
     def take(self, unit: Unit) -> None:
         """Work on this unit when the one before is done."""
