@@ -1,0 +1,247 @@
+"""Worker processes: correctors that die, hang or raise cost one trial each, whoever else is at work."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.benchmark.crew import MOST_FALSE_STARTS, spread
+from apo_bench.benchmark.grid import SweepSpec, Unit, load_all, units
+from apo_bench.benchmark.spec import TrialSpec
+from apo_bench.benchmark.stopping import Stopped, listening
+from apo_bench.benchmark.sweep import sweep
+from apo_bench.benchmark.terms import Terms, versions
+from apo_bench.benchmark.worker import Worker, lost, misbehaved
+from apo_bench.errors import InputError
+
+CODE = """
+import os, subprocess, time
+
+def dies_of_b(seen):
+    if "B" in seen.assembly.solids:
+        os._exit(3)
+    raise KeyError("many")
+
+def hangs(seen):
+    subprocess.run(["sleep", "86399"])
+
+def raises(seen):
+    raise ZeroDivisionError(object())
+
+def nonsense(seen):
+    return "goals"
+
+def slow(seen):
+    time.sleep(0.2)
+    raise ValueError("slow")
+"""
+FOLDERS = pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+
+
+@pytest.fixture(autouse=True)
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (tmp_path / "unruly.py").write_text(CODE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield
+    sys.modules.pop("unruly", None)
+
+
+def grid(*methods: str, scenarios: tuple[str, ...] = ("block_on_block",), **more: Any) -> SweepSpec:
+    """Trials that end before the arm moves, but for its own."""
+    return SweepSpec(scenarios, (1.0,), (0.0,), tuple(f"unruly:{m}" for m in methods), **{"trials": 1} | more)
+
+
+def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]]:
+    return {
+        (row["scenario"], row["method"].removeprefix("unruly:")): (row["failure_stage"], row["failure_code"])
+        for row in rows
+    }
+
+
+def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: Path) -> None:
+    asked = grid("raises", "dies_of_b", "nonsense", scenarios=("block_on_block", "stick_in_tower"), trials=2)
+    one = sweep(asked, tmp_path / "one", workers=1)
+    four = sweep(asked, tmp_path / "four", workers=4)
+    assert endings(one) == {
+        **{
+            (scenario, method): ("correct", "raised")
+            for scenario in asked.scenarios
+            for method in ("raises", "nonsense")
+        },
+        ("stick_in_tower", "dies_of_b"): ("correct", "raised"),
+        ("block_on_block", "dies_of_b"): ("worker", "worker_died"),
+    }
+    assert len(one) == 2 * 2 * 3
+    assert all(row["success"] is False for row in one)
+    assert sorted(map(json.dumps, one)) == sorted(map(json.dumps, four))
+    timing = [json.loads(text) for text in (tmp_path / "four" / "timing.jsonl").read_text().splitlines()]
+    assert len(timing) == len(four)
+    assert {t["worker"] for t in timing} <= {0, 1, 2, 3}
+
+
+@FOLDERS
+def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
+    began = time.monotonic()
+    rows = sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=6.0)
+    assert endings(rows) == {
+        ("block_on_block", "hangs"): ("worker", "time_limit"),
+        ("block_on_block", "raises"): ("correct", "raised"),
+    }
+    assert 6.0 < time.monotonic() - began < 60.0
+    assert not asleep()
+    assert "6" not in rows[0]["sentence"]
+
+
+def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
+    spec = TrialSpec("block_on_block", method="paper", seed=4)
+    died, late = lost(spec, "abc", "worker_died"), lost(spec, "abc", "time_limit")
+    raised = misbehaved(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
+    assert list(died) == list(late) == list(raised)
+    assert died["spec_hash"] == raised["spec_hash"]
+    assert (died["success"], died["demonstration"], died["failure_stage"]) == (False, None, "worker")
+    assert died["sentence"] == "the process that ran the trial died"
+    assert (late["failure_code"], raised["demonstration"]) == ("time_limit", "ok")
+    assert raised["sentence"].startswith("it raised <thing at 0x...>; xxx")
+    assert len(raised["sentence"]) == 1000
+
+
+def test_a_worker_with_other_code_or_packages_refuses() -> None:
+    unit = Unit((TrialSpec("block_on_block", method="none"),))
+    with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
+        Worker(0, Terms({"block_on_block": "0123456789abcdef"}, versions())).run(unit, lambda row, timing: None)
+    with pytest.raises(
+        InputError, match=r"has mujoco .*, the process that started the sweep 1\.2\.3; install the same"
+    ):
+        Worker(0, Terms({}, versions() | {"mujoco": "1.2.3"}))
+
+
+def test_what_a_worker_refuses_ends_the_sweep() -> None:
+    asked = grid("raises")
+    terms = Terms({"block_on_block": "0123456789abcdef"}, versions())
+    with pytest.raises(InputError, match="has other code or other files"):
+        spread(units([asked], load_all([asked])), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Ends the process that unpacks it."""
+
+    content: str = ""
+
+    def __reduce__(self) -> Any:
+        return os._exit, (5,)
+
+
+def test_processes_that_cannot_begin_are_given_up() -> None:
+    asked = grid("raises")
+    terms: Any = Deadly()
+    with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
+        spread(units([asked], load_all([asked])), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+    assert MOST_FALSE_STARTS == 3
+
+
+def started(out: Path, *more: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "apo_bench.cli", "sweep", "block_on_block", "--careless", "0", "--out", str(out)]
+    return subprocess.Popen(
+        [*command, "--workers", "1", *more],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
+    )
+
+
+def count(out: Path) -> int:
+    path = out / "trials.jsonl"
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def wait_for(true: Callable[[], bool], process: subprocess.Popen[str], seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+def asleep() -> list[str]:
+    """Processes that `hangs` has started and that are still there."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found += [path.parent.name] if b"sleep\x0086399" in path.read_bytes() else []
+        except OSError:
+            continue
+    return found
+
+
+@FOLDERS
+def test_a_signal_ends_a_sweep_cleanly(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    levels = ",".join(str(0.5 * k) for k in range(100))
+    process = started(out, "--methods", "unruly:slow", "--trials", "1", "--levels", levels)
+    wait_for(lambda: count(out) >= 2, process)
+    began = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert said == "apo-bench: ended by SIGTERM; what had ended is kept, and the same command continues.\n"
+    assert time.monotonic() - began < 30.0
+    assert 2 <= count(out) < 100
+    assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
+
+
+@FOLDERS
+def test_a_second_interrupt_ends_at_once(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = started(out, "--methods", "unruly:raises,unruly:hangs", "--trials", "1", "--levels", "1")
+    wait_for(lambda: count(out) == 1 and bool(asleep()), process)
+    process.send_signal(signal.SIGINT)
+    time.sleep(1.0)
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said == "apo-bench: interrupted; what had ended is kept, and the same command continues.\n"
+    assert time.monotonic() - began < 3.5
+    assert not asleep()
+
+
+def test_the_first_signal_asks_and_the_second_raises() -> None:
+    handler = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with listening() as check:
+            check()
+            os.kill(os.getpid(), signal.SIGINT)
+            with pytest.raises(Stopped) as first:
+                check()
+            assert first.value.number == signal.SIGINT
+            with pytest.raises(Stopped):
+                os.kill(os.getpid(), signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def test_handlers_of_the_callers_own_stay() -> None:
+    mine, before = lambda number, frame: None, signal.getsignal(signal.SIGTERM)
+    signal.signal(signal.SIGTERM, mine)
+    try:
+        with listening() as check:
+            assert signal.getsignal(signal.SIGTERM) is mine
+            check()
+    finally:
+        signal.signal(signal.SIGTERM, before)
