@@ -29,6 +29,8 @@ POWERS = np.array([-12.0, -3.0, 1.0, 3.0, 12.0])
 """Of the shape; those of the mirror image are negative."""
 OTHERS = tuple(x.ravel() for x in np.meshgrid(STEEPNESS, CEILINGS, POWERS, indexing="ij"))
 """(m,) steepness, ceiling and power of every curve that has a half level."""
+CONSTANTS = 4
+"""Of a curve: half level, steepness, ceiling, power."""
 PER_UNIT = 40
 """Half levels per unit of the logarithm, between the smallest and the largest level."""
 OUTSIDE = np.array([0.05, 0.2, 0.5, 1.0, 2.0, 4.0])
@@ -63,6 +65,7 @@ def profile(log_levels: Array, success: Array) -> Profile:
     at = best.argmax(axis=-1)[..., None]
     likeliest = np.take_along_axis(which, at, axis=-1)
     more = variation(log_levels, right, known, log_half[at], tuple(x[likeliest] for x in OTHERS))
+    more *= misfit(k, wrong, best.max(axis=-1))
     return Profile(log_half, 2.0 * (best.max(axis=-1, keepdims=True) - best) / more[..., None])
 
 
@@ -101,6 +104,23 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
     scores = (np.where(known, right - p[..., None, :], 0.0) * direction[..., None, :]).sum(axis=-1)
     expected, seen = (hh - free * hs)[..., 0], (scores**2).sum(axis=-1)
     return np.asarray(np.maximum(1.0, np.where(expected > LEAST, seen / np.maximum(expected, LEAST), 1.0)))
+
+
+def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
+    """(...) by how much the deviance of the likeliest curve exceeds what chance explains; 1 where it does not.
+
+    The heterogeneity factor of D. J. Finney, Probit Analysis, 1952: where no curve of the grid fits, as with thousands of
+    seeds, curves that fit little worse than the likeliest are believed too.
+
+    Args:
+        right, wrong: (..., k) successes and failures at the levels.
+    """
+    from scipy.special import chdtri, xlogy
+
+    trials = np.maximum(right + wrong, 1.0)
+    best = (xlogy(right, right / trials) + xlogy(wrong, wrong / trials)).sum(axis=-1)
+    freedom = max(1, right.shape[-1] - CONSTANTS)
+    return np.asarray(np.maximum(1.0, 2.0 * (best - likelihood) / chdtri(freedom, 0.05)))
 
 
 @lru_cache(maxsize=8)
