@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, final
 
 import numpy as np
@@ -115,6 +116,7 @@ def _comparison(pair: Paired) -> frozenset[Place]:
     return frozenset((pair.place, place_of_reference(pair.place, pair.reference)))
 
 
+@lru_cache(maxsize=65536)
 def tango(b: int, c: int, n: int) -> Interval:
     """The score interval of a difference of paired proportions, (b - c) / n, at 95 %.
 

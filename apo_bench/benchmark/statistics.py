@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
@@ -107,6 +108,7 @@ class Cell:
         return Rate(self.successes, self.trials - self.not_executed)
 
 
+@lru_cache(maxsize=65536)
 def wilson(successes: int, trials: int) -> Interval:
     """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
     from scipy.stats import binomtest
