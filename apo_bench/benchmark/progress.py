@@ -95,7 +95,8 @@ class Rates:
         for i in varying:
             table.add_column(BESIDE[i].removesuffix("_mm"), no_wrap=True)
         for mm, deg in levels:
-            table.add_column(f"{mm:g}" if mm == deg or deg == 0.0 else f"{mm:g}, {deg:g}", justify="right")
+            name = f"{mm:g}" if mm == deg or deg == 0.0 else f"{mm:g}, {deg:g}"
+            table.add_column(f"level {name}" if (mm, deg) == levels[0] else name, justify="right", no_wrap=True)
         for line, cells in lines.items():
             words = [f"{line[i]:g}" if isinstance(line[i], float) else str(line[i]) for i in varying]
             table.add_row(*words, *(_fraction(cells.get(level)) for level in levels))
