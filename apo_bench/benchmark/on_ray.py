@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import multiprocessing
 import os
 import pickle
@@ -14,7 +15,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, final
 
 from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.parcel import parcel, wanted
@@ -122,8 +123,7 @@ def _drive(job: Job, take: Take, check: Check) -> None:
         process.start()
         there.close()
         try:
-            _wait(here, process, job, check, log)
-            _listen(here, take, check, log)
+            _listen(here, _Joining(process, job, log), take, check)
         except KeyboardInterrupt:
             _end_cleanly(here, take)
             raise
@@ -134,48 +134,75 @@ def _drive(job: Job, take: Take, check: Check) -> None:
             process.join()
 
 
-def _wait(pipe: Any, process: Any, job: Job, check: Check, log: Path) -> None:
-    """Until the process has something to say: that it has joined the cluster, or why it cannot."""
-    named = job.address or os.environ.get("RAY_ADDRESS")
-    limit_s = STARTING_S if named in (None, "local") else JOINING_S
-    deadline = time.monotonic() + limit_s
-    while not pipe.poll(TURN_S):
-        check()
-        if NO_TOKEN in _text(log):
-            process.kill()
-            if job.token or "RAY_AUTH_MODE" in os.environ:
-                raise InputError(
-                    "the Ray cluster wants another token; have the ~/.ray/auth_token of its head here, and "
-                    "RAY_AUTH_MODE=token or unset."
-                )
-            raise _TokenWanted
-        if time.monotonic() > deadline:
-            process.kill()
-            raise InputError(
-                f"no Ray cluster answered at {named or 'this machine'} within {limit_s:g} s; look there with: ray "
-                "status, or give --address local for one of your own."
-            )
-
-
-def _listen(pipe: Any, take: Take, check: Check, log: Path) -> None:
+def _listen(pipe: Any, joining: _Joining, take: Take, check: Check) -> None:
     """Take rows until the last word."""
     while True:
         check()
         if not pipe.poll(TURN_S):
+            joining.look()
             continue
         try:
             news = pipe.recv()
         except (EOFError, OSError) as error:
             raise RuntimeError(
-                f"the Ray cluster was lost{_last_line(log)}; finished rows are kept, and the same command continues."
+                f"the Ray cluster was lost{joining.last_line()}; finished rows are kept, and the same command goes on."
             ) from error
-        if take(news) or news[0] == "connected":
-            continue
-        if news[0] == "refused":
+        if news[0] == "starting":
+            joining.give(STARTING_S)
+        elif news[0] == "connected":
+            joining.give(math.inf)
+        elif news[0] == "refused":
             raise InputError(news[1])
-        if news[0] == "failed":
+        elif news[0] == "failed":
             raise RuntimeError(news[1])
-        return
+        elif not take(news):
+            return
+
+
+@final
+class _Joining:
+    """Watches a process that may wait for a cluster for ever, and for one that does not let it in."""
+
+    def __init__(self, process: Any, job: Job, log: Path) -> None:
+        self._process, self._job, self._log = process, job, log
+        self._named = job.address or os.environ.get("RAY_ADDRESS")
+        self.give(JOINING_S)
+
+    def give(self, seconds: float) -> None:
+        """So much time from now on."""
+        self._seconds, self._deadline = seconds, time.monotonic() + seconds
+
+    def look(self) -> None:
+        """Raise an `InputError` if there is no hope, after ending the process."""
+        if math.isinf(self._seconds):
+            return
+        if NO_TOKEN in self._text():
+            self._process.kill()
+            if not self._job.token and "RAY_AUTH_MODE" not in os.environ:
+                raise _TokenWanted
+            raise InputError(
+                "the Ray cluster wants another token; have the ~/.ray/auth_token of its head here, and "
+                "RAY_AUTH_MODE=token or unset."
+            )
+        if time.monotonic() > self._deadline:
+            self._process.kill()
+            where = f"at {self._named}" if self._named else "where one last ran on this machine (ray stop forgets it)"
+            raise InputError(
+                f"no Ray cluster answered {where} within {self._seconds:g} s; look there with: ray status, or give "
+                "--address local for one of your own."
+            )
+
+    def last_line(self) -> str:
+        """What Ray said last, if anything."""
+        lines = [line.strip() for line in self._text().splitlines() if line.strip()]
+        said = re.sub(r"^\[[^\]]*\] \S+: ", "", lines[-1]).rstrip(".") if lines else ""
+        return f" ({said[:200]})" if said else ""
+
+    def _text(self) -> str:
+        try:
+            return self._log.read_text(errors="replace")
+        except OSError:
+            return ""
 
 
 def _end_cleanly(pipe: Any, take: Take) -> None:
@@ -188,16 +215,3 @@ def _end_cleanly(pipe: Any, take: Take) -> None:
                 news = pipe.recv()
                 if not take(news) and news[0] != "connected":
                     return
-
-
-def _last_line(log: Path) -> str:
-    """What Ray said last, if anything."""
-    lines = [line.strip() for line in _text(log).splitlines() if line.strip()]
-    return f" ({lines[-1][:200]})" if lines else ""
-
-
-def _text(log: Path) -> str:
-    try:
-        return log.read_text(errors="replace")
-    except OSError:
-        return ""

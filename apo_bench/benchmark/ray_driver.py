@@ -58,8 +58,8 @@ class Job:
 def drive(pipe: Any, job: Job, log: str) -> None:
     """The life of the process: connect, spread the work, say one last word.
 
-    Sends ("connected",), what a `Crew` tells, and last ("done",), ("refused", sentence) or ("failed", text); ends early
-    when it is sent anything, or when the sweep is gone.
+    Sends ("starting",) if it starts a cluster, ("connected",), what a `Crew` tells, and last ("done",), ("refused",
+    sentence) or ("failed", text); ends early when it is sent anything, or when the sweep is gone.
     """
     _live_apart(log)
     if job.token:
@@ -82,10 +82,14 @@ def _live_apart(log: str) -> None:
 
 
 def _end_with_parent() -> None:
-    """Rows of a process whose parent was killed would be written by nobody; Ray ends its workers when it is gone."""
+    """Rows of a process whose parent was killed would be written by nobody; Ray ends its workers when it is gone.
+
+    Where Ray answers, the pipe has said so by now, and all has ended in order.
+    """
     parent = parent_process()
     if parent is not None:
         parent.join()
+        time.sleep(2 * GRACE_S)
         os._exit(1)
 
 
@@ -93,7 +97,7 @@ def _last_word(pipe: Any, job: Job) -> tuple[str, ...]:
     import ray
 
     try:
-        _connect(job)
+        _connect(pipe, job)
         pipe.send(("connected",))
         _work(pipe, job)
     except InputError as error:
@@ -106,7 +110,7 @@ def _last_word(pipe: Any, job: Job) -> tuple[str, ...]:
     return ("done",)
 
 
-def _connect(job: Job) -> None:
+def _connect(pipe: Any, job: Job) -> None:
     """Join the cluster that was named, or the one that runs here, or start one for the time of the sweep."""
     import ray
     from ray.exceptions import RayError
@@ -129,6 +133,7 @@ def _connect(job: Job) -> None:
             if job.address is not None or not isinstance(error, ConnectionError):
                 raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
         cpus = max(job.workers or 1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
+        pipe.send(("starting",))
         ray.init(address="local", num_cpus=cpus, include_dashboard=False, object_store_memory=OBJECT_STORE, **quiet)
 
 
