@@ -65,7 +65,7 @@ def changed_table(found: Comparison) -> Table:
         ends = [(f"{verdict(row)} {why(row)}".strip(), row.get("sentence")) for row in (a, b)]
         commands = [replay_command(row, files[i]) for i, row in enumerate((a, b))]
         rows.append((*where, level, a["seed"], *ends[0], *ends[1], *commands))
-    return Table(head, rows, words=3)
+    return Table(head, rows, words=len(head))
 
 
 def in_words(found: Comparison) -> str:

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.journal import each_row
+from apo_bench.benchmark.spec import RANGE
+from apo_bench.errors import InputError
 
 NUMBERS: Mapping[str, str] = {
     "gap_before_mm": "gap as seen [mm]",
@@ -38,27 +40,38 @@ TESTED = (
 )
 COLUMNS = (*SAID, *TESTED, *NUMBERS)
 """What is kept of a row; the rest (thresholds, conditions, final poses, attempts) is read again where it is needed."""
+NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
+"""What every row says, besides its key."""
+USUAL = {"fidelity": "full", "arm": "six_axis", "timestep_s": 0.001}
+"""What a row that does not say means."""
 
 Row = dict[str, Any]
 
 
 def slim_rows(folder: str | Path) -> list[Row]:
-    """The rows of a sweep with the `COLUMNS` they have.
+    """The rows of a sweep with the `COLUMNS`; what a row does not say is None.
 
     Raises:
-        InputError: No such folder, no trials in it, or a line that is not a row.
+        InputError: No such folder, no trials in it, or a line that is not a whole row.
     """
     foretold: dict[Any, Any] = {}
-    return [_slim(row, foretold) for row in each_row(folder)]
+    return [_slim(row, foretold, folder) for row in each_row(folder)]
 
 
-def _slim(row: Mapping[str, Any], foretold: dict[Any, Any]) -> Row:
-    kept = {name: row[name] for name in COLUMNS if name in row}
+def _slim(row: Mapping[str, Any], foretold: dict[Any, Any], folder: str | Path) -> Row:
+    for name in NEEDED:
+        if name not in row:
+            raise InputError(
+                f"'{folder}' holds a row without '{name}' ({row['scenario']}, {row['method']}, seed {row['seed']}), so "
+                "it is not as `apo-bench sweep` wrote it; remove the row or the folder."
+            )
+    kept = {name: row.get(name) for name in COLUMNS}
     for name, value in kept.items():
         if type(value) is str:
             kept[name] = sys.intern(value)
-    said = kept.get("predicted")
+    kept["eye"] = kept["eye"] or (RANGE if kept["noise"] == RANGE else "noise")
+    said = kept["predicted"]
     if said is not None:
         what = (said["fails"], said["operation"], said["code"])
         kept["predicted"] = foretold.setdefault(what, dict(zip(("fails", "operation", "code"), what, strict=True)))
-    return kept
+    return {**USUAL, **{name: value for name, value in kept.items() if value is not None or name not in USUAL}}

@@ -57,6 +57,7 @@ def write_comparison(found: Comparison, folder: Path) -> Written:
 def comparison_page(found: Comparison, tables: dict[str, Table]) -> str:
     """The page, as HTML."""
     sides = tag("ol", *(tag("li", tag("code", str(side.folder))) for side in (found.first, found.second)))
+    names = [side.folder.resolve().name for side in (found.first, found.second)]
     lead = joined([prose(text.in_words(found), "lead"), sides])
     sections = [
         Section("verdicts", "Verdicts", joined([prose(AGREEMENT), tables["agreement"].html()])),
@@ -67,7 +68,7 @@ def comparison_page(found: Comparison, tables: dict[str, Table]) -> str:
             "differences", "What is not the same", tables["differences"].html("Nothing that is said of them differs.")
         ),
     ]
-    return document(f"{found.first.folder} against {found.second.folder}", lead, sections, ())
+    return document(f"{names[0]} against {names[1]}", lead, sections, ())
 
 
 def _changed(found: Comparison, table: Table) -> Html:
