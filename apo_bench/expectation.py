@@ -40,12 +40,12 @@ def settled(assembly: Assembly, operation: Operation, poses: Poses) -> Poses:
 def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, Array]:
     """e at the corners of the overlap, (k,), [m], positive where the faces are apart, and the normal, (3,), world.
 
-    Of faces that miss each other the corners of the whole environment face count.
+    Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count.
     """
     m, e = contact
     T_m, T_e, plane = poses[m.part], poses[e.part], assembly.face(m).plane
     found = overlap(assembly.face(m), T_m, assembly.face(e), T_e)
-    corners = found.corners if found else pose.apply(T_e, assembly.face(e).outline)
+    corners = found.corners if found and len(found.corners) else pose.apply(T_e, assembly.face(e).outline)
     n = T_m[:3, :3] @ plane[:3]
     return (corners - T_m[:3, 3]) @ n + plane[3], n
 
