@@ -43,7 +43,7 @@ class Agreement:
 
     scenario: str
     same: Rate
-    """Trials whose verdict (strict; excluded ones apart) is the same."""
+    """Trials whose strict verdict is the same; those whose demonstration was right in neither are left out."""
     same_ending: Rate
     """Trials whose verdict, stage and code are the same."""
     only_first: int
@@ -201,11 +201,12 @@ def _by_key(side: Side) -> dict[Key, Row]:
 
 
 def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
-    verdicts = [(a["success"], b["success"]) for a, b in pairs]
+    counted = [(a, b) for a, b in pairs if (a["success"], b["success"]) != (None, None)]
+    verdicts = [(a["success"], b["success"]) for a, b in counted]
     return Agreement(
         scenario=name,
         same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),
-        same_ending=Rate(sum(all(a[x] == b[x] for x in ENDING) for a, b in pairs), len(pairs)),
+        same_ending=Rate(sum(all(a[x] == b[x] for x in ENDING) for a, b in counted), len(counted)),
         only_first=sum((a, b) == (True, False) for a, b in verdicts),
         only_second=sum((a, b) == (False, True) for a, b in verdicts),
         excluded_in_one=sum((a is None) != (b is None) for a, b in verdicts),

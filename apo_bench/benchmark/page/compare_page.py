@@ -16,7 +16,8 @@ from apo_bench.errors import InputError
 AGREEMENT = (
     "The same trials in both: how often the strict verdict is the same, with Wilson's interval, and how often stage "
     "and code of a failure are as well. *Right in the first alone* are trials that the second lost. The difference of "
-    "success is the second minus the first, with Tango's interval for pairs (95 %)."
+    "success is the second minus the first, with Tango's interval for pairs (95 %). Trials whose demonstration was not "
+    "right in either are left out here."
 )
 NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
 CELLS = (
