@@ -37,6 +37,12 @@ COLUMNS = (
 )
 MOST_PANELS = 16
 """Of a PNG; laying out more takes minutes."""
+OURS = (
+    *("recognised.csv", "recognised.parquet", "times.csv", "times.parquet", "recognised.png", "success_over_level.png"),
+    *("success_over_tightness.png", "success_over_level.svg", "failure_stages.svg", "gap_before_and_after.svg"),
+    *("prediction.svg", "timing.svg"),
+)
+"""Files that not every report has."""
 PAGE, TABLES, FIGURES = "report.html", "tables", "figures"
 
 
@@ -83,6 +89,7 @@ def report(folder: str | Path, pictures: int = 0) -> Report:
     try:
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
+        _remove_older(folder)
         return _written(folder, rows, found, pictures)
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
@@ -138,6 +145,13 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
         pictures=len(taken),
         no_pictures=tuple(missed),
     )
+
+
+def _remove_older(folder: Path) -> None:
+    """What an earlier report wrote and this one may not: nothing beside the page shall be of other rows."""
+    for path in (*(folder / TABLES).glob("*"), *(folder / FIGURES).glob("*")):
+        if path.name in OURS or (path.name.startswith("difference_to_") and path.suffix == ".svg"):
+            path.unlink()
 
 
 def _drawn(folder: Path, cells: Sequence[Cell], told: Sequence[Any]) -> dict[str, Path]:

@@ -100,4 +100,4 @@ def scale(values: Sequence[float]) -> tuple[float, float, list[tuple[float, str]
 def counted(numbers: Sequence[int], what: str = "") -> str:
     """`n 40`, or `n 38 to 160` where it differs, and of what."""
     low, high = min(numbers, default=0), max(numbers, default=0)
-    return f"n {low if low == high else f'{low} to {high}'}{f' {what}' if what else ''}"
+    return f"n\u00a0{low if low == high else f'{low} to {high}'}{f' {what}' if what else ''}"
