@@ -22,7 +22,7 @@ from apo_bench.simulation.near import Moving, clear, near_spans
 from apo_bench.simulation.paths import Line, smooth, unwound
 from apo_bench.simulation.reach import along, at_end
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.world import fresh, part_pose, unstable
+from apo_bench.simulation.world import fresh, part_pose, timestep, unstable
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
@@ -106,12 +106,14 @@ class Robot:
         for T in unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
-    def wait(self, seconds: float) -> None:
+    def wait(self, seconds: float, halves: bool = False) -> None:
+        """Stand still; in halves of a physics step if asked to."""
         self.data.ctrl[self._drives] = self.q
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._every):
             n = min(self._every, steps - done)
-            mujoco.mj_step(self.model, self.data, n)
+            with timestep(self.model, self.step_s / 2 if halves else self.step_s):
+                mujoco.mj_step(self.model, self.data, 2 * n if halves else n)
             if n == self._every:
                 self._look()
 

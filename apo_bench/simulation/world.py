@@ -104,6 +104,17 @@ def sleeping(world: World, allowed: bool) -> Iterator[None]:
         options.enableflags = before
 
 
+@contextmanager
+def timestep(model: Any, seconds: float) -> Iterator[None]:
+    """Steps of another length, for a while."""
+    before = float(model.opt.timestep)
+    model.opt.timestep = seconds
+    try:
+        yield
+    finally:
+        model.opt.timestep = before
+
+
 def awaken(world: World, data: Any) -> None:
     """Bring all that follows from the positions up to date, contacts of parts that were left alone too."""
     with sleeping(world, False):
