@@ -91,6 +91,9 @@ class Kinematics:
 
     POSITION_M = 1e-6
     ANGLE_RAD = 1e-5
+    DAMPING = 1e-9
+    GAIN = 0.95
+    """A step takes at most this part of the way to a joint's limit."""
 
     def __init__(self, arm: Arm) -> None:
         spec = mujoco.MjSpec.from_file(str(arm.mjcf))
@@ -103,6 +106,8 @@ class Kinematics:
         self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=0.3)
         self._limits = [mink.ConfigurationLimit(self.model)]
         self._full = self.model.qpos0.copy()
+        limited = self.model.jnt_limited.astype(np.bool_)
+        self._range: Array = np.where(limited[:, None], self.model.jnt_range, (-np.inf, np.inf)).T
 
     def forward(self, q: Array) -> Array:
         """The pose of the tip, (4, 4), world."""
@@ -125,10 +130,28 @@ class Kinematics:
             if np.abs(error[:3]).max() < self.POSITION_M and np.abs(error[3:]).max() < self.ANGLE_RAD:
                 found = self.configuration.q[self.adr]
                 return np.array(found)
-            try:
-                step = mink.solve_ik(self.configuration, [self._task], 1.0, "daqp", damping=1e-9, limits=self._limits)
-            except mink.exceptions.MinkError:
+            step = self._step()
+            if step is None:
                 return None
             longest = float(np.abs(step).max())
             self.configuration.integrate_inplace(step * min(1.0, 0.5 / max(longest, 1e-12)), 1.0)
         return None
+
+    def _step(self) -> Array | None:
+        """The step of all joints that mink's quadratic programme finds; None if it finds none.
+
+        Without limits the programme is a linear system. Where its solution keeps them, it is that of the programme too.
+        """
+        H, c = self._task.compute_qp_objective(self.configuration)
+        H.flat[:: len(c) + 1] += self.DAMPING
+        step: Array = np.linalg.solve(H, -c)
+        low, high = self.GAIN * (self._range - self.configuration.q)
+        if (step >= low).all() and (step <= high).all():
+            return step
+        try:
+            found = mink.solve_ik(
+                self.configuration, [self._task], 1.0, "daqp", damping=self.DAMPING, limits=self._limits
+            )
+        except mink.exceptions.MinkError:
+            return None
+        return np.asarray(found)
