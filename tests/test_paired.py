@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import multinomial, ttest_rel
+from scipy.stats import binomtest, multinomial, ttest_rel
 
+from apo_bench.benchmark.adjust import adjusted
+from apo_bench.benchmark.mcnemar import mcnemar
 from apo_bench.benchmark.paired import paired, tango
 from apo_bench.benchmark.paired_table import COLUMNS, paired_lines, write_paired
 from apo_bench.benchmark.report import report
+from apo_bench.benchmark.statistics import wilson
+from apo_bench.errors import InputError
 from tests import pages
 from tests.test_statistics import row, write
 
@@ -81,6 +86,97 @@ def test_tango_covers_in_95_of_100(p: float, q: float) -> None:
                 low, high = tango(b, c, n)
                 covered += weight * (low <= p - q <= high)
     assert 0.93 <= covered <= (0.97 if p + q > 0.1 else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("only_first", "only_second", "expected"),
+    [
+        (
+            12,
+            2,
+            0.0129,
+        ),  # two media for tubercle bacilli: Armitage and Berry, Statistical Methods, 1994, p. 127
+        (1, 7, 0.0703),  # airway hyper-responsiveness: Fagerland, Lydersen and Laake, BMC Med. Res. Meth. 13:91 (2013)
+        (6, 16, 0.0525),  # complete response of leukaemia: the same
+    ],
+)
+def test_mcnemar_published_examples(only_first: int, only_second: int, expected: float) -> None:
+    assert mcnemar(only_first, only_second) == pytest.approx(expected, abs=5e-5)
+
+
+@settings(max_examples=50, deadline=None)
+@given(b=st.integers(0, 200), c=st.integers(0, 200))
+def test_mcnemar_is_the_two_sided_sign_test(b: int, c: int) -> None:
+    p = mcnemar(b, c)
+    assert p == mcnemar(c, b)
+    assert p == pytest.approx(binomtest(b, b + c).pvalue if b + c else 1.0, rel=1e-9)
+    if b >= c > 0:
+        assert mcnemar(b + 1, c - 1) <= p
+
+
+def test_holm_worked_example() -> None:
+    """By hand: 4 x 0.005, 3 x 0.01, 2 x 0.03, and 0.04, which may not be below the one before."""
+    found = adjusted({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
+    assert found == pytest.approx({"a": 0.03, "b": 0.06, "c": 0.06, "d": 0.02})
+
+
+def test_benjamini_and_hochberg_published_example() -> None:
+    """The 15 comparisons of their paper (thrombolysis, Section 4): at 0.05 they reject four, Holm three."""
+    p = dict(
+        enumerate([0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.324, 0.4262, 0.5719])
+    ) | {12: 0.6528, 13: 0.759, 14: 1.0}
+    assert sum(x <= 0.05 for x in adjusted(p, "bh").values()) == 4
+    assert sum(x <= 0.05 for x in adjusted(p, "holm").values()) == 3
+    assert (adjusted(p, "none"), adjusted({})) == (p, {})
+    with pytest.raises(InputError, match="holm"):
+        adjusted(p, "holmes")
+
+
+@settings(max_examples=50, deadline=None)
+@given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20), how=st.sampled_from(["holm", "bh"]))
+def test_adjustment_only_raises_and_keeps_the_order(p: list[float], how: str) -> None:
+    found = list(adjusted(dict(enumerate(p)), how).values())
+    assert all(a - 1e-12 <= b <= 1.0 for a, b in zip(p, found, strict=True))
+    ranked = sorted(zip(p, found, strict=True))
+    assert all(a[1] <= b[1] + 1e-12 for a, b in pairwise(ranked))
+
+
+def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
+    """`none` against `paper` and `paper` against `none` are one of three comparisons, not two of four."""
+    found = {(p.place.method, p.reference): p for p in paired(rows())}
+    assert found["none", "paper"].p == found["paper", "none"].p == mcnemar(7, 0)
+    assert found["none", "paper"].p_adjusted == found["paper", "none"].p_adjusted
+    raised = adjusted({0: mcnemar(2, 1), 1: mcnemar(8, 0), 2: mcnemar(7, 0)})
+    assert [found[k].p_adjusted for k in (("contact", "paper"), ("contact", "none"), ("paper", "none"))] == [
+        *raised.values()
+    ]
+    assert {p.p_adjusted == p.p for p in paired(rows(), adjust="none")} == {True}
+
+
+def test_what_is_mended_and_what_is_spoilt() -> None:
+    """The raw replay is right at seeds 0 to 3 of 10, the corrected one at 2 to 7: two spoilt of 4, four mended of 6."""
+    given = [row("none", i, i < 4) for i in range(10)] + [row("contact", i, 2 <= i < 8) for i in range(10)]
+    (pair,) = [p for p in paired(given) if (p.place.method, p.reference) == ("contact", "none")]
+    assert (pair.both, pair.neither, pair.pairs) == (2, 2, 10)
+    assert (pair.recovered, pair.harmed) == ((4, 6), (2, 4))
+    assert (pair.recovered.rate, pair.harmed.interval) == (4 / 6, wilson(2, 4))
+
+
+@settings(max_examples=15, deadline=None)
+@given(results=st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=30), order=st.randoms())
+def test_pairs_add_up_in_any_order(results: list[tuple[bool, bool]], order: Any) -> None:
+    given = [row(m, i, r[k]) for i, r in enumerate(results) for k, m in enumerate(("contact", "none"))]
+    shuffled = list(given)
+    order.shuffle(shuffled)
+    (pair,) = paired(given, ("none",))
+    assert (pair,) == paired(shuffled, ("none",))
+    assert pair.recovered.trials + pair.harmed.trials == pair.pairs == len(results)
+    assert pair.both + pair.neither + pair.only_method + pair.only_reference == pair.pairs
+
+
+def test_pairs_do_not_cross_grasps_or_fidelities() -> None:
+    given = [row("contact", grasp="weld"), row("none"), row("contact", fidelity="contact"), row("none", grasp="weld")]
+    assert [(p.place.method, p.place.grasp, p.reference) for p in paired(given)] == [("contact", "weld", "none")]
 
 
 def rows() -> list[dict[str, Any]]:

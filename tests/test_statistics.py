@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from statsmodels.stats.proportion import proportion_confint
 
 from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.confusion import Confusion, confusions
@@ -19,7 +20,7 @@ from apo_bench.benchmark.effort import Effort, efforts
 from apo_bench.benchmark.figure import OTHERS, STYLES, draw, rows_of
 from apo_bench.benchmark.report import COLUMNS, report
 from apo_bench.benchmark.spec import ROW
-from apo_bench.benchmark.statistics import tally, wilson
+from apo_bench.benchmark.statistics import Rate, place_of, tally, wilson
 from apo_bench.errors import InputError
 from tests import pages
 
@@ -86,6 +87,43 @@ def test_wilson_golden_values() -> None:
     assert wilson(100, 100) == pytest.approx((0.9630, 1.0), abs=5e-5)
     assert wilson(97, 100) == pytest.approx((0.9155, 0.9897), abs=5e-5)
     assert wilson(1, 2) == pytest.approx((0.0945, 0.9055), abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "expected"),
+    [(81, 263, (0.2553, 0.3662)), (15, 148, (0.0624, 0.1605)), (0, 20, (0.0, 0.1611)), (1, 29, (0.0061, 0.1718))],
+)
+def test_wilson_published_examples(successes: int, trials: int, expected: tuple[float, float]) -> None:
+    """Table I, method 3, of R. G. Newcombe, Two-sided confidence intervals for the single proportion, Statistics in
+    Medicine 17 (1998), 857-872."""
+    assert wilson(successes, trials) == pytest.approx(expected, abs=5e-5)
+    assert wilson(successes, trials) == pytest.approx(proportion_confint(successes, trials, method="wilson"), abs=1e-12)
+
+
+def test_what_was_not_executed_is_a_failure_and_stands_beside() -> None:
+    """Nothing corrected, nothing seen or a dead worker: failures; of those whose plan was carried out, 3 of 4."""
+    stages = {1: "correct", 2: "observe", 3: "worker", 4: "judge"}
+    rows = [row(seed=i, success=i not in stages, failure_stage=stages.get(i)) for i in range(8)]
+    (cell,) = tally([*rows, row(seed=9, success=None)])
+    assert (cell.trials, cell.successes, cell.not_executed, cell.excluded) == (8, 4, 3, 1)
+    assert (cell.rate, cell.executed, cell.executed.rate) == (0.5, (4, 5), 0.8)
+    assert cell.executed.interval == wilson(4, 5)
+    assert Rate(0, 0).rate is None
+
+
+def test_grasp_and_fidelity_are_axes_and_older_rows_are_full() -> None:
+    older = row()
+    del older["fidelity"]
+    rows = [older, row(fidelity="contact"), row(grasp="weld")]
+    assert [(c.grasp, c.fidelity) for c in tally(rows)] == [
+        ("friction", "full"), ("friction", "contact"), ("weld", "full")
+    ]  # fmt: skip
+    assert place_of(row(level=None)) is None
+
+
+def test_a_trial_that_is_there_twice_is_refused() -> None:
+    with pytest.raises(InputError, match="seed 3"):
+        tally([row(seed=3), row(seed=4), row(seed=3, success=False)])
 
 
 def test_rows_are_counted_into_cells() -> None:

@@ -61,7 +61,7 @@ def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interva
     if len(values) == 0:
         return Interval(low, high)
     different, counts = np.unique(np.asarray(values, dtype=float), return_counts=True)
-    sample = float(np.clip(np.mean(values), low, high))
+    sample = float(np.clip((different * counts).sum() / counts.sum(), low, high))
     seen = (different, counts.astype(float), low, high)
     return Interval(_end(*seen, sample, low), _end(*seen, sample, high))
 

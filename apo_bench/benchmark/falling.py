@@ -109,8 +109,8 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
 def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
     """(...) by how much the deviance of the likeliest curve exceeds what chance explains; 1 where it does not.
 
-    The heterogeneity factor of D. J. Finney, Probit Analysis, 1952: where no curve of the grid fits, as with thousands of
-    seeds, curves that fit little worse than the likeliest are believed too.
+    The heterogeneity factor of D. J. Finney, Probit Analysis, 1952: where no curve of the grid fits, as with thousands
+    of seeds, curves that fit little worse than the likeliest are believed too.
 
     Args:
         right, wrong: (..., k) successes and failures at the levels.
