@@ -147,9 +147,10 @@ def test_and_as_json(given: str, capsys: pytest.CaptureFixture[str]) -> None:
     [
         "rate --half-width 5", "rate --half-width nan", "rate", "rate --half-width 0.05 --rate 90",
         "rate --half-width 1e-9", "pairs", "pairs --win 0.1", "pairs --win 0.1 --lose 0.1",
-        "pairs --win 0.9 --lose 0.3", "pairs --rates a,b", "pairs --rates 0.5", "pairs --rates 0.5,0.9 --agree 0.95", "pairs --win nan --lose 0",
-        "pairs --win 0.1 --lose 0 --power 1", "pairs --win 0.1 --lose 0 --comparisons 0", "margin --margin 0",
-        "margin --margin 0.03 --win 0 --lose 0.05", "shows --trials 0", "shows --trials x", "shows",
+        "pairs --win 0.9 --lose 0.3", "pairs --rates a,b", "pairs --rates 0.5", "pairs --rates 0.5,0.9 --agree 0.95",
+        "pairs --win nan --lose 0", "pairs --win 0.1 --lose 0 --power 1", "pairs --win 0.1 --lose 0 --comparisons 0",
+        "margin --margin 0", "margin --margin 0.03 --win 0 --lose 0.05", "shows --trials 0", "shows --trials x",
+        "shows",
     ],
 )  # fmt: skip
 def test_a_wrong_request_gets_one_sentence(given: str, capsys: pytest.CaptureFixture[str]) -> None:

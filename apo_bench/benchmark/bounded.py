@@ -14,8 +14,8 @@ import numpy as np
 from apo_bench.benchmark.statistics import CONFIDENCE, Interval
 from apo_bench.geometry.arrays import Array
 
-STEPS = 60
-"""Halvings: more than a double can tell apart."""
+STEPS = 48
+"""Halvings: what is left is less than 1e-14 of the range."""
 
 
 def threshold(seeds: int) -> float:
