@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.benchmark.replay_command import Files
 from apo_bench.benchmark.spec import TrialSpec
-from apo_bench.benchmark.statistics import rank
+from apo_bench.benchmark.statistics import NOT_EXECUTED, rank
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.solid import extent
@@ -46,7 +46,8 @@ def sample(rows: Iterable[Row], most: int) -> list[Row]:
     """
     kinds: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        if row["success"] is False and row.get("sim_seconds") and row["level"] is not None:
+        moved = row.get("sim_seconds") and row["failure_stage"] not in (*NOT_EXECUTED, "plan")
+        if row["success"] is False and moved and row["level"] is not None:
             kinds.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
     queues = [
         sorted(found, key=_order) for _, found in sorted(kinds.items(), key=lambda kind: (-len(kind[1]), kind[0]))

@@ -19,7 +19,7 @@ def parquet_beside(table: Path) -> Path:
     from pyarrow import csv, parquet
 
     how = csv.ConvertOptions(column_types=dict.fromkeys(WORDS, pa.string()))
-    made = csv.read_csv(table, convert_options=how)
+    made = csv.read_csv(table, convert_options=how, parse_options=csv.ParseOptions(newlines_in_values=True))
     for i, field in enumerate(made.schema):
         if pa.types.is_null(field.type):
             made = made.set_column(i, field.name, made.column(i).cast(pa.float64()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -61,10 +62,11 @@ def slim_rows(folder: str | Path) -> list[Row]:
 def _slim(row: Mapping[str, Any], foretold: dict[Any, Any], folder: str | Path) -> Row:
     for name in NEEDED:
         if name not in row:
-            raise InputError(
-                f"'{folder}' holds a row without '{name}' ({row['scenario']}, {row['method']}, seed {row['seed']}), so "
-                "it is not as `apo-bench sweep` wrote it; remove the row or the folder."
-            )
+            raise _wrong(row, folder, f"without '{name}'")
+    for name in NUMBERS:
+        x = row.get(name)
+        if x is not None and (type(x) not in (int, float) or not math.isfinite(x)):
+            raise _wrong(row, folder, f"whose '{name}' is no number ({x!r})")
     kept = {name: row.get(name) for name in COLUMNS}
     for name, value in kept.items():
         if type(value) is str:
@@ -75,3 +77,11 @@ def _slim(row: Mapping[str, Any], foretold: dict[Any, Any], folder: str | Path) 
         what = (said["fails"], said["operation"], said["code"])
         kept["predicted"] = foretold.setdefault(what, dict(zip(("fails", "operation", "code"), what, strict=True)))
     return {**USUAL, **{name: value for name, value in kept.items() if value is not None or name not in USUAL}}
+
+
+def _wrong(row: Mapping[str, Any], folder: str | Path, what: str) -> InputError:
+    which = f"{row['scenario']}, {row['method']}, seed {row['seed']}"
+    return InputError(
+        f"'{folder}' holds a row {what} ({which}), so it is not as `apo-bench sweep` wrote it; remove the row or the "
+        "folder."
+    )

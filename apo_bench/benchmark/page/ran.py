@@ -49,14 +49,22 @@ def ran(run: Mapping[str, Any], rows: Mapping[str, Any]) -> Html:
         if isinstance(values, dict) and values:
             made.append(_folded(name, _table(name, values), len(values)))
         elif isinstance(values, list) and values:
-            numbered = {str(i): value for i, value in enumerate(values, start=1)}
-            made.append(_folded(name, _table(name, numbered), len(values)))
+            made.append(_folded(name, _beside(name, values), 1))
     return joined(made)
 
 
 def _folded(name: str, table: Html, entries: int) -> Html:
     is_open = {"open": ""} if entries <= 20 else {}
     return tag("details", tag("summary", name.replace("_", " ")), table, **is_open)
+
+
+def _beside(name: str, values: list[Any]) -> Html:
+    """Entries side by side, one line per key."""
+    given = [value if isinstance(value, dict) else {"": value} for value in values]
+    keys = dict.fromkeys(key for value in given for key in value)
+    rows: list[tuple[object, ...]] = [(key, *(words(v[key]) if key in v else None for v in given)) for key in keys]
+    head = (name.replace("_", " "), *(str(i) for i in range(1, len(given) + 1)))
+    return Table(head, rows, words=len(head)).html()
 
 
 def _table(name: str, values: Mapping[str, Any]) -> Html:
