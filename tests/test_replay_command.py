@@ -22,7 +22,7 @@ from tests import pages
 from tests.test_statistics import row, write
 
 SPEC = TrialSpec("block_on_block", level_mm=3.0, level_deg=2.0, careless=0.0, method="none", seed=5)
-SPECS = (SPEC, replace(SPEC, method="contact"), replace(SPEC, seed=6, level_mm=12.0, level_deg=12.0))
+SPECS = (SPEC, replace(SPEC, method="contact"), replace(SPEC, seed=1, level_mm=10.0, level_deg=1.0))
 
 
 @pytest.fixture(scope="module")

@@ -197,6 +197,42 @@ def test_rows_that_lack_something_are_refused(tmp_path: Path) -> None:
     del broken["success"]
     with pytest.raises(InputError, match="a row without 'success'"):
         report(write(tmp_path / "broken", [broken]))
+    for wrong in (float("nan"), "much"):
+        with pytest.raises(InputError, match="a row whose 'worst_gap_mm' is no number"):
+            report(write(tmp_path / "wrong", [row("contact", worst_gap_mm=wrong)]))
+
+
+def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench import cli
+
+    folder = write(tmp_path / "run", [row("contact", 0), row("contact", 1, scenario="two\nlines | and bars")])
+    for number in ("-1", "101", "many"):
+        assert cli.main(["report", str(folder), "--pictures", number]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    (folder / "tables").write_text("in the way", encoding="utf-8")
+    assert cli.main(["report", str(folder)]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    (folder / "tables").unlink()
+    assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
+    assert "two lines | and bars" in pages.words(folder / "report.html")
+
+
+def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
+    two = [row("contact", level=x, level_deg=x) for x in (1.0, 2.0)]
+    folder = write(tmp_path / "run", two)
+    older = set(report(folder).figures)
+    newer = set(report(write(folder, two[:1])).figures)
+    assert {path.name for path in older - newer} == {"success_over_level.svg"}
+    assert not any(path.exists() for path in older - newer)
+
+
+def test_trials_whose_worker_died_are_failures_of_a_stage_of_their_own(tmp_path: Path) -> None:
+    lost = {"failure_stage": "worker", "failure_code": "time_limit", "failure_operation": None, "predicted": None}
+    made = report(write(tmp_path / "run", [row("contact", 0), row("contact", 1, False, **lost)]))
+    page = pages.lines(made.page)
+    assert "50.0 % 9.5 to 90.5 % n 2 executed: 100.0 %, n 1" in page
+    assert "worker: time_limit" in pages.behind(made.page)["words"]["why"]
+    assert "worker 1 of 2 (50.0 %)" in made.page.read_text(encoding="utf-8")
 
 
 def test_commands_are_split_by_a_shell_as_they_were_meant(made: Report) -> None:
