@@ -93,14 +93,14 @@ def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: 
 @FOLDERS
 def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
     began = time.monotonic()
-    rows = sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=6.0)
+    rows = sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=8.0)
     assert endings(rows) == {
         ("block_on_block", "hangs"): ("worker", "time_limit"),
         ("block_on_block", "raises"): ("correct", "raised"),
     }
-    assert 6.0 < time.monotonic() - began < 60.0
+    assert 8.0 < time.monotonic() - began < 300.0
     assert not asleep()
-    assert "6" not in rows[0]["sentence"]
+    assert "8" not in rows[0]["sentence"]
 
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
@@ -151,10 +151,19 @@ def test_processes_that_cannot_begin_are_given_up() -> None:
     assert MOST_FALSE_STARTS == 3
 
 
-def started(out: Path, *more: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "apo_bench.cli", "sweep", "block_on_block", "--careless", "0", "--out", str(out)]
+PATIENT = """
+import sys
+from apo_bench.benchmark import crew
+from apo_bench.cli import main
+crew.GRACE_S = float(sys.argv[1])
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def started(out: Path, *more: str, grace_s: float = 5.0) -> subprocess.Popen[str]:
+    asked = ["sweep", "block_on_block", "--careless", "0", "--out", str(out), "--workers", "1", *more]
     return subprocess.Popen(
-        [*command, "--workers", "1", *more],
+        [sys.executable, "-c", PATIENT, str(grace_s), *asked],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -198,7 +207,7 @@ def test_a_signal_ends_a_sweep_cleanly(tmp_path: Path) -> None:
     _, said = process.communicate(timeout=60)
     assert process.returncode == 143
     assert said == "apo-bench: ended by SIGTERM; what had ended is kept, and the same command continues.\n"
-    assert time.monotonic() - began < 30.0
+    assert time.monotonic() - began < 60.0
     assert 2 <= count(out) < 100
     assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
 
@@ -206,16 +215,15 @@ def test_a_signal_ends_a_sweep_cleanly(tmp_path: Path) -> None:
 @FOLDERS
 def test_a_second_interrupt_ends_at_once(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    process = started(out, "--methods", "unruly:raises,unruly:hangs", "--trials", "1", "--levels", "1")
+    process = started(out, "--methods", "unruly:raises,unruly:hangs", "--trials", "1", "--levels", "1", grace_s=600.0)
     wait_for(lambda: count(out) == 1 and bool(asleep()), process)
     process.send_signal(signal.SIGINT)
     time.sleep(1.0)
-    began = time.monotonic()
+    assert process.poll() is None
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert said == "apo-bench: interrupted; what had ended is kept, and the same command continues.\n"
-    assert time.monotonic() - began < 3.5
     assert not asleep()
 
 
