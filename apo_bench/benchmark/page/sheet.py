@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from apo_bench.benchmark.page.markup import Html, joined, tag
 from apo_bench.benchmark.page.paint import palette
 
 ACROSS = 3
-HEAD, LINE, GAP, TITLE = 40, 20, 18, 18
+LETTERS = 62
+"""Of a line of a title."""
+HEAD, LINE, GAP, TITLE = 40, 20, 18, 32
 """Heights of the title, of a line of the legend, of the space between panels and for their titles, px."""
 
 
@@ -29,7 +32,8 @@ def write_sheet(title: str, panels: Sequence[Panel], methods: Sequence[str], key
         line = panels[i : i + across]
         for j, one in enumerate(line):
             x = GAP + j * (WIDTH + GAP)
-            body.append(tag("text", one.title, x=x, y=y + 12))
+            for k, words in enumerate(textwrap.wrap(one.title, LETTERS)[:2]):
+                body.append(tag("text", words, x=x, y=y + 12 + 14 * k))
             size = {"x": x, "y": y + TITLE, "width": WIDTH, "height": one.height}
             body.append(tag("svg", one.drawing, viewBox=f"0 0 {WIDTH} {one.height}", **size))
         y += max(one.height for one in line) + GAP + TITLE
