@@ -1,11 +1,16 @@
 # Two commands do everything, on a machine with Python 3.11 or newer and make:
 #   make sweep   set up, run a small benchmark, print the table, write the report
 #   make test    set up, check style and types, run every test
+# and one the table of the project (100 trials per cell take hours):
+#   make headline [TRIALS=100] [FIDELITY=contact]
 
 PYTHON ?= python3
-TRIALS ?= 4
 WORKERS ?= 2
-OUT ?= runs/sweep
+FIDELITY ?= contact
+sweep: TRIALS ?= 4
+sweep: OUT ?= runs/sweep
+headline: TRIALS ?= 100
+headline: OUT ?= runs/headline_$(FIDELITY)
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,12 +20,17 @@ MIN := import sys; sys.exit(sys.version_info < (3, 11))
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep test clean
+.PHONY: sweep headline test clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
 	    --methods oracle,none,paper,contact --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
 	@$(BIN)/apo-bench report $(OUT) | tail -n 3
+
+headline: $(VENV)/.installed
+	$(BIN)/apo-bench sweep benchmarks/headline.toml --trials $(TRIALS) --fidelity $(FIDELITY) --workers $(WORKERS) \
+	    --out $(OUT)
+	$(BIN)/apo-bench report $(OUT)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

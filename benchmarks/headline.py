@@ -1,0 +1,164 @@
+"""Keep the headline: `python benchmarks/headline.py runs/headline [--full runs/headline_full]`.
+
+Takes a sweep of benchmarks/headline.toml (`make headline`) and writes benchmarks/results/headline/ (rows, table,
+figure, what was run) and docs/headline.md. With a second sweep, of the same grid at fidelity full, it also writes how
+far the verdicts of the two agree.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import lzma
+import shutil
+import statistics as middle
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from apo_bench.benchmark.compare import compare
+from apo_bench.benchmark.figure import draw
+from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.report import report
+from apo_bench.benchmark.statistics import Cell, rank, tally
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "benchmarks" / "results" / "headline"
+PAGE = ROOT / "docs" / "headline.md"
+LEFT_OUT = ("reached", "thresholds")
+"""Not kept of a row: the poses reached are most of its size, the thresholds are those of the scenario."""
+METHODS = ("none", "paper", "paper-track", "contact")
+
+Row = Mapping[str, Any]
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("folder", type=Path, help="the sweep of benchmarks/headline.toml")
+    asked.add_argument("--full", type=Path, help="a sweep of the same grid at fidelity full")
+    given = asked.parse_args()
+    rows = read_rows(given.folder)
+    made = report(given.folder)
+    KEPT.mkdir(parents=True, exist_ok=True)
+    shutil.copy(made.table, KEPT / "table.csv")
+    cells = tally(rows)
+    draw([cell for cell in cells if cell.method in METHODS and cell.level > 0], KEPT / "success_over_level.png")
+    ran = what_was_run(given.folder, rows)
+    (KEPT / "run.json").write_text(json.dumps(ran, indent=2) + "\n", encoding="utf-8")
+    lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)
+    packed = lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
+    (KEPT / "rows.jsonl.xz").write_bytes(packed)
+    agreement = agreed(given.full, given.folder) if given.full else []
+    PAGE.write_text("\n".join(page(cells, rows, ran, agreement)) + "\n", encoding="utf-8")
+    print(f"Wrote {KEPT} and {PAGE}")
+
+
+def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
+    """Versions, grids, code and times; the command is the one that does it again."""
+    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    times = [json.loads(line) for line in (folder / "timing.jsonl").read_text(encoding="utf-8").splitlines()]
+    spent = {(t["scenario"], t["method"]): [] for t in times}
+    for t in times:
+        spent[t["scenario"], t["method"]].append(t["trial_s"])
+    trials = run["grids"][0]["trials"]
+    return {
+        "command": f"make headline TRIALS={trials} FIDELITY={run['grids'][0]['fidelity']}",
+        **{key: run[key] for key in ("schema", "grids", "versions", "python", "platform", "content", "code")},
+        "rows": len(rows),
+        "replays": sum(row["sim_seconds"] is not None for row in rows),
+        "simulated_hours": round(sum(row["sim_seconds"] or 0.0 for row in rows) / 3600, 1),
+        "worker_hours": round(
+            sum((t["trial_s"] or 0) + (t["demonstrate_s"] or 0) + (t["compile_s"] or 0) for t in times) / 3600, 2
+        ),
+        "workers": len({t["worker"] for t in times}),
+        "median_trial_s": {f"{s}, {m}": round(middle.median(x), 3) for (s, m), x in sorted(spent.items())},
+    }
+
+
+def page(cells: Sequence[Cell], rows: Sequence[Row], ran: Mapping[str, Any], agreement: list[str]) -> list[str]:
+    least = min(cell.trials + cell.excluded for cell in cells)
+    fidelity, versions = ran["grids"][0]["fidelity"], ran["versions"]
+    main_cells = [cell for cell in cells if cell.method in METHODS and cell.level > 0]
+    rest = [cell for cell in cells if cell.level == 0.0]
+    other = sorted({cell.method for cell in cells} - {*METHODS, "oracle"}, key=lambda m: (rank(m), m))
+    return [
+        "# The headline",
+        "",
+        f"Written by `python benchmarks/headline.py` from the rows of `{ran['command']}`: {ran['rows']} trials, "
+        f"{ran['replays']} replays, at least {least} trials in each cell, fidelity `{fidelity}`; "
+        f"{ran['simulated_hours']} hours simulated or passed over in {ran['worker_hours']} hours of a process, "
+        f"{ran['workers']} at a time, on a machine with two cores that did other work meanwhile. MuJoCo "
+        f"{versions['mujoco']}, mink {versions['mink']}, NumPy {versions['numpy']}, Python {ran['python']}; everything "
+        "else in [run.json](../benchmarks/results/headline/run.json), rates with intervals in "
+        "[table.csv](../benchmarks/results/headline/table.csv), rows (without the poses reached) in `rows.jsonl.xz` "
+        "beside it.",
+        "",
+        "Strict success with a friction grasp and 0.25 mm clearance per side, Wilson's 95 % intervals. A level of L is "
+        "a standard deviation of L mm and L degrees per axis; carelessness 0 is a human who puts parts where they "
+        "belong, 1 one who adjusts them later, as in the paper. The same seeds for every method.",
+        "",
+        "![Success over level](../benchmarks/results/headline/success_over_level.png)",
+        "",
+        "| scenario | careless | level | " + " | ".join(f"`{m}`" for m in METHODS) + " |",
+        "|---|---|---|" + "---|" * len(METHODS),
+        *crossed(main_cells, METHODS),
+        "",
+        "## Without noise, and without any error",
+        "",
+        "| scenario | careless | level | `oracle` | " + " | ".join(f"`{m}`" for m in METHODS) + " |",
+        "|---|---|---|---|" + "---|" * len(METHODS),
+        *crossed(rest, ("oracle", *METHODS)),
+        "",
+        "`oracle` replays the drawn layout and meets neither noise nor carelessness.",
+        "",
+        "## Baselines at level 2, careless humans",
+        "",
+        "| scenario | careless | level | " + " | ".join(f"`{m}`" for m in other) + " |",
+        "|---|---|---|" + "---|" * len(other),
+        *crossed([cell for cell in cells if cell.method in other], other),
+        *agreement,
+    ]
+
+
+def crossed(cells: Sequence[Cell], methods: Sequence[str]) -> list[str]:
+    """One line per scenario, carelessness and level; one column per method."""
+    table: dict[tuple[str, float, float], dict[str, Cell]] = {}
+    for cell in cells:
+        table.setdefault((cell.scenario, cell.careless, cell.level), {})[cell.method] = cell
+    return [
+        f"| {scenario} | {careless:g} | {level:g} | " + " | ".join(counted(found.get(m)) for m in methods) + " |"
+        for (scenario, careless, level), found in sorted(table.items())
+    ]
+
+
+def counted(cell: Cell | None) -> str:
+    if cell is None:
+        return ""
+    low, high = cell.interval
+    return f"{cell.successes} of {cell.trials} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def agreed(full: Path, contact: Path) -> list[str]:
+    """How far verdicts at fidelity contact are those at fidelity full."""
+    found = compare(full, contact)
+    lines = [
+        "",
+        "## Fidelity",
+        "",
+        "The same trials at fidelity `full`, in which every step of every motion is simulated: how many have the same "
+        "strict verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first.",
+        "",
+        "| scenario | trials | same verdict | interval | same ending | right at `full` alone | at `contact` alone |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for a in found.agreements:
+        low, high = a.same.interval
+        lines.append(
+            f"| {a.scenario} | {a.same.trials} | {a.same.successes} ({100 * (a.same.rate or 0):.1f} %) "
+            f"| {100 * low:.1f} to {100 * high:.1f} % | {a.same_ending.successes} | {a.only_first} | {a.only_second} |"
+        )
+    return lines
+
+
+if __name__ == "__main__":
+    main()
