@@ -305,6 +305,24 @@ def test_news_are_told_again_until_they_have_arrived(monkeypatch: pytest.MonkeyP
     wait_for(lambda: [kind for kind, *_ in hand.news(3, 60.0)] == ["row", "done"])
 
 
+def test_code_that_ends_its_thread_ends_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thread that ends would leave its worker waiting for nothing until the limit of the trial."""
+    work, terms = terms_of(replace(SPEC, trials=1))
+    ended = threading.Event()
+
+    class Leaving:
+        def __init__(self, number: int, terms: Terms) -> None:
+            pass
+
+        def run(self, *_: Any) -> None:
+            sys.exit(0)
+
+    monkeypatch.setattr(ray_hand, "Worker", Leaving)
+    monkeypatch.setattr(ray_hand.os, "_exit", lambda code: ended.set())
+    ray_hand.Hand(0, pickle.dumps((terms, wanted(work))), "node 1").take(work[0])
+    assert ended.wait(60.0)
+
+
 class Away(Exception):
     """An answer that was lost, or is late."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import platform
 import queue
@@ -89,6 +90,7 @@ class Hand:
             return list(self._news)
 
     def _live(self) -> None:
+        """The life of the thread; code of the user's that ends it, as `sys.exit` does, ends the process."""
         try:
             worker = Worker(self._number, self._terms)
             while True:
@@ -98,6 +100,8 @@ class Hand:
             self._say("refused", str(error))
         except Exception:
             self._say("failed", traceback.format_exc())
+        except BaseException:
+            os._exit(1)
 
     def _began(self, spec: TrialSpec) -> None:
         self._say("began")
