@@ -218,6 +218,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, set[str]]:
     def keep(figure: Figure, path: Path, **_: Any) -> None:
         figure.draw_without_rendering()
         texts[Path(path).name] = {text.get_text() for text in figure.findobj(Text)}
+        Path(path).write_bytes(b"a picture")
 
     monkeypatch.setattr(Figure, "savefig", keep)
     return texts
