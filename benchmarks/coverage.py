@@ -221,6 +221,7 @@ def tables(asked: list[Setting], found: list[float], experiments: int) -> list[s
         f"| {r:.2f} | " + " | ".join(" / ".join(percent(name, n, r) for n in SEEDS) for name in names) + " |"
         for r in RATES
     ]
+    single = [line.replace(" / ".join("–" * len(SEEDS)), "–") for line in single]
     return [
         "",
         "Coverage in %, mean over the settings; `settings` are the lowest and the highest single one:",
