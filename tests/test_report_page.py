@@ -9,6 +9,7 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -155,6 +156,15 @@ def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
         "There is no run.json",
     ):
         assert sentence in page
+
+
+def test_figures_are_files_that_stand_alone(made: Report) -> None:
+    names = {path.stem for path in made.figures}
+    assert {"success_over_level", "difference_to_paper", "failure_stages", "gap_before_and_after", "timing"} <= names
+    for path in made.figures:
+        root = ElementTree.parse(path).getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert "http" not in path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
 
 
 def test_tables_are_the_same_as_parquet(made: Report) -> None:

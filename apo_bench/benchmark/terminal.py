@@ -71,9 +71,11 @@ def print_report(made: Report) -> None:
     say(summary(made.confusions[-1]))
     if made.no_pictures:
         say(f"{made.pictures} failures were drawn; of others: {'; '.join(made.no_pictures)}")
-    say(f"Tables:  {' '.join(map(str, made.tables))} (the same as .parquet)")
-    pictures = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
-    say(f"Figures: {' '.join(map(str, (*pictures, *made.figures)))}")
+    say(f"Tables:  {made.table} and {len(made.tables) - 1} more there, the same as .parquet")
+    png = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
+    drawn = [*png, *made.figures]
+    if drawn:
+        say(f"Figures: {drawn[0]} and {len(drawn) - 1} more there")
     say(f"Report:  {made.page}")
 
 
