@@ -227,6 +227,30 @@ def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsy
     assert "two lines | and bars" in pages.words(folder / "report.html")
 
 
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [row("contact", i, None) for i in range(3)],
+        [row("oracle", i) for i in range(3)],
+        [row("none", 0), row("contact", 0, relations="missed"), row("contact", 0, grasp="weld", fidelity="contact")],
+        [row("contact", 0, level=x, level_deg=y) for x, y in ((1.0, 2.0), (1.0, 1.0), (0.5, 0.25))],
+        [row(f"mine:m{k}") for k in range(20)],
+        [row("contact", 2**53 - 1), row("contact", 0, level=None, level_deg=None, careless=None)],
+    ],
+    ids=["excluded", "oracle", "conditions", "pairs of levels", "methods", "measured beside"],
+)
+def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
+    made = report(write(tmp_path / "run", trials))
+    assert len(pages.behind(made.page)["columns"]["seed"]) == sum(r["level"] is not None for r in trials)
+
+
+def test_measured_demonstrations_alone_are_no_sweep(tmp_path: Path) -> None:
+    from apo_bench.errors import InputError
+
+    with pytest.raises(InputError, match="belong to no cell"):
+        report(write(tmp_path / "run", [row("contact", level=None, level_deg=None, careless=None)]))
+
+
 def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
     two = [row("contact", level=x, level_deg=x) for x in (1.0, 2.0)]
     folder = write(tmp_path / "run", two)

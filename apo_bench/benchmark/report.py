@@ -86,6 +86,10 @@ def report(folder: str | Path, pictures: int = 0) -> Report:
     if not rows:
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     found = summary(rows)
+    if not found.cells:
+        raise InputError(
+            f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
+        )
     try:
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
