@@ -49,7 +49,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 
-    def run_trial(spec: Any, scene: Any, *, shown: str, content: str) -> dict[str, Any]:
+    def run_trial(spec: Any, scene: Any, *, shown: str, content: str, branches: Any) -> dict[str, Any]:
         did["trial"] += 1
         assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
@@ -305,3 +305,44 @@ def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp
 def test_there_is_no_such_eye() -> None:
     with pytest.raises(InputError, match="telescope"):
         replace(SPEC, eyes=("noise", "telescope"))
+
+
+def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str], tmp_path: Path) -> None:
+    rows = runner.sweep(SPEC, tmp_path)
+    rows[4]["spec_hash"] = "0" * 16
+    (tmp_path / "trials.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    with pytest.raises(
+        InputError, match=r"holds a row of stick_in_tower, method \w+, seed 1\d, that was made with other"
+    ):
+        runner.sweep(SPEC, tmp_path)
+
+
+def test_grasps_are_an_axis_and_share_demonstrations(counted: Counter[str], tmp_path: Path) -> None:
+    rows = runner.sweep(replace(SPEC, grasps=("friction", "weld")), tmp_path)
+    assert len({row_key(row) for row in rows}) == len(rows) == 2 * ROWS
+    assert {(row["method"], row["grasp"]) for row in rows} == {(m, g) for m in METHODS for g in ("friction", "weld")}
+    assert counted == {"scene": 2, "demonstration": 3 * 2, "trial": 2 * ROWS}
+
+
+def test_several_grids_make_one_folder(counted: Counter[str], tmp_path: Path) -> None:
+    further = replace(SPEC, levels=(1.0, 2.0), methods=("paper",), trials=1)
+    rows = runner.sweep([SPEC, further], tmp_path)
+    assert len({row_key(row) for row in rows}) == len(rows) == ROWS + 1
+    assert len(json.loads((tmp_path / "run.json").read_text())["grids"]) == 2
+    with pytest.raises(InputError, match="it had 2 grids, now 1"):
+        runner.sweep(SPEC, tmp_path)
+    assert runner.sweep([replace(SPEC, trials=4), further], tmp_path)[: len(rows)] == rows
+
+
+def test_a_file_and_flags_make_the_same_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench.cli import main
+
+    (tmp_path / "grid.toml").write_text(
+        'scenarios = ["block_on_block"]\nlevels = [40, 0]\ncareless = [0]\nmethods = ["snap"]\ntrials = 9\nseed = 2\n'
+    )
+    flags = ["block_on_block", "--levels", "40,0", "--careless", "0", "--methods", "snap", "--seed", "2"]
+    for name, asked in (("file", [str(tmp_path / "grid.toml")]), ("flags", flags)):
+        assert main(["sweep", *asked, "--trials", "1", "--workers", "1", "--out", str(tmp_path / name)]) == 0
+        assert "2 rows in" in capsys.readouterr().out
+    written = [(tmp_path / name / "trials.jsonl").read_bytes() for name in ("file", "flags")]
+    assert written[0] == written[1]
