@@ -38,6 +38,10 @@ def hangs(seen):
 def raises(seen):
     raise ZeroDivisionError(object())
 
+def forks(seen):
+    os.fork()
+    raise ValueError("twice")
+
 def nonsense(seen):
     return "goals"
 
@@ -67,6 +71,14 @@ def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]
         (row["scenario"], row["method"].removeprefix("unruly:")): (row["failure_stage"], row["failure_code"])
         for row in rows
     }
+
+
+def test_a_corrector_that_forks_has_one_row(tmp_path: Path) -> None:
+    rows = sweep(grid("forks", "raises", trials=2), tmp_path / "rows", workers=1)
+    assert sorted((row["seed"], row["method"]) for row in rows) == [
+        (seed, f"unruly:{method}") for seed in (0, 1) for method in ("forks", "raises")
+    ]
+    assert {row["failure_code"] for row in rows} == {"raised"}
 
 
 def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: Path) -> None:
