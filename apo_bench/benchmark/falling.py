@@ -2,8 +2,8 @@
 
 Success at level L is c g(b (log h - log L) + s): h is the level at which it is one half, b the steepness, c the ceiling
 (a share 1 - c fails whatever the level: lapses; F. A. Wichmann and N. J. Hill, The psychometric function I, Perception
-and Psychophysics 63, 2001, 1293-1313), and s is such that one half is at h. The shape g is a logistic function to a
-power, or one minus its mirror image to a power: from curves that leave the ceiling early to such that reach the floor
+and Psychophysics 63, 2001, 1293-1313), and s is such that one half is at h. The shape g is normal, or logistic to a
+power, or one minus the mirror image of that: from curves that leave the ceiling early to such that reach the floor
 early. The likelihood is looked up on a grid of (h, b, c, g), so data that fall from all to nothing between two levels,
 whose steepness has no largest likelihood, are no special case.
 
@@ -25,8 +25,8 @@ from apo_bench.geometry.arrays import Array
 STEEPNESS = np.geomspace(0.4, 40.0, 18)
 """Per unit of the natural logarithm: from hardly falling to a step."""
 CEILINGS = np.array([1.0, 0.98, 0.95, 0.9, 0.82, 0.7, 0.6])
-POWERS = np.array([-12.0, -3.0, 1.0, 3.0, 12.0])
-"""Of the shape; those of the mirror image are negative."""
+POWERS = np.array([-12.0, -3.0, 0.0, 1.0, 3.0, 12.0])
+"""Of the shape; those of the mirror image are negative, and 0 stands for the normal curve."""
 OTHERS = tuple(x.ravel() for x in np.meshgrid(STEEPNESS, CEILINGS, POWERS, indexing="ij"))
 """(m,) steepness, ceiling and power of every curve that has a half level."""
 CONSTANTS = 4
@@ -35,6 +35,8 @@ PER_UNIT = 40
 """Half levels per unit of the logarithm, between the smallest and the largest level."""
 OUTSIDE = np.array([0.05, 0.2, 0.5, 1.0, 2.0, 4.0])
 """How far beyond them others lie: enough to know that the likeliest is there."""
+NORMAL = 0.6
+"""A normal curve of this times the steepness is about as steep as the logistic one."""
 LEAST, STEP = 1e-9, 1e-4
 
 
@@ -71,13 +73,15 @@ def profile(log_levels: Array, success: Array) -> Profile:
 
 def curve(log_levels: Array, log_half: Array, steepness: Array, ceiling: Array, power: Array) -> Array:
     """Success at levels; everything is broadcast together."""
-    from scipy.special import expit, logit
+    from scipy.special import expit, logit, ndtr, ndtri
 
     half = 0.5 / ceiling
-    mirrored, n = power < 0, np.abs(power)
+    normal = ceiling * ndtr(NORMAL * steepness * (log_half - log_levels) + ndtri(half))
+    mirrored, n = power < 0, np.maximum(1.0, np.abs(power))
     shift = np.where(mirrored, -logit((1.0 - half) ** (1.0 / n)), logit(half ** (1.0 / n)))
     x = steepness * (log_half - log_levels) + shift
-    return np.asarray(ceiling * np.where(mirrored, 1.0 - expit(-x) ** n, expit(x) ** n))
+    lopsided = ceiling * np.where(mirrored, 1.0 - expit(-x) ** n, expit(x) ** n)
+    return np.asarray(np.where(power == 0, normal, lopsided))
 
 
 def variation(log_levels: Array, right: Array, known: Array, log_half: Array, others: tuple[Array, ...]) -> Array:
