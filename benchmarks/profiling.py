@@ -1,0 +1,150 @@
+"""Where the time of a replay goes: `python benchmarks/profiling.py`; writes docs/speed.md and results/profile.json.
+
+The physics and the inverse kinematics are timed inside replays; shares of one run are compared, so a busy machine
+matters little.
+"""
+
+from __future__ import annotations
+
+import cProfile
+import io
+import json
+import platform
+import pstats
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from apo_bench.benchmark.planning import plan
+from apo_bench.benchmark.stages import see, show
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.arm import Kinematics
+from apo_bench.simulation.replay import replay
+from apo_bench.simulation.scene import Scene, build_scene
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "benchmarks" / "results" / "profile.json"
+PAGE = ROOT / "docs" / "speed.md"
+SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
+METHODS = ("none", "paper", "paper-track")
+SEEDS = (0, 1, 2)
+
+
+class Clock:
+    """Adds up the wall time of calls."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            began = time.perf_counter()
+            try:
+                return function(*args, **kwargs)
+            finally:
+                self.seconds += time.perf_counter() - began
+
+        return timed
+
+
+def main() -> None:
+    scenes = {name: build_scene(load_scenario(name)) for name in SCENARIOS}
+    shares = [
+        share(scenes[name], method, fidelity)
+        for name in SCENARIOS
+        for method in METHODS
+        for fidelity in ("full", "contact")
+    ]
+    found = {
+        "command": "python benchmarks/profiling.py",
+        "versions": {"mujoco": mujoco.__version__, "python": platform.python_version()},
+        "seeds": list(SEEDS),
+        "shares": shares,
+        "profile": profile(scenes["pocket_table"]),
+    }
+    KEPT.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    PAGE.write_text("\n".join(page(found)) + "\n", encoding="utf-8")
+    print(f"Wrote {KEPT} and {PAGE}")
+
+
+def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
+    """Shares of the wall time of replays of a few seeds: level 1, careless humans."""
+    plans = [planned(scene, method, seed) for seed in SEEDS]
+    step, inverse = mujoco.mj_step, Kinematics.inverse
+    physics, kinematics, whole, passed = Clock(), Clock(), 0.0, 0.0
+    mujoco.mj_step, Kinematics.inverse = physics.around(step), kinematics.around(inverse)
+    try:
+        for each in plans:
+            began = time.perf_counter()
+            passed += replay(each, scene, fidelity=fidelity).sim_seconds
+            whole += time.perf_counter() - began
+    finally:
+        mujoco.mj_step, Kinematics.inverse = step, inverse
+    return {
+        "scenario": scene.scenario.name,
+        "method": method,
+        "fidelity": fidelity,
+        "replays": len(plans),
+        "seconds": round(whole / len(plans), 3),
+        "mj_step": round(physics.seconds / whole, 4),
+        "inverse_kinematics": round(kinematics.seconds / whole, 4),
+        "real_time_factor": round(passed / whole, 1),
+    }
+
+
+def planned(scene: Scene, method: str, seed: int) -> Any:
+    """What a method would have the robot do."""
+    shown = show(scene, 1.0, seed)
+    made = plan(method, see(scene, shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals)
+    assert made.plan is not None, made.refused
+    return made.plan
+
+
+def profile(scene: Scene, lines: int = 15) -> list[str]:
+    """The functions in which one replay at full fidelity spends most time themselves, under the profiler."""
+    todo, watch, told = planned(scene, "paper", 0), cProfile.Profile(), io.StringIO()
+    watch.enable()
+    replay(todo, scene)
+    watch.disable()
+    pstats.Stats(watch, stream=told).strip_dirs().sort_stats("tottime").print_stats(lines)
+    head = next(i for i, line in enumerate(told.getvalue().splitlines()) if line.lstrip().startswith("ncalls"))
+    return [line.rstrip() for line in told.getvalue().splitlines()[head : head + lines + 1]]
+
+
+def page(found: dict[str, Any]) -> list[str]:
+    shares = found["shares"]
+    full = [s for s in shares if s["fidelity"] == "full"]
+    least, most = min(s["mj_step"] for s in full), max(s["inverse_kinematics"] for s in full)
+    return [
+        "# Where the time of a replay goes",
+        "",
+        f"Written by `{found['command']}`: level 1, careless humans, seeds {found['seeds']}, one process, MuJoCo "
+        f"{found['versions']['mujoco']}. A replay is everything from a plan to the poses reached: grasps, inverse "
+        f"kinematics, physics. At full fidelity at least {100 * least:.0f} % of the wall time is inside `mj_step` and "
+        f"at most {100 * most:.0f} % is inverse kinematics. The real-time factor counts what `contact` passes over; "
+        "it is of a machine that did other work meanwhile, so compare it within the table only.",
+        "",
+        "| scenario | method | fidelity | seconds | in `mj_step` | inverse kinematics | real-time factor |",
+        "|---|---|---|---|---|---|---|",
+        *(
+            f"| {s['scenario']} | `{s['method']}` | {s['fidelity']} | {s['seconds']:.2f} | {100 * s['mj_step']:.0f} % "
+            f"| {100 * s['inverse_kinematics']:.1f} % | {s['real_time_factor']:.0f} |"
+            for s in shares
+        ),
+        "",
+        "The functions in which a replay of `pocket_table` at full fidelity spends most time themselves, as the "
+        "profiler sees them (it slows Python down, not the physics):",
+        "",
+        "```",
+        *found["profile"],
+        "```",
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
