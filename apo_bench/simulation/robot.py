@@ -106,14 +106,14 @@ class Robot:
         for T in unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
-    def wait(self, seconds: float, halves: bool = False) -> None:
-        """Stand still; in halves of a physics step if asked to."""
+    def wait(self, seconds: float, parts: int = 1) -> None:
+        """Stand still; each physics step may be taken in so many parts."""
         self.data.ctrl[self._drives] = self.q
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._every):
             n = min(self._every, steps - done)
-            with timestep(self.model, self.step_s / 2 if halves else self.step_s):
-                mujoco.mj_step(self.model, self.data, 2 * n if halves else n)
+            with timestep(self.model, self.step_s / parts):
+                mujoco.mj_step(self.model, self.data, parts * n)
             if n == self._every:
                 self._look()
 
