@@ -1,8 +1,8 @@
-"""Keep the headline: `python benchmarks/headline.py runs/headline [--full runs/headline_full]`.
+"""Keep the headline: `python benchmarks/headline.py runs/headline_contact [--full runs/headline_full]`.
 
 Takes a sweep of benchmarks/headline.toml (`make headline`) and writes benchmarks/results/headline/ (rows, table,
 figure, what was run) and docs/headline.md. With a second sweep, of the same grid at fidelity full, it also writes how
-far the verdicts of the two agree.
+far the verdicts of the two agree. `--trials N` takes the first N seeds of a sweep that is not at its end.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import json
 import lzma
 import shutil
 import statistics as middle
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,19 +37,38 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("folder", type=Path, help="the sweep of benchmarks/headline.toml")
     asked.add_argument("--full", type=Path, help="a sweep of the same grid at fidelity full")
+    asked.add_argument("--trials", type=int, help="how many seeds to take")
     given = asked.parse_args()
-    rows = read_rows(given.folder)
-    made = report(given.folder)
+    with tempfile.TemporaryDirectory() as copy:
+        shorten(given.folder, Path(copy), given.trials)
+        keep(Path(copy), given.full)
+
+
+def shorten(folder: Path, copy: Path, trials: int | None) -> None:
+    """Copy a sweep, or its first seeds."""
+    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    for grid in run["grids"]:
+        grid["trials"] = trials or grid["trials"]
+    end = run["grids"][0]["seed"] + run["grids"][0]["trials"]
+    (copy / "run.json").write_text(json.dumps(run), encoding="utf-8")
+    for name in ("trials.jsonl", "timing.jsonl"):
+        lines = (folder / name).read_text(encoding="utf-8").splitlines()
+        kept = [line for line in lines if json.loads(line)["seed"] < end]
+        (copy / name).write_text("".join(f"{line}\n" for line in kept), encoding="utf-8")
+
+
+def keep(folder: Path, full: Path | None) -> None:
+    rows = read_rows(folder)
     KEPT.mkdir(parents=True, exist_ok=True)
-    shutil.copy(made.table, KEPT / "table.csv")
+    shutil.copy(report(folder).table, KEPT / "table.csv")
     cells = tally(rows)
     draw([cell for cell in cells if cell.method in METHODS and cell.level > 0], KEPT / "success_over_level.png")
-    ran = what_was_run(given.folder, rows)
+    ran = what_was_run(folder, rows)
     (KEPT / "run.json").write_text(json.dumps(ran, indent=2) + "\n", encoding="utf-8")
     lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)
     packed = lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
     (KEPT / "rows.jsonl.xz").write_bytes(packed)
-    agreement = agreed(given.full, given.folder) if given.full else []
+    agreement = agreed(full, folder) if full else []
     PAGE.write_text("\n".join(page(cells, rows, ran, agreement)) + "\n", encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
 
