@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from itertools import groupby
 
 import mujoco
 import numpy as np
@@ -19,10 +20,10 @@ from apo_bench.simulation.branches import Branches, marks
 from apo_bench.simulation.leap import leap
 from apo_bench.simulation.paths import Line, minimum_jerk, moved, smooth
 from apo_bench.simulation.prepare import moves
-from apo_bench.simulation.replay import replay
+from apo_bench.simulation.replay import LOOK_S, PATIENCE_S, _until_rest, replay
 from apo_bench.simulation.robot import Robot
 from apo_bench.simulation.scene import build_scene
-from apo_bench.simulation.world import SLEEP, fresh, part_pose, sleeping
+from apo_bench.simulation.world import SLEEP, fresh, part_pose, sleeping, timestep
 
 
 @cache
@@ -206,3 +207,41 @@ def test_sleep_ends_with_the_replay():
 def test_contact_is_refused_for_the_ideal_gripper():
     with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
         TrialSpec("stick_in_tower", grasp="weld", fidelity="contact")
+
+
+class Restless:
+    """A robot beside parts that move for so many waits."""
+
+    def __init__(self, waits: float):
+        self.scene, self.data, self.waits, self.parts = scene(), fresh(scene().work, shown().layout.start), waits, []
+        self.data.qvel[self.scene.work.dof["stick"]] = 1.0
+
+    def wait(self, seconds, parts=1):
+        assert seconds == LOOK_S
+        self.parts.append(parts)
+        if len(self.parts) >= self.waits:
+            self.data.qvel[:] = 0.0
+
+
+def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
+    forever, soon = Restless(np.inf), Restless(3)
+    for one in (forever, soon):
+        _until_rest(one)
+    assert len(forever.parts) == round(PATIENCE_S / LOOK_S)
+    lengths = [parts for parts, _ in groupby(forever.parts)]
+    assert lengths == [1, 4, 8, 2, 3]
+    assert forever.parts.count(1) * LOOK_S == pytest.approx(0.32)
+    assert soon.parts == [1] * 4, "two looks at rest in a row"
+
+
+@pytest.mark.parametrize(("method", "level", "seed"), [("contact", 4.0, 1), ("paper", 2.0, 64)])
+def test_sticks_that_rocked_for_ever_come_to_rest(method, level, seed):
+    spec = TrialSpec("stick_in_tower", level, level, 1.0, method=method, seed=seed)
+    assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
+
+
+def test_steps_of_another_length_are_for_a_while():
+    model = scene().work.model
+    with pytest.raises(IndexError), timestep(model, 0.0005):
+        [][round(model.opt.timestep / 0.0005) - 1]
+    assert model.opt.timestep == 0.001
