@@ -5,11 +5,8 @@ Lengths in mm, angles in degrees, operations numbered from 1; `scenarios/stick_i
 
 from __future__ import annotations
 
-import datetime
-import tomllib
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,10 +19,10 @@ from apo_bench.scenario_checks import check_scenario
 from apo_bench.scenario_entries import Entry, read_operations, read_parts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_span, refuse
 from apo_bench.strict_json import Node
+from apo_bench.strict_toml import read_toml
 from apo_bench.thresholds import Thresholds
 
 SCHEMA = 1
-LARGEST_BYTES = 1_000_000
 LARGEST_CLEARANCE_MM = 5.0
 
 
@@ -46,7 +43,7 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     if isinstance(given, Scenario):
         return given
     path = _path(given)
-    scenario, stated = _scenario(Node(_document(path), str(path)), path)
+    scenario, stated = _scenario(read_toml(path, "scenario file"), path)
     check_scenario(scenario, str(path))
     return with_lines(scenario, stated, str(path))
 
@@ -59,44 +56,6 @@ def _path(given: str | Path) -> Path:
     if given not in scenario_names():
         raise InputError(unknown("scenario", given, scenario_names()) + " Or give the path of a .toml file.")
     return folder("scenarios") / f"{given}.toml"
-
-
-def _document(path: Path) -> dict[str, Any]:
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: a folder was given; give a scenario file, which ends in .toml.")
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path}: this is no ordinary file; give a scenario file, which ends in .toml.")
-        with path.open("rb") as stream:
-            raw = stream.read(LARGEST_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: the scenario file cannot be read ({error.strerror}); check the path.") from error
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a .toml file.") from error
-    if len(raw) > LARGEST_BYTES:
-        raise InputError(f"{path}: the file is larger than 1 MB; a scenario is a page of text.")
-    try:
-        document = tomllib.loads(raw.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a TOML file.") from error
-    except (ValueError, RecursionError) as error:
-        what = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "nested too deep, or a huge number"
-        raise InputError(f"{path}: this is not TOML: {what}; mend the file at that place.") from error
-    _refuse_dates(Node(document, str(path)))
-    return document
-
-
-def _refuse_dates(node: Node) -> None:
-    """No key of a scenario is a date."""
-    if isinstance(node.value, datetime.date | datetime.time):
-        refuse(node, f"the date or time {node.value} was given, which no key takes; put a text into quotes")
-    entries = node.value.items() if isinstance(node.value, dict) else ()
-    for key, value in entries:
-        _refuse_dates(node.child(value, key))
-    for i, value in enumerate(node.value if isinstance(node.value, list) else (), start=1):
-        _refuse_dates(node.child(value, f"entry {i}"))
 
 
 def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from apo_bench.errors import InputError
 from apo_bench.observation.camera import Camera
 from apo_bench.observation.empirical import PREFIX, Empirical, empirical_noise
 from apo_bench.observation.fitted import LEAST_FREEDOM, SMALLEST, Fitted, Measured
@@ -17,9 +14,9 @@ from apo_bench.observation.tails import Split, Tail
 from apo_bench.resources import folder
 from apo_bench.scenario_keys import read_pose
 from apo_bench.strict_json import Node
+from apo_bench.strict_toml import read_toml
 
 SCHEMA = "apo-bench/noise/1"
-LARGEST_BYTES = 100_000
 FARTHEST_MM = 1e5
 HUGE = 1e300
 """Degrees of freedom beyond are infinitely many."""
@@ -59,7 +56,7 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
 
 def read_noise(path: str | Path) -> tuple[Measured, Camera]:
     """What a noise file states, and the camera it names, else the default one."""
-    root = _document(Path(path))
+    root = read_toml(path, "noise file")
     if isinstance(root.value, dict) and root.value.get("schema", SCHEMA) != SCHEMA:
         root.child(root.value["schema"], "schema").fail(f'"{SCHEMA}" is needed')
     required = ("schema", "source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
@@ -116,34 +113,3 @@ def _number(node: Node, low: float, high: float) -> float:
     if isinstance(x, bool) or not isinstance(x, int | float) or not low <= x <= high:
         node.fail(f"a number from {low:g}{' on, or inf,' if high == math.inf else f' to {high:g}'} is needed")
     return float(x) if x < HUGE else math.inf
-
-
-def _document(path: Path) -> Node:
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: a folder was given; give a noise file, which ends in .toml.")
-        with path.open("rb") as stream:
-            raw = stream.read(LARGEST_BYTES + 1)
-        if len(raw) > LARGEST_BYTES:
-            raise InputError(f"{path}: the file is larger than {LARGEST_BYTES // 1000} kB; give a noise file.")
-        return Node(_plain(tomllib.loads(raw.decode("utf-8-sig")), path), str(path))
-    except OSError as error:
-        raise InputError(f"{path}: the noise file cannot be read ({error.strerror}); check the path.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a noise file.") from error
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, InputError):
-            raise
-        what = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "nested too deep, or a huge number"
-        raise InputError(f"{path}: this is not TOML: {what}; mend the file at that place.") from error
-
-
-def _plain(value: Any, path: Path) -> Any:
-    """The same, without dates and times, which no key of a noise file takes."""
-    if isinstance(value, dict):
-        return {key: _plain(entry, path) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_plain(entry, path) for entry in value]
-    if not isinstance(value, str | int | float | bool):
-        raise InputError(f"{path}: the date or time {value} was given, which no key takes; put a text into quotes.")
-    return value
