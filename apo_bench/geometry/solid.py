@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import final
 
@@ -29,19 +30,19 @@ class Face:
         object.__setattr__(self, "outline", frozen(self.outline, None, 3))
         object.__setattr__(self, "holes", tuple(frozen(hole, None, 3) for hole in self.holes))
 
-    @property
+    @cached_property
     def normal(self) -> Array:
         """The outward unit normal, (3,) (Newell's formula: right for concave outlines too)."""
         corners = self.outline - self.outline[0]
         M = corners.T @ np.concatenate([corners[1:], corners[:1]])
         n = np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
-        return n / np.sqrt(n @ n)
+        return frozen(n / np.sqrt(n @ n), 3)
 
-    @property
+    @cached_property
     def plane(self) -> Array:
         """The face equation (n_x, n_y, n_z, -d) of Eq. 1, (4,), d in [m]."""
         n = self.normal
-        return np.append(n, -n @ self.outline.mean(axis=0))
+        return frozen(np.append(n, -n @ self.outline.mean(axis=0)), 4)
 
 
 @final

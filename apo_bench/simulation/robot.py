@@ -22,7 +22,7 @@ from apo_bench.simulation.near import Moving, clear, near_spans
 from apo_bench.simulation.paths import Line, smooth, unwound
 from apo_bench.simulation.reach import along, at_end
 from apo_bench.simulation.scene import Scene
-from apo_bench.simulation.world import fresh, part_pose, timestep, unstable
+from apo_bench.simulation.world import fresh, part_pose, timestep, unfelt, unstable
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
@@ -112,8 +112,10 @@ class Robot:
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._every):
             n = min(self._every, steps - done)
+            with timestep(self.model, self.step_s / parts), unfelt(self.model):
+                mujoco.mj_step(self.model, self.data, parts * n - 1)
             with timestep(self.model, self.step_s / parts):
-                mujoco.mj_step(self.model, self.data, parts * n)
+                mujoco.mj_step(self.model, self.data)
             if n == self._every:
                 self._look()
 
@@ -211,15 +213,32 @@ class Robot:
         rows = np.repeat(data.ctrl[None], len(targets), axis=0)
         rows[:, self._drives] = targets
         ctrl = data.ctrl
+        if guard is None:
+            self._run_free(rows)
+            return len(targets)
         for i, row in enumerate(rows, start=1):
             ctrl[:] = row
             step(model, data)
-            if guard is not None and self._pushed_back(guard):
+            if self._pushed_back(guard):
                 self._look()
                 return i
             if i % every == 0:
                 self._look()
         return len(targets)
+
+    def _run_free(self, rows: Array) -> None:
+        """Step through commands (n, controls) that no guard watches: forces are felt once a tick, when it looks."""
+        model, data, step, ctrl = self.model, self.data, mujoco.mj_step, self.data.ctrl
+        for i in range(0, len(rows), self._every):
+            tick = rows[i : i + self._every]
+            with unfelt(model):
+                for row in tick[:-1]:
+                    ctrl[:] = row
+                    step(model, data)
+            ctrl[:] = tick[-1]
+            step(model, data)
+            if len(tick) == self._every:
+                self._look()
 
     def _look(self) -> None:
         """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""

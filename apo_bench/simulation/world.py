@@ -16,6 +16,7 @@ from apo_bench.program import Poses, Snapshot
 
 Ints = NDArray[np.int64]
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
 
 @final
@@ -113,6 +114,17 @@ def timestep(model: Any, seconds: float) -> Iterator[None]:
         yield
     finally:
         model.opt.timestep = before
+
+
+@contextmanager
+def unfelt(model: Any) -> Iterator[None]:
+    """Steps after which no sensor is asked: they need not be computed for a while."""
+    before = int(model.opt.disableflags)
+    model.opt.disableflags = before | NO_SENSORS
+    try:
+        yield
+    finally:
+        model.opt.disableflags = before
 
 
 def awaken(world: World, data: Any) -> None:
