@@ -19,8 +19,9 @@ from apo_bench.simulation.paths import Line
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import Ints, part_pose
 
-NEAR_M = 0.003
-APART_M = 0.002
+NEAR_M, NEAR_GROUP_M = 0.00015, 0.002
+"""A part drifts by less than the first in a hand; parts of a group have that much play and more in each other."""
+APART_M = 0.001
 """Looks along a line are this far apart."""
 RUN_UP_S = 0.04
 """A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
@@ -59,7 +60,8 @@ def near_spans(
     far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
     looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, 1.0, APART_M / max(far, APART_M))), n))
     poses = {part: _pose(scene, data, part) for part in others}
-    near = _near(moving, {part: (scene.boxes[part], T) for part, T in poses.items()}, line, s[looks])
+    obstacles = {part: (scene.boxes[part], T) for part, T in poses.items()}
+    near = _near(moving, obstacles, line, s[looks], NEAR_M if len(held) < 2 else NEAR_GROUP_M)
     return _spans(near, looks, n, float(scene.physics.timestep_s))
 
 
@@ -69,7 +71,11 @@ def clear(scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ..
 
 
 def _near(
-    moving: Iterable[Moving], obstacles: Mapping[str, tuple[tuple[Box, ...], Array]], line: Line, s: Array
+    moving: Iterable[Moving],
+    obstacles: Mapping[str, tuple[tuple[Box, ...], Array]],
+    line: Line,
+    s: Array,
+    margin: float,
 ) -> Flags:
     """(k,), at which places along the line something is near."""
     angle = float(np.linalg.norm(line.turn))
@@ -84,12 +90,12 @@ def _near(
             low, high = _swept(low, high)
         for others, T in obstacles.values():
             bottom, top = upright(others, T[:3, :3], T[:3, 3])
-            may = ((tips + low < top + NEAR_M) & (tips + high > bottom - NEAR_M)).all(axis=1) & ~near
+            may = ((tips + low < top + margin) & (tips + high > bottom - margin)).all(axis=1) & ~near
             if turning:
                 near |= may
             elif may.any():
                 at = tips[may] + R @ T_tip[:3, 3]
-                near[may] = depths(boxes, R @ T_tip[:3, :3], at, others, T) > -NEAR_M
+                near[may] = depths(boxes, R @ T_tip[:3, :3], at, others, T) > -margin
     return near
 
 
