@@ -8,10 +8,13 @@ from typing import Annotated
 
 import typer
 
+from apo_bench.arguments import path_given
 from apo_bench.errors import InputError
 
 MOST_PICTURES = 100
-Folder = Annotated[Path, typer.Argument(help="The folder that `sweep --out` wrote.")]
+Folder = Annotated[
+    Path, typer.Argument(parser=path_given, metavar="FOLDER", help="The folder that `sweep --out` wrote.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -36,9 +39,16 @@ def report(
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(help="The folder of a sweep.")],
-    second: Annotated[Path, typer.Argument(help="Another one, of the same seeds.")],
-    out: Annotated[Path | None, typer.Option(help="Folder of the page and its tables; default: comparison.")] = None,
+    first: Annotated[Path, typer.Argument(parser=path_given, metavar="FIRST", help="The folder of a sweep.")],
+    second: Annotated[
+        Path, typer.Argument(parser=path_given, metavar="SECOND", help="Another one, of the same seeds.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            parser=path_given, metavar="<path>", help="Folder of the page and its tables; default: comparison."
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Compare two sweeps trial by trial: two versions, machines or fidelities; write compare.html."""

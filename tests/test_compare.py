@@ -21,6 +21,20 @@ from tests.test_statistics import row, write
 EVIL = "<script>document.title='broken'</script>"
 
 
+@pytest.mark.parametrize("command", [["report", ""], ["compare", "", "b"], ["compare", "a", " "]])
+def test_an_empty_path_does_not_stand_for_this_folder(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(command) == 2
+    assert "an empty path was given" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("value", ["yes", 1, 0.5, [], "true"])
+def test_a_verdict_that_is_none_is_refused(value: Any, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        write(tmp_path / name, [row("contact", 1, True) | {"success": value}])
+    with pytest.raises(InputError, match="whose 'success' is neither true, false nor null"):
+        compare(tmp_path / "a", tmp_path / "b")
+
+
 def first() -> list[dict[str, Any]]:
     made = [row("contact", seed, seed % 4 > 0, worst_gap_mm=0.1 + seed / 100) for seed in range(40)]
     made += [row("paper", seed, True, scenario=f"other {EVIL}", worst_gap_mm=0.2) for seed in range(10)]

@@ -38,6 +38,9 @@ def hangs(seen):
 def raises(seen):
     raise ZeroDivisionError(object())
 
+def halves(seen):
+    raise ValueError("half a letter: \\ud800")
+
 def forks(seen):
     os.fork()
     raise ValueError("twice")
@@ -71,6 +74,12 @@ def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]
         (row["scenario"], row["method"].removeprefix("unruly:")): (row["failure_stage"], row["failure_code"])
         for row in rows
     }
+
+
+def test_what_a_corrector_says_can_be_written_as_text(tmp_path: Path) -> None:
+    (said,) = sweep(grid("halves"), tmp_path / "rows")
+    assert "half a letter" in said["sentence"]
+    said["sentence"].encode()
 
 
 def test_a_corrector_that_forks_has_one_row(tmp_path: Path) -> None:

@@ -63,6 +63,9 @@ def _slim(row: Mapping[str, Any], foretold: dict[Any, Any], folder: str | Path) 
     for name in NEEDED:
         if name not in row:
             raise _wrong(row, folder, f"without '{name}'")
+    for name in ("success", "loose_success"):
+        if row[name] is not None and type(row[name]) is not bool:
+            raise _wrong(row, folder, f"whose '{name}' is neither true, false nor null ({row[name]!r})")
     for name in NUMBERS:
         x = row.get(name)
         if x is not None and (type(x) not in (int, float) or not math.isfinite(x)):

@@ -116,7 +116,7 @@ def misbehaved(spec: TrialSpec, content: str, demonstration: str, said: str) -> 
     Args:
         said: What it did; addresses of objects, which differ from run to run, are left out.
     """
-    said = ADDRESS.sub("0x...", said)[:LONGEST_SENTENCE]
+    said = ADDRESS.sub("0x...", said.encode(errors="replace").decode())[:LONGEST_SENTENCE]
     return _failed(spec, content, demonstration, Ending("correct", "raised", None, said))
 
 
