@@ -17,7 +17,7 @@ AFTERWARDS = """
     sweep_file terminal
 """
 LEFT_OUT = (
-    *("cli*.py", "arguments.py", "strict_toml.py", "benchmark/page/*", "benchmark/figure*.py", "benchmark/graph_*.py"),
+    *("cli*.py", "arguments.py", "benchmark/page/*", "benchmark/figure*.py", "benchmark/graph_*.py"),
     *("benchmark/*_picture.py", "benchmark/*_table.py", "benchmark/*_text.py", "benchmark/*card.py"),
     *(f"benchmark/{name}.py" for name in AFTERWARDS.split()),
 )
