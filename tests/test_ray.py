@@ -34,7 +34,7 @@ from apo_bench.errors import InputError
 from apo_bench.resources import folder
 from apo_bench.simulation.arm import find_arm
 
-SPEC = SweepSpec(("block_on_block",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=16)
+SPEC = SweepSpec(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
 CODE = """
 import os, time
@@ -172,8 +172,8 @@ def test_a_node_that_is_lost_costs_no_row_and_changes_none(cluster: Any, here: l
 @pytest.mark.slow
 def test_a_driver_that_is_stopped_or_killed_goes_on_later(cluster: Any, here: list[bytes], tmp_path: Path) -> None:
     out = tmp_path / "run"
-    asked = ["--levels", "1", "--careless", "0", "--methods", "none,paper", "--trials", "16", "--out", str(out)]
-    command = [sys.executable, "-m", "apo_bench.cli", "sweep", "block_on_block", *asked]
+    asked = ["--levels", "1", "--careless", "0", "--methods", "none,paper", "--trials", "5", "--out", str(out)]
+    command = [sys.executable, "-m", "apo_bench.cli", "sweep", "carried_bridge", *asked]
     command += ["--backend", "ray", "--address", cluster.address]
 
     def start() -> subprocess.Popen[str]:
@@ -246,7 +246,7 @@ def test_what_speaks_against_a_node_is_one_sentence(own: Path) -> None:
     other = dict.fromkeys(terms.content, "0" * 16)
     changed = dict.fromkeys(asked.content, "0" * 16)
     for packed, words in (
-        ((replace(terms, content=other), asked), "other code or other files for 'block_on_block'"),
+        ((replace(terms, content=other), asked), "other code or other files for 'carried_bridge'"),
         ((terms, replace(asked, content=changed)), "the file behind the method code_of_mine:raises is another one"),
         ((terms, replace(asked, methods=("not_there:at_all",))), "cannot be imported"),
         ((terms, replace(asked, scenarios=("missing.toml",))), "missing.toml"),
