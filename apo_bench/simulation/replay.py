@@ -22,7 +22,7 @@ REST_M_S, REST_RAD_S = 5e-5, 1e-3
 LOOK_S, PATIENCE_S = 0.04, 1.5
 STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
 """What has moved so long, [s], rocks: steps are taken in so many parts. Of 19 states that rocked on for ever in whole
-steps quarters end 17, halves 11, and all of these in turn every one."""
+steps quarters end 17, halves 10, and all of these in turn every one."""
 
 
 def replay(
