@@ -278,7 +278,7 @@ def test_a_row_without_replay_is_a_failure_with_null_physics(
     monkeypatch.setattr("apo_bench.benchmark.planning.correct", lambda seen, method: refuses(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
     assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
-    assert (row["freed"], row["gap_after_mm"]) == ([3, 2], 1.0)
+    assert (row["freed"], row["gap_after_mm"]) == ([3, 2], None)
     assert row["tried"] == [{"step": 3, "free": [3], "gap_mm": None}]
     assert row["predicted"] is row["extra_operations"] is None
     assert row["reached"] is row["sim_seconds"] is row["conditions"] is None

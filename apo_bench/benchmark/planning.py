@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -23,6 +24,7 @@ class Planned:
     tried: tuple[Try, ...]
     gap_before_m: float
     gap_after_m: float
+    """Of the plan; not a number where there is none."""
     correction: Correction | None = None
     """What the corrector returned; None where none was asked."""
 
@@ -47,7 +49,7 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
         freed=made.freed,
         tried=made.tried,
         gap_before_m=made.gap_before_m,
-        gap_after_m=made.gap_after_m,
+        gap_after_m=made.gap_after_m if made.ok else math.nan,
         correction=made,
     )
 
@@ -66,5 +68,6 @@ def refusal(made: Correction) -> Ending:
 
 def _as_it_is(seen: Observation, goals: Array, refused: Ending | None) -> Planned:
     open_m = gap(seen.assembly, seen.start, goals)
-    made = None if refused else Plan(seen.assembly, seen.start, goals)
-    return Planned(made, refused, (), (), open_m, open_m)
+    if refused:
+        return Planned(None, refused, (), (), open_m, math.nan)
+    return Planned(Plan(seen.assembly, seen.start, goals), None, (), (), open_m, open_m)

@@ -117,7 +117,8 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("ended", row["sentence"]),
     ]
     if row["gap_before_mm"] is not None:
-        gaps = f"{row['gap_before_mm']:.3f} mm as seen, {row['gap_after_mm'] or 0.0:.3f} mm as planned"
+        gaps = f"{row['gap_before_mm']:.3f} mm as seen"
+        gaps += "" if row["gap_after_mm"] is None else f", {row['gap_after_mm']:.3f} mm as planned"
         lines.append(("contact gap", gaps))
     for attempt in row["tried"] or ():
         lines.append((f"after step {attempt['step']}", _attempt(attempt)))
