@@ -22,12 +22,14 @@ from apo_bench import (
     cli_plan,
     cli_power,
     cli_recognition,
+    cli_replay,
     cli_report,
     cli_show,
     cli_sweep,
 )
 from apo_bench.arguments import check_writable
-from apo_bench.cli_sweep import EYE, FIDELITY, NOISE, RELATIONS, Interrupted
+from apo_bench.cli_replay import NO_RESULT, ArmOption, Clearance, GraspOption, ScenarioArgument, Timestep
+from apo_bench.cli_sweep import Interrupted
 from apo_bench.errors import InputError
 
 app = typer.Typer(
@@ -38,14 +40,7 @@ app = typer.Typer(
 )
 
 WRONG_REQUEST = 2
-NO_RESULT = 1
 INTERRUPTED = 130
-
-ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
-Clearance = Annotated[float | None, typer.Option(help="mm per side of parts that fit; default: the scenario's.")]
-GraspOption = Annotated[str, typer.Option(help="friction, or weld for an ideal gripper.")]
-ArmOption = Annotated[str, typer.Option(help="Name of the arm, or package.module:name.")]
-Timestep = Annotated[float, typer.Option(help="Time step of the physics in ms: 1 for tables, 0.5 to check.")]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -169,69 +164,7 @@ def scene(
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
 
 
-@app.command()
-def replay(
-    scenario: ScenarioArgument,
-    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees, standard deviation; default 1.")] = None,
-    level_mm: Annotated[float | None, typer.Option(help="Only the mm; default: the level.")] = None,
-    level_deg: Annotated[float | None, typer.Option(help="Only the degrees; default: the level.")] = None,
-    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
-    method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "none",
-    clearance: Clearance = None,
-    grasp: GraspOption = "friction",
-    arm: ArmOption = "six_axis",
-    noise: Annotated[str | None, typer.Option(help=f"{NOISE}; default: isotropic.")] = None,
-    relations: Annotated[str | None, typer.Option(help=f"{RELATIONS}; default: given.")] = None,
-    eye: Annotated[str | None, typer.Option(help=f"{EYE}; default: noise.")] = None,
-    timestep_ms: Timestep = 1.0,
-    fidelity: Annotated[str, typer.Option(help=FIDELITY)] = "full",
-    observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,
-    save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
-    video: Annotated[Path | None, typer.Option(help="Write a film of the replay: .mp4 or .gif.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
-) -> None:
-    """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
-    from apo_bench.benchmark.one import Request, run_one
-    from apo_bench.benchmark.terminal import print_row
-
-    for path, option, endings in (
-        (video, "--video", (".mp4", ".gif")),
-        (save_observation, "--save-observation", (".json",)),
-    ):
-        if path is not None:
-            check_writable(path, option, endings)
-    row = run_one(
-        Request(
-            scenario=scenario,
-            level=level,
-            level_mm=level_mm,
-            level_deg=level_deg,
-            careless=careless,
-            noise=noise,
-            relations=relations,
-            eye=eye,
-            seed=seed,
-            method=method,
-            clearance_mm=clearance,
-            grasp=grasp,
-            arm=arm,
-            timestep_s=timestep_ms * 1e-3,
-            fidelity=fidelity,
-            observation=observation,
-            save_observation=save_observation,
-            video=video,
-        )
-    )
-    if as_json:
-        typer.echo(json.dumps(row, allow_nan=False))
-    else:
-        print_row(row)
-    if video is not None and row["sim_seconds"] is None:
-        typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
-    if row["success"] is None:
-        raise typer.Exit(NO_RESULT)
-
+cli_replay.register(app)
 
 if __name__ == "__main__":
     sys.exit(main())

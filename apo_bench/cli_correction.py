@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -10,6 +11,7 @@ import typer
 
 from apo_bench.arguments import check_writable
 from apo_bench.errors import InputError
+from apo_bench.output import aside
 from apo_bench.program import Correction, Observation, Plan
 
 NO_RESULT = 1
@@ -98,7 +100,8 @@ def correct(
             )
     corrector = _corrector(method, if_doubtful)
     seen, loaded, assumed = observed(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
-    made = corrected(seen, corrector)
+    with aside() if as_json else nullcontext():
+        made = corrected(seen, corrector)
     found = _explained(seen, made)
     if as_json:
         typer.echo(json.dumps(correction_form(loaded.name, method, seen, made, found, assumed), allow_nan=False))

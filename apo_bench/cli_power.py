@@ -56,7 +56,7 @@ def rate(
     reached = wilson_half_width(rate, n)
     _say(
         {"question": "rate", "rate": rate, "half_width": half_width, "trials": n, "reached": reached},
-        f"{n} trials: at a rate of {rate:g} Wilson's 95 % interval then reaches {100 * reached:.2f} points to either "
+        f"{n} trials: at a rate of {rate:g} Wilson's 95 % interval then reaches {100 * reached:.3g} points to either "
         "side of its middle.",
         as_json,
     )

@@ -72,13 +72,14 @@ class Node:
             self.fail(f"{size} finite numbers are needed")
         return array
 
-    def number(self, low: float, *, above: bool = False) -> float:
-        """A finite number that is at least `low`, or above it."""
-        wanted = f"a finite number {'above' if above else 'from'} {low:g} is needed"
+    def number(self, low: float, high: float = math.inf, *, above: bool = False) -> float:
+        """A finite number that is at least `low`, or above it, and at most `high`."""
+        most = f" to {high:g}" if math.isfinite(high) else ""
+        wanted = f"a finite number {'above' if above else 'from'} {low:g}{most} is needed"
         if not _fits(self.value, ()):
             self.fail(wanted)
         x = float(self.value)
-        if not math.isfinite(x) or x < low or (above and x == low):
+        if not math.isfinite(x) or x > high or x < low or (above and x == low):
             self.fail(wanted)
         return x
 

@@ -1,8 +1,9 @@
 """Keep the headline: `python benchmarks/headline.py runs/headline_contact [--full runs/headline_full]`.
 
 Takes a sweep of benchmarks/headline.toml (`make headline`) and writes benchmarks/results/headline/ (rows, table,
-figure, what was run) and docs/headline.md. With a second sweep, of the same grid at fidelity full, it also writes how
-far the verdicts of the two agree. `--trials N` takes the first N seeds of a sweep that is not at its end.
+figure, what was run), docs/headline.md and the table in README.md. With a second sweep, of the same grid at fidelity
+full, it also writes how far the verdicts of the two agree. `--trials N` takes the first N seeds of a sweep that is not
+at its end.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from typing import Any
 from apo_bench.benchmark.compare import compare
 from apo_bench.benchmark.figure import draw
 from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.paired import Paired, paired
 from apo_bench.benchmark.report import report
 from apo_bench.benchmark.statistics import Cell, rank, tally
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"
-PAGE = ROOT / "docs" / "headline.md"
+PAGE, README = ROOT / "docs" / "headline.md", ROOT / "README.md"
+BEGIN, END = "<!-- written by benchmarks/headline.py -->", "<!-- until here -->"
 LEFT_OUT = ("reached", "thresholds")
 """Not kept of a row: the poses reached are most of its size, the thresholds are those of the scenario."""
 METHODS = ("none", "paper", "paper-track", "contact")
@@ -69,8 +72,12 @@ def keep(folder: Path, full: Path | None) -> None:
     packed = lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
     (KEPT / "rows.jsonl.xz").write_bytes(packed)
     agreement = agreed(full, folder) if full else []
-    PAGE.write_text("\n".join(page(cells, rows, ran, agreement)) + "\n", encoding="utf-8")
-    print(f"Wrote {KEPT} and {PAGE}")
+    told = page(cells, paired(rows, ("paper",)), ran, agreement)
+    PAGE.write_text("\n".join(told) + "\n", encoding="utf-8")
+    before, rest = README.read_text(encoding="utf-8").split(BEGIN)
+    kept = "\n".join([BEGIN, "", *short(cells), "", END])
+    README.write_text(before + kept + rest.split(END)[1], encoding="utf-8")
+    print(f"Wrote {KEPT}, {PAGE} and the table of {README}")
 
 
 def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
@@ -95,7 +102,21 @@ def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def page(cells: Sequence[Cell], rows: Sequence[Row], ran: Mapping[str, Any], agreement: list[str]) -> list[str]:
+def short(cells: Sequence[Cell]) -> list[str]:
+    """The table of the README: rates of careless humans, a line per scenario and method."""
+    shown = [cell for cell in cells if cell.careless == 1.0]
+    levels = sorted({cell.level for cell in shown})
+    rates = {(cell.scenario, cell.method, cell.level): f"{100 * (cell.rate or 0.0):.0f}" for cell in shown}
+    lines = ["| scenario | method | " + " | ".join(f"level {level:g}" for level in levels) + " |"]
+    lines.append("|---|---|" + "---|" * len(levels))
+    for scenario in sorted({cell.scenario for cell in shown}):
+        for method in METHODS:
+            told = [rates.get((scenario, method, level), "") for level in levels]
+            lines.append(f"| {scenario} | `{method}` | {' | '.join(told)} |")
+    return lines
+
+
+def page(cells: Sequence[Cell], pairs: Sequence[Paired], ran: Mapping[str, Any], agreement: list[str]) -> list[str]:
     least = min(cell.trials + cell.excluded for cell in cells)
     fidelity, versions = ran["grids"][0]["fidelity"], ran["versions"]
     main_cells = [cell for cell in cells if cell.method in METHODS and cell.level > 0]
@@ -106,8 +127,8 @@ def page(cells: Sequence[Cell], rows: Sequence[Row], ran: Mapping[str, Any], agr
         "",
         f"Written by `python benchmarks/headline.py` from the rows of `{ran['command']}`: {ran['rows']} trials, "
         f"{ran['replays']} replays, at least {least} trials in each cell, fidelity `{fidelity}`; "
-        f"{ran['simulated_hours']} hours simulated or passed over in {ran['worker_hours']} hours of a process, "
-        f"{ran['workers']} at a time, on a machine with two cores that did other work meanwhile. MuJoCo "
+        f"{ran['simulated_hours']} hours simulated or passed over in {ran['worker_hours'] / ran['workers']:.2f} hours "
+        f"by {ran['workers']} processes on a machine with two cores, which did other work now and then. MuJoCo "
         f"{versions['mujoco']}, mink {versions['mink']}, NumPy {versions['numpy']}, Python {ran['python']}; everything "
         "else in [run.json](../benchmarks/results/headline/run.json), rates with intervals in "
         "[table.csv](../benchmarks/results/headline/table.csv), rows (without the poses reached) in `rows.jsonl.xz` "
@@ -122,6 +143,10 @@ def page(cells: Sequence[Cell], rows: Sequence[Row], ran: Mapping[str, Any], agr
         "| scenario | careless | level | " + " | ".join(f"`{m}`" for m in METHODS) + " |",
         "|---|---|---|" + "---|" * len(METHODS),
         *crossed(main_cells, METHODS),
+        "",
+        "## Pairs",
+        "",
+        *differing(pairs),
         "",
         "## Without noise, and without any error",
         "",
@@ -158,6 +183,29 @@ def counted(cell: Cell | None) -> str:
     return f"{cell.successes} of {cell.trials} ({100 * low:.0f} to {100 * high:.0f} %)"
 
 
+def differing(pairs: Sequence[Paired]) -> list[str]:
+    """Cells in which `contact` or `paper-track` ends otherwise than `paper` at any seed."""
+    asked = [p for p in pairs if p.place.method in METHODS and p.place.method != "none"]
+    apart = [p for p in asked if p.only_method or p.only_reference]
+    lines = [
+        "`paper-track` and `contact` against `paper` over the same seeds, in the "
+        f"{len(apart)} of {len(asked)} cells in which they do not end alike at every seed: at how many one alone was "
+        "right, difference of the rates in points with Tango's 95 % interval, and McNemar's exact p, as it is and "
+        "adjusted for all comparisons with `paper` (Holm).",
+        "",
+        "| scenario | careless | level | method | pairs | it alone | `paper` alone | difference | p | p adjusted |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for p in apart:
+        at, (low, high) = p.place, (100 * x for x in p.interval)
+        lines.append(
+            f"| {at.scenario} | {at.careless:g} | {at.level:g} | `{at.method}` | {p.pairs} | {p.only_method} "
+            f"| {p.only_reference} | {100 * p.difference:+.1f} ({low:+.1f} to {high:+.1f}) "
+            f"| {p.p:.2g} | {p.p_adjusted:.2g} |"
+        )
+    return lines
+
+
 def agreed(full: Path, contact: Path) -> list[str]:
     """How far verdicts at fidelity contact are those at fidelity full."""
     found = compare(full, contact)
@@ -166,16 +214,19 @@ def agreed(full: Path, contact: Path) -> list[str]:
         "## Fidelity",
         "",
         "The same trials at fidelity `full`, in which every step of every motion is simulated: how many have the same "
-        "strict verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first.",
+        "strict verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first. Trials of "
+        "one seed are not independent; the last column counts the seeds with the same verdict in all trials.",
         "",
-        "| scenario | trials | same verdict | interval | same ending | right at `full` alone | at `contact` alone |",
-        "|---|---|---|---|---|---|---|",
+        "| scenario | trials | same verdict | interval | same ending | right at `full` alone | at `contact` alone "
+        "| seeds |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for a in found.agreements:
         low, high = a.same.interval
         lines.append(
             f"| {a.scenario} | {a.same.trials} | {a.same.successes} ({100 * (a.same.rate or 0):.1f} %) "
-            f"| {100 * low:.1f} to {100 * high:.1f} % | {a.same_ending.successes} | {a.only_first} | {a.only_second} |"
+            f"| {100 * low:.1f} to {100 * high:.1f} % | {a.same_ending.successes} | {a.only_first} | {a.only_second} "
+            f"| {a.same_everywhere.successes} of {a.same_everywhere.trials} |"
         )
     return lines
 

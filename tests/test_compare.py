@@ -71,6 +71,7 @@ def test_the_same_trials_are_met_whatever_the_fidelity(folders: tuple[Path, Path
     assert (other.same, every.same) == ((9, 9), (46, 48))
     assert every.same.interval == wilson(46, 48)
     assert every.same_ending == (46, 48)
+    assert every.same_everywhere == (46, 48)
     assert [a["seed"] for a, _ in found.changed] == [0, 1]
     (gap,) = (a for a in found.numbers if a.name == "worst_gap_mm")
     assert (gap.both, gap.differ, gap.alone) == (48, 1, 0)
@@ -87,6 +88,24 @@ def test_a_sweep_is_the_same_as_itself(folders: tuple[Path, Path]) -> None:
     assert (found.identical, found.changed, found.differences, found.alone) == (51, (), (), (0, 0))
     assert all(a.same.rate == 1.0 for a in found.agreements)
     assert all((a.differ, a.most) == (0, 0.0) for a in found.numbers)
+
+
+def test_trials_of_one_seed_count_once_where_independence_is_asked_for(tmp_path: Path) -> None:
+    ours = [row(method, seed, True) for method in ("paper", "contact") for seed in range(10)]
+    theirs = [{**r, "success": r["seed"] != 4} for r in ours]
+    (a, _) = compare(write(tmp_path / "a", ours), write(tmp_path / "b", theirs)).agreements
+    assert (a.same, a.same_everywhere) == ((18, 20), (9, 10))
+
+
+def test_one_run_file_that_is_not_there_is_one_difference(folders: tuple[Path, Path]) -> None:
+    (folders[1] / "run.json").write_text("{", encoding="utf-8")
+    found = compare(*folders)
+    assert [(d.what, d.first, d.second) for d in found.differences] == [
+        ("run.json can be read", True, None),
+        ("rows: fidelity", ["full"], ["contact"]),
+    ]
+    (folders[0] / "run.json").unlink()
+    assert [d.what for d in compare(*folders).differences] == ["rows: fidelity"]
 
 
 def test_the_sides_change_places(folders: tuple[Path, Path]) -> None:

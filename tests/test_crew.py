@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -17,11 +18,13 @@ import pytest
 
 from apo_bench.benchmark.crew import MOST_FALSE_STARTS, spread
 from apo_bench.benchmark.grid import SweepSpec, Unit, load_all, units
+from apo_bench.benchmark.replay_command import replay_command
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stopping import Stopped, listening
 from apo_bench.benchmark.sweep import sweep
 from apo_bench.benchmark.terms import Terms, versions
 from apo_bench.benchmark.worker import Worker, lost, misbehaved
+from apo_bench.cli import main
 from apo_bench.errors import InputError
 
 CODE = """
@@ -47,6 +50,14 @@ def forks(seen):
 
 def nonsense(seen):
     return "goals"
+
+def interrupts(seen):
+    raise KeyboardInterrupt
+
+def talks(seen):
+    print("from Python")
+    os.write(1, b"from below")
+    return seen.goals
 
 def slow(seen):
     time.sleep(0.2)
@@ -111,6 +122,61 @@ def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: 
     assert {t["worker"] for t in timing} <= {0, 1, 2, 3}
 
 
+def test_an_interrupt_of_the_correctors_own_is_a_death(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    rows = sweep(grid("interrupts", "raises"), tmp_path / "run", workers=1)
+    assert endings(rows) == {
+        ("block_on_block", "interrupts"): ("worker", "worker_died"),
+        ("block_on_block", "raises"): ("correct", "raised"),
+    }
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> None:
+    """The clock is looked at every half second."""
+    rows = sweep(grid("slow", trials=2), tmp_path / "late", workers=1, limit_s=0.05)
+    assert {(row["failure_stage"], row["failure_code"]) for row in rows} == {("worker", "time_limit")}
+    for row in rows:
+        spec = TrialSpec("block_on_block", careless=0.0, method="unruly:slow", seed=row["seed"])
+        same = {name: row[name] for name in ("spec_hash", "clearance_mm")}
+        assert row == {**lost(spec, "", "time_limit"), **same}
+
+
+def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    """The row that the command of a row prints."""
+    assert main([*shlex.split(replay_command(row))[1:], "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = sweep(grid("raises", "nonsense", "dies_of_b"), tmp_path / "run", workers=1)
+    assert {row["failure_code"] for row in rows} == {"raised", "worker_died"}
+    for row in rows:
+        assert ("--trial-limit 600" in replay_command(row)) is (row["failure_stage"] == "worker")
+        assert replayed(row, capsys) == json.loads(json.dumps(row))
+
+
+def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:hangs"]
+    assert main([*trial, "--trial-limit", "6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["failure_code"] == "time_limit"
+    assert main([*trial, "--trial-limit", "-1"]) == 2
+    assert "a limit of -1 s per trial was given" in capsys.readouterr().err
+    assert main([*trial, "--trial-limit", "6", "--video", str(tmp_path / "film.mp4")]) == 2
+    assert "--video was given together with --trial-limit" in capsys.readouterr().err
+
+
+def test_a_row_on_standard_output_stands_there_alone(capfd: pytest.CaptureFixture[str]) -> None:
+    trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:talks", "--json"]
+    for more in ([], ["--trial-limit", "100"]):
+        assert main([*trial, *more]) == 0
+        said = capfd.readouterr()
+        assert json.loads(said.out)["method"] == "unruly:talks"
+        assert "from Python" in said.err
+        assert "from below" in said.err
+
+
 @FOLDERS
 def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
     began = time.monotonic()
@@ -151,7 +217,7 @@ def test_what_a_worker_refuses_ends_the_sweep() -> None:
     asked = grid("raises")
     terms = Terms({"block_on_block": "0123456789abcdef"}, versions())
     with pytest.raises(InputError, match="has other code or other files"):
-        spread(units([asked], load_all([asked])), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+        spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
 
 
 @dataclass(frozen=True)
@@ -168,7 +234,7 @@ def test_processes_that_cannot_begin_are_given_up() -> None:
     asked = grid("raises")
     terms: Any = Deadly()
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
-        spread(units([asked], load_all([asked])), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+        spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
     assert MOST_FALSE_STARTS == 3
 
 

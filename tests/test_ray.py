@@ -108,7 +108,7 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
 def terms_of(spec: SweepSpec) -> tuple[tuple[Unit, ...], Terms]:
     loaded = load_all([spec])
     arm = find_arm(spec.arm).mjcf
-    return units([spec], loaded), Terms({g: content_hash(s, g, arm) for g, s in loaded.items()}, versions())
+    return tuple(units([spec], loaded)), Terms({g: content_hash(s, g, arm) for g, s in loaded.items()}, versions())
 
 
 def lines(out: Path) -> list[bytes]:
@@ -268,7 +268,7 @@ def test_files_below_the_current_folder_travel_and_no_others(
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
     scenarios = ("deep/mine.toml", str(far))
     spec = replace(SPEC, scenarios=scenarios, methods=("code_of_mine:raises",), noises=("noise.toml", "camera"))
-    travel = parcel(wanted(units([spec], load_all([spec]))))
+    travel = parcel(wanted(tuple(units([spec], load_all([spec])))))
     assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml", "code_of_mine.py", "helper_of_mine.py"}
     assert all((own / name).samefile(path) for name, path in travel.items())
 

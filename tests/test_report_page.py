@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import shlex
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 from apo_bench.benchmark.report import Report, report
+from apo_bench.cli import main
 from tests import pages
 from tests.browser import browser, opened, overflow
 from tests.test_statistics import row, write
@@ -129,6 +131,50 @@ def test_nothing_is_wider_than_the_window(made: Report, chromium: Any, width: in
         bright = [sum(map(int, re.findall(r"\d+", color)[:3])) for color in (paper, ink)]
         assert (bright[0] < bright[1]) == dark
         assert said == []
+
+
+def test_tables_that_go_on_to_the_right_fade_there(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page, 390) as (page, _, _):
+        page.wait_for_function("document.querySelector('.scroll.cut') !== null")
+        box = page.query_selector(".scroll.cut")
+        box.evaluate("(box) => { box.scrollLeft = box.scrollWidth; }")
+        page.wait_for_function("(box) => !box.classList.contains('cut')", arg=box)
+        assert overflow(page) <= 0
+
+
+def test_names_of_methods_and_levels_do_not_lie_on_each_other(tmp_path: Path, chromium: Any) -> None:
+    """Where both are long, the name stands above its bars."""
+    long = [row(m, i, level=0.5, level_deg=1.25) for m in ("none", "mine:corrector_of_mine") for i in range(3)]
+    short = [row(m, i) for m in ("none", "paper-track") for i in range(3)]
+    for name, some in (("long", long), ("short", short)):
+        page = report(write(tmp_path / name, some)).page
+        with opened(chromium, page) as (tab, _, _):
+            boxes = tab.evaluate(
+                "[...document.querySelectorAll('#stages ~ * svg.chart text')]"
+                ".map((t) => { const b = t.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"
+            )
+        assert boxes
+        assert not [
+            (a, b)
+            for i, a in enumerate(boxes)
+            for b in boxes[:i]
+            if a[0] < b[2] - 0.5 and b[0] < a[2] - 0.5 and a[1] < b[3] - 4 and b[1] < a[3] - 4
+        ]
+
+
+def test_a_folder_whose_name_is_no_text_has_a_page(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/n\xf6"))
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("names of files are text here")
+    write(folder / "run", [row("contact", i) for i in range(3)])
+    write(folder / "b\udcf6", [row("contact", i) for i in range(3)])
+    for name in ("run", "b\udcf6"):
+        assert main(["report", str(folder / name), "--pictures", "0"]) == 0
+        assert (folder / name / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert main(["compare", str(folder / "run"), str(folder / "b\udcf6"), "--out", str(folder / "both")]) == 0
+    assert (folder / "both" / "compare.html").exists()
 
 
 def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:

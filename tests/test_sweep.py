@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import functools
 import json
+import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +23,7 @@ import pytest
 from apo_bench.benchmark import sweep as runner
 from apo_bench.benchmark import worker
 from apo_bench.benchmark.fingerprint import spec_hash
-from apo_bench.benchmark.grid import KEY, SweepSpec, load_all, row_key, trial_key, units
+from apo_bench.benchmark.grid import KEY, SweepSpec, Unit, load_all, row_key, trial_key, units
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.spec import ROW
 from apo_bench.correction.correct import CORRECTORS
@@ -84,6 +85,29 @@ def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None
     assert met["oracle"] == {("isotropic", "given")}
     assert met["none"] == {("isotropic", "given"), ("per-part", "given")}
     assert len(met["paper"]) == 6
+
+
+def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
+    huge = replace(SPEC, trials=1_000_000)
+    with pytest.raises(InputError, match=r"up to [0-9,]+ trials, and at most 1,000,000 are allowed in one folder"):
+        runner.sweep(huge, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_stop_is_heard_while_the_work_is_laid_out(
+    counted: Counter[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def signalled(*given: Any) -> Iterator[Unit]:
+        for unit in units(*given):
+            yield unit
+            counted["laid out"] += 1
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(runner, "units", signalled)
+    with pytest.raises(KeyboardInterrupt):
+        runner.sweep(replace(SPEC, trials=5), tmp_path / "run")
+    assert counted["laid out"] == 1
+    assert counted["trial"] == 0
 
 
 def test_by_default_the_ceiling_the_raw_the_papers_way_and_contact_are_compared() -> None:

@@ -15,6 +15,7 @@ from apo_bench.benchmark.slim import NUMBERS, Row, slim_rows
 from apo_bench.benchmark.statistics import Cell, Interval, Place, Rate, order, place_of, tally
 from apo_bench.errors import InputError
 
+RUN = "run.json can be read"
 ENDING = ("success", "failure_stage", "failure_code")
 ALL = "all"
 """Stands for every scenario."""
@@ -46,6 +47,9 @@ class Agreement:
     """Trials whose strict verdict is the same; those whose demonstration was right in neither are left out."""
     same_ending: Rate
     """Trials whose verdict, stage and code are the same."""
+    same_everywhere: Rate
+    """Seeds of a scenario with which every trial has the same verdict in both. Trials of one share layout,
+    demonstration and the draws of noise, so that these, and not trials, are independent."""
     only_first: int
     """Trials that were right in the first alone."""
     only_second: int
@@ -158,7 +162,13 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
 
 
 def differences(first: Side, second: Side) -> tuple[Difference, ...]:
-    """What the two were asked to do and made with that is not the same; of source files those that differ."""
+    """What the two were asked to do and made with that is not the same; of source files those that differ.
+
+    Where one of them has no `run.json` that can be read, nothing that only stands there is compared.
+    """
+    if not (first.run and second.run):
+        read = [bool(side.run) or None for side in (first, second)]
+        first, second = first._replace(run={RUN: read[0]}), second._replace(run={RUN: read[1]})
     said = [_said(side) for side in (first, second)]
     names = list(dict.fromkeys([*said[0], *said[1]]))
     return tuple(Difference(n, said[0].get(n), said[1].get(n)) for n in names if said[0].get(n) != said[1].get(n))
@@ -203,10 +213,15 @@ def _by_key(side: Side) -> dict[Key, Row]:
 def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
     counted = [(a, b) for a, b in pairs if (a["success"], b["success"]) != (None, None)]
     verdicts = [(a["success"], b["success"]) for a, b in counted]
+    seeds: dict[tuple[str, int], bool] = {}
+    for a, b in counted:
+        one = (a["scenario"], a["seed"])
+        seeds[one] = seeds.get(one, True) and a["success"] == b["success"]
     return Agreement(
         scenario=name,
         same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),
         same_ending=Rate(sum(all(a[x] == b[x] for x in ENDING) for a, b in counted), len(counted)),
+        same_everywhere=Rate(sum(seeds.values()), len(seeds)),
         only_first=sum((a, b) == (True, False) for a, b in verdicts),
         only_second=sum((a, b) == (False, True) for a, b in verdicts),
         excluded_in_one=sum((a is None) != (b is None) for a, b in verdicts),

@@ -24,8 +24,9 @@ MOST = 2000
 
 def agreement_table(found: Comparison) -> Table:
     """Verdicts that agree, by scenario and of all."""
-    head = ("scenario", "trials", "same verdict", "95 %", "same stage and code", "right in the first alone",
-            "right in the second alone", "difference of success [points]")  # fmt: skip
+    head = ("scenario", "trials", "same verdict", "95 %", "seeds", "same in all", "95 %",
+            "same stage and code", "right in the first alone", "right in the second alone",
+            "difference of success [points]")  # fmt: skip
     return Table(head, [_agreement(a) for a in found.agreements])
 
 
@@ -75,7 +76,9 @@ def in_words(found: Comparison) -> str:
     return (
         f"{found.shared:,} trials are in both ({found.alone[0]:,} in the first alone, {found.alone[1]:,} in the second "
         f"alone). Verdicts agree in {total.same.successes:,} of {total.same.trials:,}: {share(total.same.rate)} "
-        f"(95 %: {100 * low:.2f} to {100 * high:.2f} %). {found.identical:,} trials are the same to the last digit."
+        f"(95 %: {100 * low:.2f} to {100 * high:.2f} %, as if every trial were one of its own; in "
+        f"{total.same_everywhere.successes:,} of {total.same_everywhere.trials:,} seeds all of them agree). "
+        f"{found.identical:,} trials are the same to the last digit."
     )
 
 
@@ -103,8 +106,11 @@ def share(rate: float | None) -> str:
 
 def _agreement(a: Agreement) -> tuple[object, ...]:
     same = (f"{a.same.successes} ({share(a.same.rate)})", _span(a.same.interval))
+    seeds = a.same_everywhere
+    every = (seeds.trials, f"{seeds.successes} ({share(seeds.rate)})", _span(seeds.interval))
     ending = f"{a.same_ending.successes} ({share(a.same_ending.rate)})"
-    return (a.scenario, a.same.trials, *same, ending, a.only_first, a.only_second, points(a.difference, a.interval))
+    alone = (a.only_first, a.only_second, points(a.difference, a.interval))
+    return (a.scenario, a.same.trials, *same, *every, ending, *alone)
 
 
 def _cell(pair: Pair) -> tuple[object, ...]:
@@ -137,6 +143,10 @@ def _agreement_form(a: Agreement) -> dict[str, Any]:
         "same_verdict_rate": a.same.rate,
         "same_verdict_low_95": a.same.interval.low,
         "same_verdict_high_95": a.same.interval.high,
+        "seeds": a.same_everywhere.trials,
+        "same_verdicts_in_all": a.same_everywhere.successes,
+        "same_verdicts_in_all_low_95": a.same_everywhere.interval.low,
+        "same_verdicts_in_all_high_95": a.same_everywhere.interval.high,
         "same_stage_and_code": a.same_ending.successes,
         "right_in_first_alone": a.only_first,
         "right_in_second_alone": a.only_second,

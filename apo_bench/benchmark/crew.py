@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.stopping import Check, never
 from apo_bench.benchmark.terms import Terms
 from apo_bench.benchmark.worker import Emit, lost, timing
+from apo_bench.errors import InputError
 
 TURN_S = 0.5
 """How often the clock and the signals are looked at while nothing else happens."""
@@ -20,6 +22,15 @@ MOMENT_S = 0.25
 GRACE_S = 5.0
 """After a stop: what trials under way get to end."""
 MOST_FALSE_STARTS = 3
+LONGEST_TRIAL_S = 1e6
+
+
+def check_limit(limit_s: float) -> None:
+    """Raise an `InputError` unless a trial can have such a limit."""
+    if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_TRIAL_S):
+        raise InputError(
+            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {LONGEST_TRIAL_S:g} is allowed."
+        )
 
 
 def spread(

@@ -156,6 +156,8 @@ def _last_word(number: int, terms: Terms, pipe: Any) -> tuple[str, ...]:
         return ("refused", str(error))
     except Exception:
         return ("failed", traceback.format_exc())
+    except KeyboardInterrupt:
+        os._exit(1)  # signals are ignored here: it is a corrector's own, and ends its process as `sys.exit` does
     return ("done",)
 
 

@@ -31,6 +31,8 @@ from apo_bench.scenario_file import load_scenario
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 METHODS = ("oracle", "none", "paper", "contact")
 LARGEST_TRIALS = 1_000_000
+MOST_TRIALS = 1_000_000
+"""Of all cells of a sweep together: their specifications are held in memory, half a kilobyte each."""
 AXES = ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes", "grasps")
 """What a sweep has several of."""
 MAY_BE_EMPTY = ("clearances_mm", "noises")
@@ -117,13 +119,20 @@ class Unit:
 
 
 def check_grids(grids: Sequence[SweepSpec]) -> None:
-    """Raise an `InputError` unless there is a grid, and all have the same arm, time step and fidelity."""
+    """Raise an `InputError` unless there is a grid, all have the same arm, time step and fidelity, and they are not
+    larger than can be held."""
     if not grids:
         raise InputError("no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
         given = {getattr(grid, name): None for grid in grids}
         if len(given) > 1:
             raise InputError(f"{name} of a sweep is {' and '.join(map(str, given))}; run a sweep for each.")
+    most = sum(grid.trials * _per_seed(grid) for grid in grids)
+    if most > MOST_TRIALS:
+        raise InputError(
+            f"the sweep has up to {most:,} trials, and at most {MOST_TRIALS:,} are allowed in one folder; share them "
+            "out over several: other seeds, or other scenarios, in each."
+        )
 
 
 def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
@@ -140,7 +149,7 @@ def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
     return loaded
 
 
-def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> tuple[Unit, ...]:
+def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> Iterator[Unit]:
     """All the work of a sweep, each trial once, seeds first, so that every cell of an interrupted sweep is about
     equally full.
 
@@ -149,12 +158,10 @@ def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> tuple[U
     with relations as given.
     """
     begin, end = min(grid.seed for grid in grids), max(grid.seed + grid.trials for grid in grids)
-    return tuple(
-        unit
-        for seed in range(begin, end)
-        for given, scenario in loaded.items()
-        for unit in _units([g for g in grids if g.seed <= seed < g.seed + g.trials], given, scenario, seed)
-    )
+    for seed in range(begin, end):
+        those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
+        for given, scenario in loaded.items():
+            yield from _units(those, given, scenario, seed)
 
 
 def described(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
@@ -183,6 +190,14 @@ def check_grasp(grasp: str) -> None:
 
     if grasp not in GRASPS:
         raise InputError(unknown("grasp", str(grasp), GRASPS))
+
+
+def _per_seed(grid: SweepSpec) -> int:
+    """How many trials a grid has for one seed, if none is the same as another."""
+    ways = sum(len(_ways(eye, grid.noises)) for eye in grid.eyes)
+    told = sum(len(grid.relations) if knows_relations(method) else 1 for method in grid.methods if method != "oracle")
+    trials = len(grid.careless) * len(grid.levels) * ways * told + ("oracle" in grid.methods)
+    return len(grid.scenarios) * max(1, len(grid.clearances_mm)) * len(grid.grasps) * trials
 
 
 def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int) -> Iterator[Unit]:

@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
+from apo_bench.benchmark.alone import run_alone
+from apo_bench.benchmark.fingerprint import content_hash
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
 from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import eye_of, run_measured, run_trial
+from apo_bench.benchmark.worker import misbehaved
+from apo_bench.correction.correct import Misbehaved
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
 from apo_bench.observed import observed, read_stated
@@ -43,6 +47,8 @@ class Request:
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
+    limit_s: float | None = None
+    """Wall time; what has one runs in a process of its own, as in a sweep."""
 
 
 def run_one(request: Request) -> Row:
@@ -53,6 +59,9 @@ def run_one(request: Request) -> Row:
     """
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
+    if request.limit_s is not None:
+        _refuse_what_is_written(request)
+        return run_alone(spec, request.limit_s)
     scene = build_scene(
         scenario,
         clearance_mm=spec.clearance_mm,
@@ -123,7 +132,11 @@ def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, shown), name), request.save_observation)
-    return run_trial(spec, scene, shown=shown, watch=film)
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    try:
+        return run_trial(spec, scene, shown=shown, content=content, watch=film)
+    except Misbehaved as error:
+        return misbehaved(spec, content, shown.demonstration.code, str(error))
 
 
 def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
@@ -169,6 +182,15 @@ def _refuse_contradictions(request: Request) -> None:
             option = "--" + name.replace("_", "-")
             raise InputError(
                 f"{option} was given together with --observation, which draws nothing; leave one of them out."
+            )
+
+
+def _refuse_what_is_written(request: Request) -> None:
+    for name in ("observation", "save_observation", "video"):
+        if getattr(request, name) is not None:
+            raise InputError(
+                f"--{name.replace('_', '-')} was given together with --trial-limit, which runs the trial in a process "
+                "of its own; leave one of them out."
             )
 
 

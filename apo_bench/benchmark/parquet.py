@@ -11,6 +11,7 @@ WORDS = (
     *("host", "worker", "command"),
 )
 """Columns of words, also where they look like numbers."""
+# Files are opened here: names that are no UTF-8 are refused by the library.
 
 
 def parquet_beside(table: Path) -> Path:
@@ -19,11 +20,13 @@ def parquet_beside(table: Path) -> Path:
     from pyarrow import csv, parquet
 
     how = csv.ConvertOptions(column_types=dict.fromkeys(WORDS, pa.string()))
-    made = csv.read_csv(table, convert_options=how, parse_options=csv.ParseOptions(newlines_in_values=True))
+    with table.open("rb") as file:
+        made = csv.read_csv(file, convert_options=how, parse_options=csv.ParseOptions(newlines_in_values=True))
     for i, field in enumerate(made.schema):
         if pa.types.is_null(field.type):
             made = made.set_column(i, field.name, made.column(i).cast(pa.float64()))
-    parquet.write_table(made, table.with_suffix(".parquet"))
+    with table.with_suffix(".parquet").open("wb") as out:
+        parquet.write_table(made, out)
     return table.with_suffix(".parquet")
 
 
@@ -34,4 +37,5 @@ def write_columns(names: Sequence[str], columns: Sequence[Sequence[Any]], path: 
 
     arrays = [pa.array(column, from_pandas=False) for column in columns]
     arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]
-    parquet.write_table(pa.table(arrays, names=list(names)), path, compression="zstd")
+    with path.open("wb") as out:
+        parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")

@@ -12,6 +12,8 @@ from apo_bench.errors import InputError
 
 USUALLY = {"grasp": "friction", "arm": "six_axis", "timestep_s": 0.001}
 """What a row that does not say means."""
+LIMIT_S = 600.0
+"""Usual for a trial in a process of its own; given where that process died or was ended."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
@@ -51,6 +53,8 @@ def _options(row: Mapping[str, Any], given: str) -> list[str]:
     say("--timestep-ms", milli(row["timestep_s"]), 1.0)
     say("--fidelity", row["fidelity"], "full")
     say("--method", row["method"], "none")
+    if row.get("failure_stage") == "worker":
+        say("--trial-limit", LIMIT_S, None)
     return said
 
 

@@ -132,7 +132,7 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
         drawn=drawn,
         tables=[str(path.relative_to(folder)) for path in (*made, *drawn.values(), *svg)],
     )
-    (folder / PAGE).write_text(report_page(page), encoding="utf-8")
+    (folder / PAGE).write_text(report_page(page), encoding="utf-8", errors="replace")
     recognised = (tables["recognised"], drawn["recognised"]) if told else None
     return Report(
         page=folder / PAGE,

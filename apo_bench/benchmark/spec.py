@@ -22,6 +22,7 @@ LARGEST_LEVEL = 50.0
 FIDELITIES = ("full", "contact")
 """Every motion is simulated, or the part of each in which things may touch."""
 LARGEST_CARELESS = 10.0
+LARGEST_CLEARANCE_MM = 5.0
 LARGEST_SEED = 2**53 - 1
 """Whole numbers up to here survive every JSON reader."""
 
@@ -98,7 +99,7 @@ def check_careless(careless: float) -> None:
 
 def check_clearance(clearance_mm: float) -> None:
     """Raise an `InputError` unless the clearance can be one; what a part can have is the scene's to say."""
-    _within(clearance_mm, 0.0, 5.0, "clearance", "in mm per side")
+    _within(clearance_mm, 0.0, LARGEST_CLEARANCE_MM, "clearance", "in mm per side")
 
 
 def check_seed(seed: int) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.code_version import code_files
-from apo_bench.benchmark.crew import spread
+from apo_bench.benchmark.crew import check_limit, spread
 from apo_bench.benchmark.fingerprint import content_hash, content_pieces, noise_content, own_content, spec_hash
 from apo_bench.benchmark.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
 from apo_bench.benchmark.journal import Journal
@@ -19,7 +18,7 @@ from apo_bench.benchmark.run_file import run_record
 from apo_bench.benchmark.spec import level_pair
 from apo_bench.benchmark.stopping import Check, listening
 from apo_bench.benchmark.terms import Terms, versions
-from apo_bench.benchmark.worker import Emit, Timing, Worker
+from apo_bench.benchmark.worker import Emit, Timing, Worker, in_time
 from apo_bench.correction.correct import CORRECTORS
 from apo_bench.errors import InputError, unknown
 from apo_bench.names import resolve
@@ -31,7 +30,6 @@ from apo_bench.simulation.arm import Arm, find_arm
 from apo_bench.simulation.physics import physics
 
 LARGEST_WORKERS = 256
-LONGEST_TRIAL_S = 1e6
 BACKENDS = ("local", "ray")
 
 
@@ -70,17 +68,19 @@ def sweep(
     """
     grids = (grids,) if isinstance(grids, SweepSpec) else tuple(grids)
     _check_spread(workers, limit_s, backend, address)
+    here = workers is None and backend == "local"
     loaded, arm = _checked(grids)
     terms = Terms({given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}, versions())
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     run = run_record(described(grids, loaded), _content(grids, loaded, arm), code_files(), terms, files, command)
     with listening() as check, Journal(Path(out), run) as journal:
-        work = _left(units(grids, loaded), loaded, terms, journal)
+        work = _left(units(grids, loaded), loaded, terms, journal, check)
         with progress(sum(len(unit.trials) for unit in work)) as tell:
 
             def emit(row: Row, timing: Timing) -> None:
-                journal.append(row, timing)
-                tell(row)
+                kept = row if here else in_time(row, timing, limit_s)
+                journal.append(kept, timing)
+                tell(kept)
 
             if backend == "ray":
                 from apo_bench.benchmark.on_ray import spread as spread_on_ray
@@ -101,10 +101,13 @@ def _here(work: Sequence[Unit], terms: Terms, emit: Emit, check: Check) -> None:
     check()
 
 
-def _left(work: Sequence[Unit], loaded: Mapping[str, Scenario], terms: Terms, journal: Journal) -> list[Unit]:
+def _left(
+    work: Iterable[Unit], loaded: Mapping[str, Scenario], terms: Terms, journal: Journal, check: Check
+) -> list[Unit]:
     """The trials that have no row yet; the rows that there are must be what those trials would give."""
     left, hashes = [], {}
     for unit in work:
+        check()
         trials = []
         for trial in unit.trials:
             row_hash = journal.finished.get(trial_key(trial, loaded[trial.scenario].name))
@@ -130,10 +133,7 @@ _CELL = ("clearance_mm", "careless", "level_mm", "level_deg", "noise", "relation
 def _check_spread(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
     if workers is not None and not 1 <= workers <= LARGEST_WORKERS:
         raise InputError(f"{workers} workers were given; a whole number from 1 to {LARGEST_WORKERS} is allowed.")
-    if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_TRIAL_S):
-        raise InputError(
-            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {LONGEST_TRIAL_S:g} is allowed."
-        )
+    check_limit(limit_s)
     if backend not in BACKENDS:
         raise InputError(unknown("backend", backend, BACKENDS))
     if address is not None and backend != "ray":

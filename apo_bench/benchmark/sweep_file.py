@@ -15,17 +15,19 @@ Lengths in mm, angles in degrees; paths as on the command line, from the current
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.grid import LARGEST_TRIALS, SweepSpec
-from apo_bench.benchmark.spec import LARGEST_SEED
+from apo_bench.benchmark.spec import LARGEST_CARELESS, LARGEST_CLEARANCE_MM, LARGEST_LEVEL, LARGEST_SEED
 from apo_bench.errors import InputError
 from apo_bench.strict_json import Node
 from apo_bench.strict_toml import read_toml
 
 TEXTS = ("scenarios", "noises", "methods", "grasps", "relations", "eyes")
-NUMBERS = ("levels", "careless", "clearances_mm")
+NUMBERS = {"levels": LARGEST_LEVEL, "careless": LARGEST_CARELESS, "clearances_mm": LARGEST_CLEARANCE_MM}
+"""And the largest that is allowed; the smallest is 0."""
 COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": (0, LARGEST_SEED)}
 SHARED = ("arm", "timestep_ms", "fidelity")
 """One for the whole sweep: they stand at the top of the file only."""
@@ -82,9 +84,8 @@ def _value(key: str, node: Node) -> Any:
     if key in TEXTS:
         return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
     if key in NUMBERS:
-        return tuple(
-            _level(entry) if key == "levels" else entry.number(0.0) for entry in _entries(node, key, "numbers")
-        )
+        read = _level if key == "levels" else partial(Node.number, low=0.0, high=NUMBERS[key])
+        return tuple(read(entry) for entry in _entries(node, key, "numbers"))
     if key in COUNTS:
         return _count(node, *COUNTS[key])
     return node.number(0.0, above=True) if key == "timestep_ms" else node.text()
@@ -101,7 +102,7 @@ def _entries(node: Node, key: str, of: str) -> Sequence[Node]:
 def _level(node: Node) -> float | tuple[float, float]:
     """A number, or a pair of mm and degrees."""
     if not isinstance(node.value, list):
-        return node.number(0.0)
+        return node.number(0.0, LARGEST_LEVEL)
     mm, deg = map(float, node.numbers(2))
     return mm, deg
 

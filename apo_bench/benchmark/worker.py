@@ -110,6 +110,15 @@ def lost(spec: TrialSpec, content: str, code: str) -> Row:
     return _failed(spec, content, None, Ending("worker", code, None, sentence(code)))
 
 
+def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
+    """The row, or the failed row of a trial that took longer than the limit and ended before anyone looked."""
+    took_s = (timing["demonstrate_s"] or 0.0) + (timing["trial_s"] or 0.0)
+    if took_s <= limit_s or row["failure_stage"] == "worker":
+        return row
+    late = Ending("worker", "time_limit", None, sentence("time_limit"))
+    return row | {"demonstration": None} | result(late, success=False)
+
+
 def misbehaved(spec: TrialSpec, content: str, demonstration: str, said: str) -> Row:
     """The failed row of a trial whose corrector raised an error or returned what it must not.
 

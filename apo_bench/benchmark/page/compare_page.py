@@ -15,9 +15,11 @@ from apo_bench.errors import InputError
 
 AGREEMENT = (
     "The same trials in both: how often the strict verdict is the same, with Wilson's interval, and how often stage "
-    "and code of a failure are as well. *Right in the first alone* are trials that the second lost. The difference of "
-    "success is the second minus the first, with Tango's interval for pairs (95 %). Trials whose demonstration was not "
-    "right in either are left out here."
+    "and code of a failure are as well. Trials of one seed share layout, demonstration and draws of noise, so those "
+    "intervals are too narrow where disagreements come in bunches; *same in all* counts the seeds of a scenario with "
+    "which every trial has the same verdict in both, and these are independent. *Right in the first alone* are trials "
+    "that the second lost. The difference of success is the second minus the first, with Tango's interval for pairs "
+    "(95 %), over trials too. Trials whose demonstration was not right in either are left out here."
 )
 NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
 CELLS = (
@@ -49,7 +51,7 @@ def write_comparison(found: Comparison, folder: Path) -> Written:
         folder.mkdir(parents=True, exist_ok=True)
         paths = [_write(table, folder / f"{name}.csv") for name, table in tables.items()]
         page = folder / "compare.html"
-        page.write_text(comparison_page(found, tables), encoding="utf-8")
+        page.write_text(comparison_page(found, tables), encoding="utf-8", errors="replace")
     except OSError as error:
         raise InputError(f"--out {folder} cannot be written ({error.strerror}); choose another place.") from error
     return Written(page, tuple(paths))
@@ -81,7 +83,7 @@ def _changed(found: Comparison, table: Table) -> Html:
 
 
 def _write(table: Table, path: Path) -> Path:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with path.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.writer(file)
         writer.writerow(_names(table.head))
         writer.writerows(table.rows)

@@ -7,6 +7,9 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import NamedTuple
 
+LONG = 24
+"""Columns of words with more letters than this break into lines."""
+
 
 class Html(str):
     """Text that is markup already."""
@@ -55,8 +58,11 @@ class Table(NamedTuple):
         """In a box that scrolls by itself; a sentence where there is no row."""
         if not self.rows:
             return tag("p", empty, class_="none")
+        long = {i for row in self.rows for i, x in enumerate(row[: self.words]) if len(_plain(x)) > LONG}
         head = joined(_cell("th", x, i < self.words, scope="col") for i, x in enumerate(self.head))
-        body = joined(tag("tr", joined(_cell("td", x, i < self.words) for i, x in enumerate(row))) for row in self.rows)
+        body = joined(
+            tag("tr", joined(_cell("td", x, i < self.words, i in long) for i, x in enumerate(row))) for row in self.rows
+        )
         made = tag("table", tag("thead", tag("tr", head)), tag("tbody", body))
         tall = " tall" * (len(self.rows) > 30)
         return tag("div", made, class_=f"scroll{tall}", tabindex=0, role="region", aria_label=f"table: {self.head[0]}")
@@ -68,8 +74,13 @@ class Table(NamedTuple):
         return [_line(self.head), "|" + "---|" * len(self.head), *map(_line, self.rows)]
 
 
-def _cell(name: str, x: object, word: bool, **more: object) -> Html:
-    return tag(name, x, class_=None if word else "number", **more)
+def _cell(name: str, x: object, word: bool, long: bool = False, **more: object) -> Html:
+    return tag(name, x, class_="long" if long else None if word else "number", **more)
+
+
+def _plain(x: object) -> str:
+    """Text that may break into lines; markup looks after itself."""
+    return "" if x is None or isinstance(x, Html) else str(x)
 
 
 def _line(cells: Sequence[object]) -> str:

@@ -28,6 +28,17 @@
       predicted: word("predicted"), command: `${word("command")} --seed ${seed}` };
   }
 
+  // Tables that go on to the right fade there.
+  function fade(box) {
+    box.classList.toggle("cut", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
+  }
+  const sizes = new ResizeObserver((entries) => { for (const entry of entries) fade(entry.target); });
+
+  function watch(box) {
+    sizes.observe(box);
+    box.addEventListener("scroll", () => fade(box), { passive: true });
+  }
+
   async function copied(text) {
     try {
       await navigator.clipboard.writeText(text);
@@ -106,11 +117,13 @@
       const left = chosen.length - body.childElementCount;
       more.hidden = left <= 0;
       more.textContent = `show ${Math.min(STEP, left)} more of ${left}`;
+      fade(scroll);
     };
     only.addEventListener("change", () => { body.replaceChildren(); show(); });
     more.addEventListener("click", show);
     show();
     panel.append(tools, scroll, more);
+    watch(scroll);
   }
 
   function panelOf(button) {
@@ -173,5 +186,6 @@
   window.addEventListener("beforeprint", () => {
     for (const box of document.querySelectorAll("details")) box.open = true;
   });
+  for (const box of document.querySelectorAll(".scroll")) watch(box);
   linked();
 })();

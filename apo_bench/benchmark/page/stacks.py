@@ -14,6 +14,8 @@ from apo_bench.benchmark.statistics import Cell
 
 LEFT, RIGHT, HIGH, STEP, APART = 138, 46, 11, 14, 5
 """Where bars begin and end, their height, from one to the next, and between methods, px."""
+LETTER, SMALL = 6.4, 5.4
+"""How wide letters of names and of levels are, px."""
 
 
 def stages_of(cell: Cell) -> Counter[str]:
@@ -37,10 +39,13 @@ def stack_panels(grouped: Mapping[Setting, Sequence[Cell]]) -> list[Panel]:
 
 def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     y, said, before = 6.0, [], ""
+    above = any(_beside(cell, setting) > LEFT - 12 for cell in cells)
     for cell in cells:
         if cell.method != before:
             y += APART
-            said.append(f'<text x="0" y="{y + HIGH - 2:.0f}">{html(_short(cell.method))}</text>')
+            name = _short(cell.method, 48 if above else 16)
+            said.append(f'<text x="0" y="{y + HIGH - 2:.0f}">{html(name)}</text>')
+            y += STEP if above else 0.0
             before = cell.method
         said.append(_bar(cell, setting, y))
         y += STEP
@@ -54,7 +59,7 @@ def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
 
 
 def _bar(cell: Cell, setting: Setting, y: float) -> str:
-    level = "" if cell.method == "oracle" else level_words(level_of(cell), setting.noise)
+    level = _level(cell, setting)
     said = [f'<text class="soft" x="{LEFT - 6}" y="{y + HIGH - 2:.0f}" text-anchor="end">{html(level)}</text>']
     found, done = stages_of(cell), 0
     pieces = [("success", cell.successes, "var(--ok)")]
@@ -71,6 +76,15 @@ def _bar(cell: Cell, setting: Setting, y: float) -> str:
             done += count
     said.append(f'<text class="soft" x="{WIDTH - RIGHT + 5}" y="{y + HIGH - 2:.0f}">n {cell.trials}</text>')
     return "".join(said)
+
+
+def _beside(cell: Cell, setting: Setting) -> float:
+    """How much room a method's name and its level take beside each other, px; more than there is: it stands above."""
+    return LETTER * len(_short(cell.method)) + SMALL * len(_level(cell, setting))
+
+
+def _level(cell: Cell, setting: Setting) -> str:
+    return "" if cell.method == "oracle" else level_words(level_of(cell), setting.noise)
 
 
 def _x(share: float) -> float:

@@ -1,0 +1,28 @@
+"""What is printed where: one JSON object on standard output, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
+
+
+@contextmanager
+def aside() -> Iterator[None]:
+    """What is printed meanwhile, by whatever code and below Python too, goes to standard error."""
+    sys.stdout.flush()
+    try:
+        ours = os.dup(1)
+    except OSError:
+        ours = None
+    try:
+        if ours is not None:
+            with suppress(OSError):
+                os.dup2(2, 1)
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        if ours is not None:
+            os.dup2(ours, 1)
+            os.close(ours)

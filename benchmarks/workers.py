@@ -1,0 +1,55 @@
+"""How much faster two workers are than one: `python benchmarks/workers.py [--trials 12] [--rounds 3]`.
+
+The same trials, with one worker and with two, in turns. Counted is the time from the first row to the last one, so that
+starting processes and compiling, which a sweep does once, is left out, and the end, at which one of two waits for the
+other, is not. Writes benchmarks/results/workers.json; run it on a machine that does nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from pathlib import Path
+
+from apo_bench.benchmark.crew import spread
+from apo_bench.benchmark.fingerprint import content_hash
+from apo_bench.benchmark.grid import SweepSpec, load_all, units
+from apo_bench.benchmark.terms import Terms, versions
+from apo_bench.simulation.arm import find_arm
+
+SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
+RESULT = Path(__file__).parent / "results" / "workers.json"
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--trials", type=int, default=12, help="seeds per cell")
+    asked.add_argument("--rounds", type=int, default=3, help="how often both are timed")
+    given = asked.parse_args()
+    rounds = []
+    for _ in range(given.rounds):
+        one, two = (rows_per_second(workers, given.trials) for workers in (1, 2))
+        rounds.append({"one": round(one, 3), "two": round(two, 3), "ratio": round(two / one, 3)})
+        print(f"one worker {one:.2f} rows/s, two {two:.2f}: {two / one:.2f} times", flush=True)
+    ratio = statistics.median(r["ratio"] for r in rounds)
+    print(f"median {ratio:.2f}")
+    command = f"python benchmarks/workers.py --trials {given.trials} --rounds {given.rounds}"
+    found = {"command": command, "rows_per_second": rounds, "median_ratio": ratio}
+    RESULT.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+def rows_per_second(workers: int, trials: int) -> float:
+    """Of trials at fidelity contact, from the first row on."""
+    grid = SweepSpec(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
+    loaded, arm = load_all([grid]), find_arm(grid.arm).mjcf
+    terms = Terms({given: content_hash(one, given, arm) for given, one in loaded.items()}, versions())
+    ended: list[float] = []
+    work = tuple(units([grid], loaded))
+    spread(work, terms, workers=workers, limit_s=600.0, emit=lambda row, timing: ended.append(time.perf_counter()))
+    return (len(ended) - 1) / (ended[-1] - ended[0])
+
+
+if __name__ == "__main__":
+    main()
