@@ -61,6 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not hasattr(error, "format_message"):
             raise
         return _complain(" ".join(error.format_message().split()), WRONG_REQUEST)
+    if code == INTERRUPTED:  # what the command line library makes of Ctrl-C
+        return _complain("interrupted.", INTERRUPTED)
     return int(code or 0)
 
 

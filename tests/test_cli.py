@@ -342,3 +342,11 @@ def test_the_program_ends_with_its_exit_code() -> None:
     wrong = ended("replay", "stick_in_towr")
     assert (wrong.returncode, wrong.stdout) == (2, "")
     assert wrong.stderr.count("\n") == 1
+
+
+def test_an_interrupted_command_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("apo_bench.benchmark.terminal.print_scenarios", interrupted)
+    assert run(capsys, "scenarios") == (130, "", "apo-bench: interrupted.\n")
