@@ -1,7 +1,8 @@
 """The command line: `apo-bench scenarios | graph | explain | correct | scene | replay | sweep | report | ..`.
 
 Exit codes: 0 a result was produced, also that of a replay that failed physically; 1 none was produced; 2 the
-request was wrong, with one sentence on stderr. Lengths in mm, angles in degrees.
+request was wrong, with one sentence on stderr; 128 and the number of the signal that ended it. Lengths in mm, angles in
+degrees.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 
 from apo_bench.deviations import assumed_deviations
 from apo_bench.errors import InputError
+from apo_bench.output import aside
 from apo_bench.program import Plan
 from apo_bench.scenario import Scenario
 
@@ -48,7 +50,8 @@ def plan(
         frames = "directions and until in the frame of the assembly"
     else:
         method = "contact" if method is None else method
-        loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
+        with aside() if as_json else nullcontext():
+            loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
         frames = "directions in the frame of the assembly, until in the world"
     lines = plan_lines(asked, loaded)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from apo_bench.deviations import assumed_deviations
 from apo_bench.errors import InputError, unknown
+from apo_bench.output import aside
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
@@ -45,7 +47,8 @@ def recognise(
     asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     name = load_scenario(scenario).name
-    seen, assumed = looked_at(scenario, observation, asked, deviations)
+    with aside() if as_json else nullcontext():
+        seen, assumed = looked_at(scenario, observation, asked, deviations)
     found = recognised(seen, relations)
     if as_json:
         typer.echo(json.dumps(recognition_form(name, relations, seen, found, assumed), allow_nan=False))

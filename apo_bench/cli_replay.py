@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from apo_bench.arguments import check_writable
-from apo_bench.cli_sweep import EYE, FIDELITY, NOISE, RELATIONS
+from apo_bench.cli_sweep import EYE, FIDELITY, NOISE, RELATIONS, interrupted
 from apo_bench.output import aside
 
 NO_RESULT = 1
@@ -81,8 +81,11 @@ def replay(
         video=video,
         limit_s=trial_limit,
     )
-    with aside() if as_json else nullcontext():
-        row = run_one(request)
+    try:
+        with aside() if as_json else nullcontext():
+            row = run_one(request)
+    except KeyboardInterrupt as error:
+        raise interrupted(error) from error
     if as_json:
         typer.echo(json.dumps(row, allow_nan=False))
     else:

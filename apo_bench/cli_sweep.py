@@ -47,6 +47,13 @@ class Interrupted(Exception):
         self.code = code
 
 
+def interrupted(error: KeyboardInterrupt, more: str = "") -> Interrupted:
+    """What a command says that a signal has ended, with its exit code: 128 and the number of the signal."""
+    number = int(getattr(error, "number", signal.SIGINT))
+    said = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+    return Interrupted(f"{said}{more}.", KILLED + number)
+
+
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
     app.command()(sweep)
@@ -112,11 +119,7 @@ def sweep(
     try:
         rows = run(grids, out, workers=crew, limit_s=trial_limit, backend=backend, address=address, command=command)
     except KeyboardInterrupt as error:
-        number = int(getattr(error, "number", signal.SIGINT))
-        said = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-        raise Interrupted(
-            f"{said}; what had ended is kept, and the same command continues.", KILLED + number
-        ) from error
+        raise interrupted(error, "; what had ended is kept, and the same command continues") from error
     print_cells(tally(rows))
     print_prediction(rows)
     typer.echo(

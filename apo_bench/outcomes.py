@@ -8,8 +8,12 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-STAGES = ("demonstrate", "observe", "correct", "plan", "pick", "lift", "carry", "attach", "release", "depart", "judge")
-"""Where a trial can fail, in the order of a trial; `done` is where one that did not fail ends."""
+STAGES = (
+    *("demonstrate", "observe", "correct", "plan", "pick", "lift", "carry", "attach", "release", "depart", "judge"),
+    "worker",
+)
+"""Where a trial can fail, in the order of a trial, and last the process that runs it; `done` is where one that did not
+fail ends."""
 
 CODES = MappingProxyType(
     {
@@ -40,9 +44,9 @@ CODES = MappingProxyType(
         "pushed": "a part that was already in place was pushed away",
         "not_released": "a part is still held",
         "not_at_rest": "a part still moves",
-        # worker: of sweeps alone, whatever the trial was doing
+        # worker: of trials in a process of their own, whatever they were doing
         "worker_died": "the process that ran the trial died",
-        "time_limit": "the trial took longer than the sweep allows, and was ended",
+        "time_limit": "the trial took longer than its limit",
     }
 )
 

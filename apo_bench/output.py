@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from contextlib import contextmanager, redirect_stdout, suppress
 @contextmanager
 def aside() -> Iterator[None]:
     """What is printed meanwhile, by whatever code and below Python too, goes to standard error."""
-    sys.stdout.flush()
+    _flush()
     try:
         ours = os.dup(1)
     except OSError:
@@ -23,6 +24,17 @@ def aside() -> Iterator[None]:
         with redirect_stdout(sys.stderr):
             yield
     finally:
+        _flush()
         if ours is not None:
             os.dup2(ours, 1)
             os.close(ours)
+
+
+def _flush() -> None:
+    """Write what Python and the C library still hold back."""
+    for stream in (sys.stdout, sys.__stdout__):
+        if stream is not None:
+            with suppress(OSError, ValueError):
+                stream.flush()
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).fflush(None)

@@ -21,6 +21,7 @@ from typing import Any
 from apo_bench.benchmark.compare import compare
 from apo_bench.benchmark.figure import draw
 from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.page.times import read_timing
 from apo_bench.benchmark.paired import Paired, paired
 from apo_bench.benchmark.report import report
 from apo_bench.benchmark.statistics import Cell, rank, tally
@@ -54,9 +55,8 @@ def shorten(folder: Path, copy: Path, trials: int | None) -> None:
         grid["trials"] = trials or grid["trials"]
     end = run["grids"][0]["seed"] + run["grids"][0]["trials"]
     (copy / "run.json").write_text(json.dumps(run), encoding="utf-8")
-    for name in ("trials.jsonl", "timing.jsonl"):
-        lines = (folder / name).read_text(encoding="utf-8").splitlines()
-        kept = [line for line in lines if json.loads(line)["seed"] < end]
+    for name, lines in (("trials.jsonl", read_rows(folder)), ("timing.jsonl", read_timing(folder))):
+        kept = (json.dumps(line) for line in lines if line["seed"] < end)
         (copy / name).write_text("".join(f"{line}\n" for line in kept), encoding="utf-8")
 
 
@@ -83,7 +83,7 @@ def keep(folder: Path, full: Path | None) -> None:
 def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
     """Versions, grids, code and times; the command is the one that does it again."""
     run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    times = [json.loads(line) for line in (folder / "timing.jsonl").read_text(encoding="utf-8").splitlines()]
+    times = read_timing(folder)
     spent = {(t["scenario"], t["method"]): [] for t in times}
     for t in times:
         spent[t["scenario"], t["method"]].append(t["trial_s"])
@@ -215,7 +215,7 @@ def agreed(full: Path, contact: Path) -> list[str]:
         "",
         "The same trials at fidelity `full`, in which every step of every motion is simulated: how many have the same "
         "strict verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first. Trials of "
-        "one seed are not independent; the last column counts the seeds with the same verdict in all trials.",
+        "one seed share their random numbers; the last column counts the seeds with the same verdict in all trials.",
         "",
         "| scenario | trials | same verdict | interval | same ending | right at `full` alone | at `contact` alone "
         "| seeds |",

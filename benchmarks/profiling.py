@@ -9,6 +9,7 @@ from __future__ import annotations
 import cProfile
 import io
 import json
+import math
 import platform
 import pstats
 import sys
@@ -119,14 +120,15 @@ def profile(scene: Scene, lines: int = 15) -> list[str]:
 def page(found: dict[str, Any]) -> list[str]:
     shares = found["shares"]
     full = [s for s in shares if s["fidelity"] == "full"]
-    least, most = min(s["mj_step"] for s in full), max(s["inverse_kinematics"] for s in full)
+    least = math.floor(100 * min(s["mj_step"] for s in full))
+    most = math.ceil(100 * max(s["inverse_kinematics"] for s in full))
     return [
         "# Where the time of a replay goes",
         "",
         f"Written by `{found['command']}`: level 1, careless humans, seeds {found['seeds']}, one process, MuJoCo "
         f"{found['versions']['mujoco']}. A replay is everything from a plan to the poses reached: grasps, inverse "
-        f"kinematics, physics. At full fidelity at least {100 * least:.0f} % of the wall time is inside `mj_step` and "
-        f"at most {100 * most:.0f} % is inverse kinematics. The real-time factor counts what `contact` passes over; "
+        f"kinematics, physics. At full fidelity at least {least} % of the wall time is inside `mj_step` and "
+        f"at most {most} % is inverse kinematics. The real-time factor counts what `contact` passes over; "
         "it is of a machine that did other work meanwhile, so compare it within the table only.",
         "",
         "| scenario | method | fidelity | seconds | in `mj_step` | inverse kinematics | real-time factor |",

@@ -28,7 +28,7 @@ from apo_bench.cli import main
 from apo_bench.errors import InputError
 
 CODE = """
-import os, subprocess, time
+import ctypes, os, subprocess, sys, time
 
 def dies_of_b(seen):
     if "B" in seen.assembly.solids:
@@ -56,7 +56,9 @@ def interrupts(seen):
 
 def talks(seen):
     print("from Python")
+    print("from behind", file=sys.__stdout__)
     os.write(1, b"from below")
+    ctypes.CDLL(None).printf(b"from C")
     return seen.goals
 
 def slow(seen):
@@ -167,14 +169,20 @@ def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.Capture
     assert "--video was given together with --trial-limit" in capsys.readouterr().err
 
 
-def test_a_row_on_standard_output_stands_there_alone(capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")
+def test_a_row_on_standard_output_stands_there_alone(tmp_path: Path) -> None:
+    """Also what is held back until the end, where the output is no terminal."""
     trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:talks", "--json"]
+    held_back = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
     for more in ([], ["--trial-limit", "100"]):
-        assert main([*trial, *more]) == 0
-        said = capfd.readouterr()
-        assert json.loads(said.out)["method"] == "unruly:talks"
-        assert "from Python" in said.err
-        assert "from below" in said.err
+        command = [sys.executable, "-m", "apo_bench.cli", *trial, *more]
+        done = subprocess.run(command, capture_output=True, text=True, env=held_back, check=True, timeout=120)
+        assert json.loads(done.stdout)["method"] == "unruly:talks"
+        for words in ("from Python", "from behind", "from below", "from C"):
+            assert words in done.stderr
+    closed = shlex.join([sys.executable, "-m", "apo_bench.cli", *trial]) + " >&-"
+    done = subprocess.run(closed, shell=True, capture_output=True, text=True, check=False, timeout=120)
+    assert "Traceback" not in done.stderr
 
 
 @FOLDERS

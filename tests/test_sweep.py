@@ -94,6 +94,11 @@ def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+def test_grids_whose_seeds_lie_far_apart_are_laid_out_at_once() -> None:
+    far = [replace(SPEC, trials=2, seed=seed, methods=("none",)) for seed in (10**12, 0)]
+    assert [unit.trials[0].seed for unit in units(far, load_all(far))] == [0, 1, 10**12, 10**12 + 1]
+
+
 def test_a_stop_is_heard_while_the_work_is_laid_out(
     counted: Counter[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -48,8 +48,8 @@ class Agreement:
     same_ending: Rate
     """Trials whose verdict, stage and code are the same."""
     same_everywhere: Rate
-    """Seeds of a scenario with which every trial has the same verdict in both. Trials of one share layout,
-    demonstration and the draws of noise, so that these, and not trials, are independent."""
+    """Seeds with which every trial has the same verdict in both. All random numbers of a trial are drawn from its seed,
+    in every scenario the same, so that seeds, and not trials, are independent."""
     only_first: int
     """Trials that were right in the first alone."""
     only_second: int
@@ -213,10 +213,9 @@ def _by_key(side: Side) -> dict[Key, Row]:
 def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
     counted = [(a, b) for a, b in pairs if (a["success"], b["success"]) != (None, None)]
     verdicts = [(a["success"], b["success"]) for a, b in counted]
-    seeds: dict[tuple[str, int], bool] = {}
+    seeds: dict[int, bool] = {}
     for a, b in counted:
-        one = (a["scenario"], a["seed"])
-        seeds[one] = seeds.get(one, True) and a["success"] == b["success"]
+        seeds[a["seed"]] = seeds.get(a["seed"], True) and a["success"] == b["success"]
     return Agreement(
         scenario=name,
         same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),

@@ -157,8 +157,7 @@ def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> Iterato
     carelessness 0 and the first noise model or eye. Neither it nor `none` asks what touches what: both are recorded
     with relations as given.
     """
-    begin, end = min(grid.seed for grid in grids), max(grid.seed + grid.trials for grid in grids)
-    for seed in range(begin, end):
+    for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
         for given, scenario in loaded.items():
             yield from _units(those, given, scenario, seed)

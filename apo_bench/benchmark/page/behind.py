@@ -110,4 +110,5 @@ def rounded(x: Any) -> float | int | None:
 
 def _asked(row: Mapping[str, Any]) -> tuple[Any, ...]:
     names = ("scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp", "arm", "relations")
-    return (*(row.get(name) for name in names), row["method"], row.get("timestep_s"), row.get("fidelity"))
+    lost = row.get("failure_stage") == "worker"
+    return (*(row.get(name) for name in names), row["method"], row.get("timestep_s"), row.get("fidelity"), lost)

@@ -15,9 +15,9 @@ from apo_bench.errors import InputError
 
 AGREEMENT = (
     "The same trials in both: how often the strict verdict is the same, with Wilson's interval, and how often stage "
-    "and code of a failure are as well. Trials of one seed share layout, demonstration and draws of noise, so those "
-    "intervals are too narrow where disagreements come in bunches; *same in all* counts the seeds of a scenario with "
-    "which every trial has the same verdict in both, and these are independent. *Right in the first alone* are trials "
+    "and code of a failure are as well. Trials of one seed share their random numbers, so those "
+    "intervals are too narrow where disagreements come in bunches; *same in all* counts the seeds with which every "
+    "trial has the same verdict in both, and these are independent. *Right in the first alone* are trials "
     "that the second lost. The difference of success is the second minus the first, with Tango's interval for pairs "
     "(95 %), over trials too. Trials whose demonstration was not right in either are left out here."
 )

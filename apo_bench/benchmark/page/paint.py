@@ -36,7 +36,6 @@ STAGE_COLORS = {
     "judge": ("#0072B2", "#4BA3DB"),
     "worker": ("#222222", "#EEEEEE"),
 }
-ORDER = (*STAGES, "worker")
 
 
 def palette(methods: Sequence[str]) -> tuple[str, str]:
@@ -57,7 +56,7 @@ def stage_paint(stage: str) -> str:
 
 def stages_in_order(found: Iterable[str]) -> list[str]:
     """As a trial goes through them; any other at the end."""
-    return sorted(set(found), key=lambda stage: (ORDER.index(stage) if stage in ORDER else len(ORDER), stage))
+    return sorted(set(found), key=lambda stage: (STAGES.index(stage) if stage in STAGES else len(STAGES), stage))
 
 
 def dash(dashes: Any) -> str:

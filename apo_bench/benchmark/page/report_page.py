@@ -263,7 +263,8 @@ def _ran(found: Found) -> Html:
     }
     beside = tag("ul", *(tag("li", tag("a", name, href=name)) for name in found.tables))
     words = (
-        "Commands on this page are to be run where the sweep was run; they give the same rows with the same versions."
+        "Commands on this page are to be run where the sweep was run; they give the same rows with the same versions "
+        "(trials that a limit ended: with the `--trial-limit` of the sweep)."
     )
     return joined([prose(words), ran(found.run, said), tag("h3", "Beside this page"), beside])
 
