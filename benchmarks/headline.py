@@ -71,7 +71,7 @@ def keep(folder: Path, full: Path | None) -> None:
     lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)
     packed = lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
     (KEPT / "rows.jsonl.xz").write_bytes(packed)
-    agreement = agreed(full, folder) if full else []
+    agreement = [*lasting(folder, full), *agreed(full, folder)] if full else []
     told = page(cells, paired(rows, ("paper",)), ran, agreement)
     PAGE.write_text("\n".join(told) + "\n", encoding="utf-8")
     before, rest = README.read_text(encoding="utf-8").split(BEGIN)
@@ -94,9 +94,7 @@ def what_was_run(folder: Path, rows: Sequence[Row]) -> dict[str, Any]:
         "rows": len(rows),
         "replays": sum(row["sim_seconds"] is not None for row in rows),
         "simulated_hours": round(sum(row["sim_seconds"] or 0.0 for row in rows) / 3600, 1),
-        "worker_hours": round(
-            sum((t["trial_s"] or 0) + (t["demonstrate_s"] or 0) + (t["compile_s"] or 0) for t in times) / 3600, 2
-        ),
+        "worker_hours": round(sum(map(worked_s, times)) / 3600, 2),
         "workers": len({t["worker"] for t in times}),
         "median_trial_s": {f"{s}, {m}": round(middle.median(x), 3) for (s, m), x in sorted(spent.items())},
     }
@@ -204,6 +202,30 @@ def differing(pairs: Sequence[Paired]) -> list[str]:
             f"| {p.p:.2g} | {p.p_adjusted:.2g} |"
         )
     return lines
+
+
+def lasting(contact: Path, full: Path) -> list[str]:
+    """How long 40 seeds take: counted, where there are as many, else in proportion."""
+    lines = [
+        "",
+        "## How long it takes",
+        "",
+        "Work of all processes, shared evenly among two: what a sweep of 40 seeds (9760 trials) takes on two cores.",
+        "",
+        "| fidelity | seeds | trials | minutes | 40 seeds |",
+        "|---|---|---|---|---|",
+    ]
+    for name, folder in (("contact", contact), ("full", full)):
+        times = read_timing(folder)
+        first = min(t["seed"] for t in times)
+        some = [t for t in times if t["seed"] < first + 40]
+        seeds, minutes = len({t["seed"] for t in some}), sum(map(worked_s, some)) / 2 / 60
+        lines.append(f"| {name} | {seeds} | {len(some)} | {minutes:.1f} | {minutes * 40 / seeds:.0f} min |")
+    return lines
+
+
+def worked_s(timing: Row) -> float:
+    return sum(timing[part] or 0.0 for part in ("trial_s", "demonstrate_s", "compile_s"))
 
 
 def agreed(full: Path, contact: Path) -> list[str]:
