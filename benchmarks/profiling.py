@@ -129,7 +129,7 @@ def page(found: dict[str, Any]) -> list[str]:
         f"{found['versions']['mujoco']}. A replay is everything from a plan to the poses reached: grasps, inverse "
         f"kinematics, physics. At full fidelity at least {least} % of the wall time is inside `mj_step` and "
         f"at most {most} % is inverse kinematics. The real-time factor counts what `contact` passes over; "
-        "it is of a machine that did other work meanwhile, so compare it within the table only.",
+        "it depends on the machine, so compare it within the table only.",
         "",
         "| scenario | method | fidelity | seconds | in `mj_step` | inverse kinematics | real-time factor |",
         "|---|---|---|---|---|---|---|",
