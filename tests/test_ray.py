@@ -177,7 +177,13 @@ def test_a_driver_that_is_stopped_or_killed_goes_on_later(cluster: Any, here: li
     command += ["--backend", "ray", "--address", cluster.address]
 
     def start() -> subprocess.Popen[str]:
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
+        )
 
     for number, rows in ((signal.SIGINT, 2), (signal.SIGKILL, 5)):
         process = start()
