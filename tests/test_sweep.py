@@ -109,8 +109,12 @@ def test_a_stop_is_heard_while_the_work_is_laid_out(
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(runner, "units", signalled)
-    with pytest.raises(KeyboardInterrupt):
-        runner.sweep(replace(SPEC, trials=5), tmp_path / "run")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have it ignored
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            runner.sweep(replace(SPEC, trials=5), tmp_path / "run")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert counted["laid out"] == 1
     assert counted["trial"] == 0
 
