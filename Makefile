@@ -1,7 +1,7 @@
 # Two commands do everything, on a machine with Python 3.11 or newer and make:
 #   make sweep   set up, run a small benchmark, print the table, write the report
 #   make test    set up, check style and types, run every test
-# and one the table of the project (100 trials per cell take hours):
+# and one the table of the project (100 trials per cell take some 100 minutes on two cores):
 #   make headline [TRIALS=100] [FIDELITY=contact]
 
 PYTHON ?= python3
