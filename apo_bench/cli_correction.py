@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -100,7 +99,7 @@ def correct(
             )
     corrector = _corrector(method, if_doubtful)
     seen, loaded, assumed = observed(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
-    with aside() if as_json else nullcontext():
+    with aside(as_json):
         made = corrected(seen, corrector)
     found = _explained(seen, made)
     if as_json:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -50,7 +49,7 @@ def plan(
         frames = "directions and until in the frame of the assembly"
     else:
         method = "contact" if method is None else method
-        with aside() if as_json else nullcontext():
+        with aside(as_json):
             loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
         frames = "directions in the frame of the assembly, until in the world"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,7 +46,7 @@ def recognise(
     asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     name = load_scenario(scenario).name
-    with aside() if as_json else nullcontext():
+    with aside(as_json):
         seen, assumed = looked_at(scenario, observation, asked, deviations)
     found = recognised(seen, relations)
     if as_json:

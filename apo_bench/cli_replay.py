@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -82,7 +81,7 @@ def replay(
         limit_s=trial_limit,
     )
     try:
-        with aside() if as_json else nullcontext():
+        with aside(as_json):
             row = run_one(request)
     except KeyboardInterrupt as error:
         raise interrupted(error) from error

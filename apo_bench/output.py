@@ -10,8 +10,11 @@ from contextlib import contextmanager, redirect_stdout, suppress
 
 
 @contextmanager
-def aside() -> Iterator[None]:
-    """What is printed meanwhile, by whatever code and below Python too, goes to standard error."""
+def aside(asked: bool) -> Iterator[None]:
+    """If asked, what is printed meanwhile, by whatever code and below Python too, goes to standard error."""
+    if not asked:
+        yield
+        return
     _flush()
     try:
         ours = os.dup(1)

@@ -13,9 +13,8 @@ from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
 from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
-from apo_bench.benchmark.trial import eye_of, run_measured, run_trial
-from apo_bench.benchmark.worker import misbehaved
-from apo_bench.correction.correct import Misbehaved
+from apo_bench.benchmark.trial import eye_of, run_measured
+from apo_bench.benchmark.worker import row_of
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
 from apo_bench.observed import observed, read_stated
@@ -133,10 +132,7 @@ def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, shown), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    try:
-        return run_trial(spec, scene, shown=shown, content=content, watch=film)
-    except Misbehaved as error:
-        return misbehaved(spec, content, shown.demonstration.code, str(error))
+    return row_of(spec, scene, shown, content, watch=film)
 
 
 def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:

@@ -76,10 +76,7 @@ class Worker:
             if key not in demonstrations:
                 demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
             shown = time.perf_counter()
-            try:
-                row = run_trial(spec, scene, shown=demonstrations[key], content=content, branches=branches)
-            except Misbehaved as error:
-                row = misbehaved(spec, content, demonstrations[key].demonstration.code, str(error))
+            row = row_of(spec, scene, demonstrations[key], content, branches=branches)
             spent = (ready - start, shown - ready, time.perf_counter() - shown)
             emit(row, timing(row, self.number, *spent))
 
@@ -97,6 +94,21 @@ class Worker:
             self._terms.check_content(spec.scenario, content)
             self._scenes[key] = (scene, content)
         return self._scenes[key]
+
+
+def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
+    """The row of a trial, also of one whose corrector raised an error or returned what it must not.
+
+    Args:
+        more: As `run_trial` takes it.
+
+    Raises:
+        InputError: The request cannot be honoured.
+    """
+    try:
+        return run_trial(spec, scene, shown=shown, content=content, **more)
+    except Misbehaved as error:
+        return misbehaved(spec, content, shown.demonstration.code, str(error))
 
 
 def lost(spec: TrialSpec, content: str, code: str) -> Row:
