@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import os
-import sys
 import weakref
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -17,6 +14,7 @@ from numpy.typing import NDArray
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Poses
+from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import World, fresh, place
 
@@ -97,7 +95,7 @@ class Film:
         middle = np.array([*scene.scenario.site.center_m, 0.08])
         self.fps, self.camera = fps, camera or view(middle, 0.85, 128.0, -24.0)
         self.frames: list[Image] = []
-        self._renderer = _renderer(scene.work.model, width, height)
+        self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._close = weakref.finalize(self, _release, self._renderer)
         self._every, self._next = speed / fps, 0.0
@@ -149,6 +147,12 @@ class Viewer:
     """Shows a replay in MuJoCo's window, in real time: pass it as `watch`. On macOS run under `mjpython`."""
 
     def __init__(self, scene: Scene) -> None:
+        """A viewer whose window opens when the replay begins.
+
+        Raises:
+            InputError: No window can be opened.
+        """
+        need_window()
         self._scene = scene
         self._window: Any = None
 
@@ -172,11 +176,11 @@ class Viewer:
 def _drawn(
     world: World, data: Any, width: int, height: int, camera: Camera, more: Callable[[Any], None] | None = None
 ) -> Image:
-    with _renderer(world.model, width, height) as renderer:
-        renderer.update_scene(data, camera=camera)
+    with renderer(world.model, width, height) as draws:
+        draws.update_scene(data, camera=camera)
         if more is not None:
-            more(renderer.scene)
-        return np.array(renderer.render())
+            more(draws.scene)
+        return np.array(draws.render())
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
@@ -194,23 +198,3 @@ def _release(renderer: Any) -> None:
     if context is not None:
         context.make_current()
     renderer.close()
-
-
-def _renderer(model: Any, width: int, height: int) -> Any:
-    """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
-
-    Raises:
-        InputError: There is nothing to draw with.
-    """
-    if "MUJOCO_GL" not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        from mujoco.rendering.classic import gl_context
-
-        os.environ["MUJOCO_GL"] = "egl"
-        importlib.reload(gl_context)  # MuJoCo chose when it was imported; nothing was drawn since
-    try:
-        return mujoco.Renderer(model, height, width)
-    except (mujoco.FatalError, ImportError, AttributeError, RuntimeError) as error:
-        raise InputError(
-            f"no picture can be drawn here ({str(error).splitlines()[0]}); install libegl1 and libgl1-mesa-dri, or set "
-            "MUJOCO_GL=osmesa."
-        ) from error

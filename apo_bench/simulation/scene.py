@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, final
@@ -18,6 +17,7 @@ from apo_bench.layout import layout_at
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.arm import Arm, Kinematics, find_arm
+from apo_bench.simulation.graphics import import_mjcf
 from apo_bench.simulation.physics import Physics, physics
 from apo_bench.simulation.world import World, world
 
@@ -105,7 +105,7 @@ def _fixed(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm | None, grasp: str) -> str:
-    mjcf = _mjcf()
+    mjcf = import_mjcf()
     room = mjcf.from_path(str(folder("assets") / "room.xml"))
     room.model = scenario.name
     _set_physics(room, settings)
@@ -120,14 +120,6 @@ def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Ar
     else:
         _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
     return _with_force_sensors(room.to_xml_string(), scenario, arm)
-
-
-def _mjcf() -> Any:
-    """dm-control's mjcf, imported where it is used and without its word about a missing display."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from dm_control import mjcf
-    return mjcf
 
 
 def _set_physics(room: Any, s: Physics) -> None:

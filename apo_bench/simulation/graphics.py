@@ -1,0 +1,150 @@
+"""MuJoCo and dm-control, imported without a graphics driver: one is loaded when the first picture is asked for.
+
+Both choose their OpenGL backend by the variable MUJOCO_GL while they are imported, and a driver that is loaded then
+stays in the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with CUDA) do not survive. Where
+somebody has imported MuJoCo or dm-control before, it is left as it is.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
+
+from apo_bench.errors import InputError
+
+VARIABLE = "MUJOCO_GL"
+
+
+def import_mujoco() -> None:
+    """Import MuJoCo; `mujoco.GLContext` is there when somebody uses it."""
+    if "mujoco" in sys.modules:
+        return
+    with _without_backend():
+        mujoco = importlib.import_module("mujoco")
+    contexts = importlib.import_module("mujoco.rendering.classic.gl_context")
+    _choose_later(contexts, contexts, "GLContext")
+    _choose_later(mujoco, contexts, "GLContext")
+
+
+def import_mjcf() -> Any:
+    """dm-control's mjcf; its renderer is there when somebody uses it."""
+    if "dm_control._render" not in sys.modules:
+        with _without_backend():
+            render = importlib.import_module("dm_control._render")
+        _choose_later(render, render, "Renderer", "BACKEND", "USING_GPU")
+    return importlib.import_module("dm_control.mjcf")
+
+
+@contextmanager
+def _without_backend() -> Iterator[None]:
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = "disable"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
+
+
+def _choose_later(module: ModuleType, source: ModuleType, *names: str) -> None:
+    """Take names out of a module; the first that is asked for runs `source` again, under the variable as it is then."""
+    for name in names:
+        vars(module).pop(name, None)
+
+    def chosen(name: str) -> Any:
+        if name not in names:
+            raise AttributeError(f"module '{module.__name__}' has no attribute '{name}'")
+        if name not in vars(source):
+            importlib.reload(source)
+        if name not in vars(source):
+            raise AttributeError(f"{VARIABLE}={os.environ.get(VARIABLE)} turns pictures off")
+        return vars(source)[name]
+
+    vars(module)["__getattr__"] = chosen
+
+
+def renderer(model: Any, width: int, height: int) -> Any:
+    """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
+
+    Raises:
+        InputError: There is nothing to draw with.
+    """
+    import mujoco
+    from mujoco.rendering.classic import gl_context
+
+    try:
+        if VARIABLE not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+            os.environ[VARIABLE] = "egl"
+            importlib.reload(gl_context)  # where somebody else imported MuJoCo it has chosen already
+        if gl_context.GLContext.__module__ == "mujoco.glfw" and (why := _no_window()):
+            raise RuntimeError(why)  # drawing without a display, MuJoCo ends the process at the second try
+        return mujoco.Renderer(model, height, width)
+    except ValueError:
+        raise
+    except Exception as error:
+        reason = _reason(error)
+        if VARIABLE in os.environ and VARIABLE not in reason:
+            reason = f"{VARIABLE}={os.environ[VARIABLE]}: {reason}"
+        raise InputError(
+            f"no picture can be drawn here ({reason}); without a display install libegl1 and "
+            "libgl1-mesa-dri (Debian) and set MUJOCO_GL=egl."
+        ) from error
+
+
+def need_window() -> None:
+    """Refuse what MuJoCo's viewer would end the process for.
+
+    Raises:
+        InputError: There is no display, or none that can draw.
+    """
+    if sys.platform == "darwin":
+        return
+    if why := _no_window():
+        raise InputError(
+            f"no window can be opened here ({why}); run it where there is a display, or use render_mode='rgb_array' or "
+            "a film."
+        )
+
+
+def _no_window() -> str:
+    """Why GLFW cannot open a window, empty where it can."""
+    try:
+        import glfw
+    except ImportError as error:
+        return _reason(error)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)
+        try:
+            window = _hidden_window(glfw)
+        except glfw.GLFWError as error:
+            return _reason(error)
+    if window:
+        glfw.destroy_window(window)
+        return ""
+    said: Any = glfw.get_error()[1]
+    return said.decode(errors="replace") if said else "there is no display"
+
+
+def _hidden_window(glfw: Any) -> Any:
+    if not glfw.init():
+        return None
+    glfw.default_window_hints()
+    glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+    try:
+        return glfw.create_window(64, 64, "", None, None)
+    finally:
+        glfw.default_window_hints()
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, AttributeError) and "NoneType" in str(error):
+        return "its library is not installed"
+    return (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
