@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.records import copyable
 from apo_bench.geometry.solid import Face, Solid
 
 
@@ -103,6 +104,7 @@ class Relation(NamedTuple):
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """What is taken as certain: solids, operations, fixed parts. It never changes."""

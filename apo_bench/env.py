@@ -13,11 +13,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly
+from apo_bench.benchmark.episode import Scenes, Settings, with_options
 from apo_bench.benchmark.spec import (
     RANGE,
     USUAL,
-    check_careless,
-    check_clearance,
     check_eye,
     check_seed,
     level_pair,
@@ -28,7 +27,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.infos import predicted_info, whole
-from apo_bench.observation.noise import Level, Noise, make_noise
+from apo_bench.observation.noise import Level, make_noise
 from apo_bench.program import Observation, Plan, Poses, Step
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
@@ -77,13 +76,18 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     ## Starting State
     The layout, the human's carelessness and the observation error are drawn anew. `reset(seed=k)` is trial k of
-    sweeps and of `apo-bench replay --seed k`, whatever came before; `reset()` draws the number of a trial. The parts
-    stand where the demonstration began.
+    sweeps and of `apo-bench replay --seed k`, whatever came before; `reset()` draws the number of a trial, which is
+    `env.unwrapped.trial` and never in `info`: whoever sees it can draw the truth. The parts stand where the
+    demonstration began.
+
+    `reset(options={...})` takes `level`, `careless` and `clearance_mm`, with the meaning of the arguments below and for
+    that episode alone; any other key is refused.
 
     ## Episode End
     Every step terminates. `info` then holds `is_success`, `loose_success`, `stage` and `code` (`done` and `ok`, or
     out of `apo_bench.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
-    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth.
+    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and
+    nothing from which it can be drawn.
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
     keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
@@ -100,6 +104,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `timestep_s`: of the physics.
     - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
       display; `human` opens a window when the replay begins.
+
+    ## Copies
+    An environment can be pickled and copied (`copy.deepcopy`) at any time, and the copy goes on exactly as the original
+    would. The window of the mode `human` is not copied; a noise model of one's own must be picklable itself.
 
     ## Version History
     - v0: first version.
@@ -122,19 +130,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
-        check_careless(careless)
-        if clearance_mm is not None:
-            check_clearance(clearance_mm)
-        self.render_mode = render_mode
-        self._careless = careless
         check_eye(eye)
+        self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
-        self._eye, self._level = eye, Level(*level_pair(level, eye))
-        self._noise: Noise = make_noise(USUAL if noise is None else noise, self._level)
+        self._eye, self._model = eye, USUAL if noise is None else noise
+        self._usual = self._now = Settings(Level(*level_pair(level, eye)), careless, clearance_mm)
+        self._noise = self._usual_noise = make_noise(self._model, self._usual.level)
         self._scene = build_scene(
             load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
         )
+        self._scenes = Scenes(self._scene)
         n = len(self.assembly)
         far = np.tile([ROOM_M] * 3 + [1.0] * 4, (n, 1))
         unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
@@ -147,6 +153,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             }
         )
         self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
+        self._trial: int | None = None
         self._shown: Shown | None = None
         self._seen: Observation | None = None
         self._aim: Plan | None = None
@@ -172,22 +179,42 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
         return self._seen
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
-        """Watch another demonstration; `seed=k` is trial k. There are no options.
+    @property
+    def trial(self) -> int:
+        """The number of the trial of this episode, for whoever watches a learner: not for the learner.
+
+        Anybody can draw the truth of a trial from its number.
 
         Raises:
-            InputError: No demonstration comes out right.
+            ResetNeeded: There is no episode yet.
+        """
+        if self._trial is None:
+            raise gymnasium.error.ResetNeeded("there is no trial yet; call reset() first.")
+        return self._trial
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """Watch another demonstration; `seed=k` is trial k.
+
+        Args:
+            options: `level`, `careless` and `clearance_mm` of this episode; what is not said is as the environment was
+                made.
+
+        Raises:
+            InputError: Another option, a value that is not allowed, or no demonstration comes out right.
         """
         if seed is not None:
             check_seed(int(seed))
+        self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
-        trial, shown = self._watch_human(seed)
-        noise = through(self._scene, shown, self._level.mm) if self._eye == RANGE else self._noise
-        self._shown, self._seen = shown, see(self._scene, shown, noise, trial)
+        self._over = True
+        self._trial, shown = self._watch_human(seed)
+        noise = through(self._scene, shown, self._now.level.mm) if self._eye == RANGE else self._noise
+        self._seen = see(self._scene, shown, noise, self._trial)
+        self._shown = replace(shown, watched=None)
         self.aim(self._seen.goals)
         self._refused, self._over = unseen(self._seen), False
         self._poses, self._state = shown.layout.start, None
-        return self._observation(), {"trial": trial, "demonstration": shown.demonstration.code}
+        return self._observation(), {"demonstration": shown.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the goals, each moved by its twist.
@@ -248,17 +275,28 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             self._window.close()
             self._window = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the window."""
+        return {**self.__dict__, "_poses": dict(self._poses), "_window": None}
+
+    def _set(self, now: Settings) -> None:
+        """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
+        same = now.level == self._usual.level
+        noise = self._usual_noise if same else make_noise(self._model, now.level)
+        self._scene = self._scenes.of(now.clearance_mm)
+        self._now, self._noise = now, noise
+
     def _watch_human(self, seed: int | None) -> tuple[int, Shown]:
         """Trial `seed`, or the next one whose demonstration is right."""
         for _ in range(1 if seed is not None else MOST_TRIES):
             trial = int(seed) if seed is not None else self._next_trial()
-            shown = show(self._scene, self._careless, trial, self._eye)
+            shown = show(self._scene, self._now.careless, trial, self._eye)
             if seed is not None or shown.demonstration.code == "ok":
                 return trial, shown
         raise InputError(
             f"{MOST_TRIES} demonstrations of '{self._scene.scenario.name}' in a row went wrong at carelessness "
-            f"{self._careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend the "
-            "scenario."
+            f"{self._now.careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend "
+            "the scenario."
         )
 
     def _next_trial(self) -> int:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Contact
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
 
 Poses = Mapping[str, Array]
 """Part name -> pose (4, 4) in the world, [m]."""
@@ -27,6 +28,7 @@ def frozen_poses(poses: Poses) -> Poses:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Layout:
     """The truth of a trial: the consistent goals a seed draws, before any human error."""
@@ -40,6 +42,7 @@ class Layout:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Demonstration:
     """What the human did, without measurement error."""
@@ -66,6 +69,7 @@ class Demonstration:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Observation:
     """What was seen: all a corrector may use."""
@@ -108,6 +112,7 @@ def once_each(n: int) -> tuple[Step, ...]:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Plan:
     """What the robot is asked to do."""
@@ -195,6 +200,7 @@ class Consistency:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Correction:
     """What a corrector returns: the goals, and what happened."""
@@ -238,6 +244,7 @@ class Correction:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """The physical state when an operation was over, or at the end."""

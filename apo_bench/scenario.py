@@ -12,11 +12,13 @@ import numpy as np
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
 from apo_bench.program import Poses, frozen_poses
 from apo_bench.thresholds import Thresholds
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Attach:
     """The straight line on which a part comes to its goal."""
@@ -44,6 +46,7 @@ class Preference(NamedTuple):
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Grasp:
     """Where the gripper holds the main part, from above."""
@@ -59,6 +62,7 @@ class Grasp:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Shift:
     """How far the truth of an operation may vary along a direction that no contact fixes."""
@@ -87,6 +91,7 @@ class Site:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Carelessness:
     """What the human gets wrong: an offset of random sign, its size uniform between two bounds."""
@@ -109,6 +114,7 @@ class Carelessness:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """One demonstration: topology, nominal goals, and how its truth and its human vary."""

@@ -11,9 +11,11 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Face:
     """A flat polygon, convex or not, with or without holes, that looks outwards along its normal."""
@@ -46,6 +48,7 @@ class Face:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Box:
     """An axis-aligned box in the frame of its solid, [m]."""
@@ -66,6 +69,7 @@ def extent(boxes: Iterable[Box], along: Array) -> tuple[float, float]:
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A rigid part of nominal size: named faces, and the boxes whose union it is."""

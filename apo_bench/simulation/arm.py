@@ -12,10 +12,12 @@ import numpy as np
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
 from apo_bench.resources import folder
 
 
 @final
+@copyable
 @dataclass(frozen=True, eq=False)
 class Arm:
     """An arm with a parallel gripper; bring your own as `Arm(mjcf=..., tip=..., ...)`.
