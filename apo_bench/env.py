@@ -72,7 +72,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     0.1 m and 0.5 rad per axis. The robot is asked for `goal @ exp(twist)`; zeros replay what was seen.
 
     ## Rewards
-    1.0 if the assembly is right in the strict sense of the judge, else 0.0.
+    1.0 if the finished assembly is right, else 0.0.
 
     ## Starting State
     The layout, the human's carelessness and the observation error are drawn anew. `reset(seed=k)` is trial k of
@@ -84,10 +84,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     that episode alone; any other key is refused.
 
     ## Episode End
+<<<<<<< HEAD
     Every step terminates. `info` then holds `is_success`, `loose_success`, `stage` and `code` (`done` and `ok`, or
     out of `apo_bench.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
     `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and
     nothing from which it can be drawn.
+=======
+    Every step terminates. `info` then holds `is_success`, `as_demonstrated` (each contact was also made when and where
+    it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of `apo_bench.outcomes`), `operation`
+    (numbered from 1, or None), `sentence` and, if a plan was carried out,
+    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth.
+>>>>>>> bc3eb73 (Two verdicts: success is what a person says who sees the finished assembly, as_demonstrated is today's)
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
     keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
@@ -233,17 +240,16 @@ class APOReplay(gymnasium.Env[Seen, Action]):
                 "allowed, as `env.action_space` says."
             )
         self._over = True
-        success, loose, end, said = self._replayed(self._shown, _moved(self._aim, pose.exp(twist)))
+        verdicts, end, said = self._replayed(self._shown, _moved(self._aim, pose.exp(twist)))
         info = {
-            "is_success": success,
-            "loose_success": loose,
+            **verdicts,
             "stage": end.stage,
             "code": end.code,
             "operation": whole(None if end.operation is None else end.operation + 1),
             "sentence": end.sentence,
             **({} if said is None else {"predicted": predicted_info(said)}),
         }
-        return self._observation(), float(success), True, False, info
+        return self._observation(), float(verdicts["is_success"]), True, False, info
 
     def aim(self, goals: Array, schedule: Sequence[Step] = (), targets: Array | None = None) -> None:
         """Replay this on zeros, until the next reset; for wrappers.
@@ -307,17 +313,20 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         goals = packed(self.seen.goals)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
-    def _replayed(self, shown: Shown, plan: Plan) -> tuple[bool, bool, Ending, dict[str, Any] | None]:
-        """Strict success, loose success, where it ended, and what the plan had said."""
+    def _replayed(self, shown: Shown, plan: Plan) -> tuple[dict[str, bool], Ending, dict[str, Any] | None]:
+        """The verdicts, where it ended, and what the plan had said."""
+        failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
         if shown.demonstration.code != "ok":
-            return False, False, misshown(shown.demonstration), None
+            return failed, misshown(shown.demonstration), None
         if self._refused is not None:
-            return False, False, self._refused, None
+            return failed, self._refused, None
         said = foretold(plan, self._scene)
         tried = attempt(plan, self._scene, shown.layout.goals, self._watch())
         if tried.result.reached.final is not None:
             self._poses = tried.result.reached.final.poses
-        return tried.verdict.success, tried.verdict.loose_success, ending(tried), said
+        judged = tried.verdict
+        verdicts = (judged.success, judged.as_demonstrated, judged.loose_success)
+        return dict(zip(failed, verdicts, strict=True)), ending(tried), said
 
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NOTHING, Overlap, overlap
-from apo_bench.placement import placed
-from apo_bench.program import Poses, Snapshot
+from apo_bench.geometry.overlap import Overlap, overlap
+from apo_bench.program import Poses
 from apo_bench.thresholds import Thresholds
 
 Moment = Literal["made", "end"]
+Share = Callable[[Overlap, Overlap], float]
+"""How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
 
 
 class ContactVerdict(NamedTuple):
@@ -30,79 +30,85 @@ class ContactVerdict(NamedTuple):
     angle_deg: float
     """Between the normals of the faces; 0 if they look straight at each other."""
     overlap: float
-    """How much of the true overlap is covered, at its place on the environment face; elsewhere does not count."""
+    """How much of the true overlap is covered."""
     touching: bool
     """Strict in gap, loose in angle; faces that look at each other but do not overlap leave this open, as true."""
     covering: bool
     """There is an overlap, and it is large enough."""
     loose: bool
+    allowed_mm: float
+    """The largest gap that counts as touching."""
 
     @property
     def strict(self) -> bool:
         return self.touching and self.covering
 
 
-def judged_contacts(
-    assembly: Assembly,
-    after: Sequence[Snapshot | None],
-    final: Snapshot | None,
-    reference: Array,
-    thresholds: Thresholds,
-    clearance_mm: float,
-) -> tuple[ContactVerdict, ...]:
-    """Every contact in the snapshot after its operation, and at the end if it still stands.
+class ContactJudge(NamedTuple):
+    """What is asked of a contact, whatever the moment."""
 
-    Moments of which there is no snapshot are left out. Args as for `apo_bench.judge.judge`.
-    """
-    true = _true_overlaps(assembly, after, reference)
-    out = []
-    for k, (contact, made, lost) in enumerate(assembly.relations()):
-        allowed = clearance_mm + thresholds.fit_margin_mm if assembly.is_fit(contact) else thresholds.support_mm
-        plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
-        moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
-        for moment, snapshot in moments.items():
-            if snapshot is not None:
-                gap, angle, found = _measured(assembly, contact, plane, normal, snapshot.poses)
-                share = found.share(true[k])
-                turned = not angle <= thresholds.loose_angle_deg
-                covering = gap is not None and share >= thresholds.overlap_fraction
-                near = not turned and (gap is None or gap <= thresholds.loose_gap_mm)
-                touching = near and (gap is None or gap <= allowed)
-                loose = near and covering
-                out.append(ContactVerdict(contact, made, moment, gap, angle, share, touching, covering, loose))
-    return tuple(out)
+    assembly: Assembly
+    thresholds: Thresholds
+    clearance_mm: float
+
+    def verdict(
+        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Overlap, share: Share
+    ) -> ContactVerdict:
+        """Measure one contact.
+
+        Args:
+            poses: Where the parts are, world frame, [m].
+            true: The overlap of the two faces at the true goals.
+        """
+        asked, fits = self.thresholds, self.assembly.is_fit(contact)
+        allowed = self.clearance_mm + asked.fit_margin_mm if fits else asked.support_mm
+        gap, angle, found = _measured(self.assembly, contact, poses)
+        covered = share(found, true)
+        covering = gap is not None and covered >= asked.overlap_fraction
+        near = angle <= asked.loose_angle_deg and (gap is None or gap <= asked.loose_gap_mm)
+        touching = near and (gap is None or gap <= allowed)
+        loose = near and covering
+        return ContactVerdict(
+            contact, operation, moment, gap, angle, covered, touching, covering, loose, allowed_mm=allowed
+        )
 
 
-def _true_overlaps(assembly: Assembly, after: Sequence[Snapshot | None], reference: Array) -> list[Overlap]:
-    """The overlap of every contact when it is made at the true goals.
+def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
+    """Of the contacts that are worst: `gap` and `overlap`, each with what is wrong, if there is anything."""
+    apart = [c for c in contacts if not c.touching]
+    if apart:
+        worst = max(apart, key=lambda c: (c.angle_deg > thresholds.loose_angle_deg, c.gap_mm or 0.0))
+        if worst.gap_mm is None or worst.angle_deg > thresholds.loose_angle_deg:
+            how = f"turned by {worst.angle_deg:.1f} deg, where {thresholds.loose_angle_deg:g} deg are allowed"
+        else:
+            how = f"off by {worst.gap_mm:.2f} mm, where {worst.allowed_mm:g} mm are allowed"
+        yield "gap", f"{worst.contact} is {how}{_when(worst)}"
+    bare = [c for c in contacts if not c.covering]
+    if bare:
+        worst = min(bare, key=lambda c: c.overlap)
+        how = (
+            f"{100 * worst.overlap:.0f} % of the true overlap, where {100 * thresholds.overlap_fraction:g} % are asked"
+        )
+        yield "overlap", f"{worst.contact} covers {how}{_when(worst)}"
 
-    A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
-    """
-    first = next((snapshot for snapshot in after if snapshot is not None), None)
-    if first is None:
-        return [NOTHING] * len(assembly.relations())
-    history = placed(assembly, first.poses, reference)
-    return [_overlap(assembly, contact, history[made]) for contact, made, _ in assembly.relations()]
+
+def face_overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
+    """The overlap of the two faces of a contact; nothing, if they do not look at each other."""
+    m, e = contact
+    return overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])
 
 
-def _measured(
-    assembly: Assembly, contact: Contact, plane: Array, normal: Array, poses: Poses
-) -> tuple[float | None, float, Overlap]:
-    """Largest |e| [mm], angle between the normals [degrees], and the overlap.
+def _when(found: ContactVerdict) -> str:
+    return f" after operation {found.operation + 1}" if found.moment == "made" else ""
 
-    Args:
-        plane: Of the manipulated face, (4,), in the frame of its part.
-        normal: Of the environment face, (3,), in the frame of its part.
-    """
-    found = _overlap(assembly, contact, poses)
+
+def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float | None, float, Overlap]:
+    """Largest |e| [mm], angle between the normals [degrees], and the overlap."""
+    plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
+    found = face_overlap(assembly, contact, poses)
     T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]
     n = T_m[:3, :3] @ plane[:3]
     angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
     if not found:
         return None, angle, found
     return float(np.abs((found.corners - T_m[:3, 3]) @ n + plane[3]).max()) * 1e3, angle, found
-
-
-def _overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
-    m, e = contact
-    return overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])

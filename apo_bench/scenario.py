@@ -14,7 +14,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.records import copyable
 from apo_bench.program import Poses, frozen_poses
-from apo_bench.thresholds import Thresholds
+from apo_bench.thresholds import Meaning, Thresholds
 
 
 @final
@@ -144,6 +144,8 @@ class Scenario:
     clearance_mm: float
     gap_mm: float
     """Largest |e| at which the contact equations count as solved."""
+    success_means: Meaning = "assembled"
+    """What the judge calls a success: that the finished assembly is right, or that it was made as demonstrated."""
     follows_site: frozenset[str] = frozenset()
     """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
 

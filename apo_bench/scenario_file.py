@@ -20,7 +20,7 @@ from apo_bench.scenario_entries import Entry, read_operations, read_parts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_span, refuse
 from apo_bench.strict_json import Node
 from apo_bench.strict_toml import read_toml
-from apo_bench.thresholds import Thresholds
+from apo_bench.thresholds import MEANINGS, Meaning, Thresholds
 
 SCHEMA = 1
 LARGEST_CLEARANCE_MM = 5.0
@@ -78,6 +78,7 @@ def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]
     for name in parts:
         if name not in assembly.fixed and not any(name in operation.moves for operation in assembly.operations):
             refuse(top["parts"], f"no operation moves '{name}'; give it one, or say fixed = true")
+    thresholds, means = _judge(top["judge"]) if "judge" in top else (Thresholds(), MEANINGS[0])
     scenario = Scenario(
         name=path.stem,
         **{key: top[key].text() if key in top else "" for key in ("title", "paper", "human", "success")},
@@ -91,7 +92,8 @@ def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]
         site=_site(top["site"]) if "site" in top else Site(),
         shifts=tuple(shift for entry in entries for shift in entry.shifts),
         careless=_careless(top["careless"], entries) if "careless" in top else None,
-        thresholds=_thresholds(top["judge"]) if "judge" in top else Thresholds(),
+        thresholds=thresholds,
+        success_means=means,
         clearance_mm=_number(top["clearance_mm"], LARGEST_CLEARANCE_MM) if "clearance_mm" in top else 0.25,
         gap_mm=_number(top["gap_mm"], LARGEST_CLEARANCE_MM, above=True) if "gap_mm" in top else 0.1,
         follows_site=frozenset(name for name, part in parts.items() if part.follows_site),
@@ -130,10 +132,14 @@ def _careless(node: Node, entries: tuple[Entry, ...]) -> Carelessness:
     return Carelessness(number - 1, axis, 1e-3 * low, 1e-3 * high)
 
 
-def _thresholds(node: Node) -> Thresholds:
-    keys = node.fields((), tuple(field.name for field in fields(Thresholds)))
+def _judge(node: Node) -> tuple[Thresholds, Meaning]:
+    keys = dict(node.fields((), ("success", *(field.name for field in fields(Thresholds)))))
+    means = keys.pop("success", None)
+    if means is not None and means.value not in MEANINGS:
+        means.fail(f"{' or '.join(MEANINGS)} is needed")
     largest = {"overlap_fraction": 1.0, "loose_angle_deg": 180.0}
-    return Thresholds(**{key: _number(value, largest.get(key, 1e4)) for key, value in keys.items()})
+    thresholds = Thresholds(**{key: _number(value, largest.get(key, 1e4)) for key, value in keys.items()})
+    return thresholds, MEANINGS[0] if means is None else means.value
 
 
 def _number(node: Node, high: float, *, above: bool = False) -> float:

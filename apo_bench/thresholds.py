@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Literal, final
+
+Meaning = Literal["assembled", "as_demonstrated"]
+"""What `success` asks for: that the finished assembly is right, or that it was also made as demonstrated."""
+MEANINGS: tuple[Meaning, ...] = ("assembled", "as_demonstrated")
 
 
 @final
@@ -20,7 +24,7 @@ class Thresholds:
     penetration_mm: float = 0.05
     """Strict: no two physical geoms of different parts are deeper in each other."""
     pushed_mm: float = 1.0
-    """Strict: no part that was in place moved its centre by more."""
+    """Strict: no part that was in place moved a corner by more; as demonstrated: its centre, at any later moment."""
     rest_mm_s: float = 1.0
     """Strict: every part is slower."""
     rest_deg_s: float = 2.0

@@ -40,7 +40,7 @@ def test_numbers_are_those_of_the_scenario() -> None:
     scenario = load_scenario("stick_in_tower")
     text = card(replace(scenario, clearance_mm=0.4, thresholds=replace(scenario.thresholds, pushed_mm=7.0)))
     assert "within 0.5 mm (at 0.4 mm clearance per side)" in text
-    assert "pushed by more than 7 mm" in text
+    assert "more than 7 mm from where it was put" in text
     assert "x 120 ± 40 mm, y 0 ± 60 mm, turned by -28 to 28 degrees" in text
     assert "- Operation 2: castle2 by -4 to 4 mm along its x axis." in text
 

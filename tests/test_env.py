@@ -133,7 +133,7 @@ def _nothing() -> Any:
 
     outcome = Record(stage="plan", code="unreachable", operation=0, sentence="the arm cannot reach it")
     result = Record(outcome=outcome, reached=Record(final=None))
-    return Record(result=result, verdict=Record(success=False, loose_success=False, code="not_made"))
+    return Record(result=result, verdict=Record(success=False, as_demonstrated=False, loose_success=False))
 
 
 def test_correction_aims_and_an_action_composes_on_top(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,7 +210,7 @@ def test_info_never_holds_the_truth(env: APOReplay) -> None:
     _, _, _, _, info = env.step(np.full((3, 6), 0.05))
     said = info.pop("predicted")
     assert set(said) == {"fails", "operation", "code", "size_mm"}
-    assert set(info) == {"is_success", "loose_success", "stage", "code", "operation", "sentence"}
+    assert set(info) == {"is_success", "as_demonstrated", "loose_success", "stage", "code", "operation", "sentence"}
     assert set(first) == {"demonstration"}
     assert info["stage"] in (*outcomes.STAGES, "done")
     assert info["code"] in outcomes.CODES

@@ -236,9 +236,9 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
         (
             "trials.jsonl",
             json.dumps(row(1) | {"schema": "apo-bench/row/4"}) + "\n",
-            "this version writes 'apo-bench/row/5'",
+            "this version writes 'apo-bench/row/6'",
         ),
-        ("trials.jsonl", json.dumps(row(1) | {"schema": "apo-bench/row/9"}) + "\n", "'apo-bench/row/5' is needed"),
+        ("trials.jsonl", json.dumps(row(1) | {"schema": "apo-bench/row/9"}) + "\n", "'apo-bench/row/6' is needed"),
         ("trials.jsonl", "{}\n", "line 1: this is not a row of a sweep"),
         ("trials.jsonl", "[1, 2]\n", "line 1: this is not a row of a sweep"),
         ("trials.jsonl", "\xff\n", "line 1: this is not a row of a sweep"),

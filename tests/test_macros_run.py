@@ -57,7 +57,7 @@ def test_a_bottom_is_felt(tmp_path: Path, short_mm: float) -> None:
     holes = {"cube": ("cube", (-30, 0, 25)), "holder": ("blind.xml", (60, 0, 25))}
     scenario = own(tmp_path, f"goal = {{ at_mm = [-30, 0, 25] }}\ncontacts = [{contacts}]", **holes)
     assert names(scenario) == [["insert-into", "move-to-bottom"]]
-    assert done(scenario, (-short_mm, 0, 0)).verdict.success
+    assert done(scenario, (-short_mm, 0, 0)).verdict.as_demonstrated
 
 
 @pytest.mark.parametrize("short_mm", [0.0, 3.0])
@@ -66,7 +66,7 @@ def test_the_end_of_a_slot_is_felt(tmp_path: Path, short_mm: float) -> None:
     goal = f'goal = {{ at_mm = [0, 0, 40] }}\ncontacts = [{SLOT}, ["px", "stop.nx"]]'
     scenario = own(tmp_path, goal, **stand)
     assert names(scenario) == [["insert-into-slot", "move-to-contact", "slide-to-contact"]]
-    assert done(scenario, (-short_mm, 0, 0)).verdict.success
+    assert done(scenario, (-short_mm, 0, 0)).verdict.as_demonstrated
 
 
 def test_a_slot_may_be_entered_from_its_end(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_slot_may_be_entered_from_its_end(tmp_path: Path) -> None:
     scenario = own(tmp_path, goal, castle=("castle", (0, 0, 0)))
     assert names(scenario) == [["insert-into-slot", "move-to-contact"]]
     assert scenario.attach[0].direction.tolist() == [-1.0, 0.0, 0.0]
-    assert done(scenario).verdict.success
+    assert done(scenario).verdict.as_demonstrated
 
 
 def test_a_level_way_may_end_in_a_slide(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_a_level_way_may_end_in_a_slide(tmp_path: Path) -> None:
     goal += 'attach = { along = "+x", travel_mm = 60 }'
     scenario = own(tmp_path, goal, stop=("block", (135, 0, 25)))
     assert names(scenario) == [["move-to-contact", "slide-to-contact"]]
-    assert done(scenario, (-2.0, 0, 0)).verdict.success
+    assert done(scenario, (-2.0, 0, 0)).verdict.as_demonstrated
 
 
 def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:
         cube=("cube", (0, 0, 25)),
     )
     assert names(scenario) == [["insert-into"], ["depart", "move-to-contact"]]
-    assert done(scenario, schedule=(Step(0), Step(1), Step(1, True), Step(1))).verdict.success
+    assert done(scenario, schedule=(Step(0), Step(1), Step(1, True), Step(1))).verdict.as_demonstrated
 
 
 @pytest.mark.parametrize("off_mm", [0.0, 2.0])
@@ -115,7 +115,9 @@ def test_a_corner_is_felt_from_both_sides(tmp_path: Path, off_mm: float) -> None
     schedule = (Step(0), Step(1), Step(1, True), Step(1))
     tried = done(scenario, (off_mm, off_mm, 0), schedule)
     assert tried.result.outcome.code == "ok"
-    assert [c.contact.environment.part for c in tried.verdict.contacts if c.operation == 0 and c.strict] == [
+    assert [
+        c.contact.environment.part for c in tried.verdict.demonstrated.contacts if c.operation == 0 and c.strict
+    ] == [
         "left",
         "back",
         "table",

@@ -44,6 +44,7 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         **UNKNOWN,
         "demonstration": "demonstration_failed" if success is None else "ok",
         "success": success,
+        "as_demonstrated": success,
         "loose_success": success,
         "failure_stage": "attach" if failed else None,
         "failure_code": "force_stop" if failed else None,

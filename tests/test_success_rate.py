@@ -43,9 +43,9 @@ def spec(scenario: str, method: str, seed: int) -> TrialSpec:
 
 
 def verdicts(scene: Scene, method: str) -> str:
-    """Strict success for each seed, as ones and zeros."""
+    """Whether it was made as demonstrated, for each seed, as ones and zeros."""
     name = scene.scenario.name
-    return "".join(str(int(run_trial(spec(name, method, seed), scene)["success"])) for seed in SEEDS)
+    return "".join(str(int(run_trial(spec(name, method, seed), scene)["as_demonstrated"])) for seed in SEEDS)
 
 
 def bits(scene: Scene) -> str:

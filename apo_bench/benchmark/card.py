@@ -10,6 +10,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.graph import Arc, Graph, relation_graph
 from apo_bench.human_error import NOTHING_M, spread
+from apo_bench.judge_finished import fixtures
 from apo_bench.placement import placed
 from apo_bench.program import Layout
 from apo_bench.scenario import Carelessness, Scenario
@@ -123,10 +124,18 @@ def _success(scenario: Scenario) -> Iterator[str]:
     if scenario.success:
         yield scenario.success
     yield (
-        f"Strict: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} mm clearance "
-        f"per side), other contacts within {t.support_mm:g} mm, over at least {100 * t.overlap_fraction:g} % of the "
-        f"true overlap; no part more than {t.penetration_mm:g} mm inside another, none in place pushed by more than "
-        f"{t.pushed_mm:g} mm; all let go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
+        f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
+        f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
+        f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
+        f"another, no corner of a part more than {t.pushed_mm:g} mm from where it was put; all let go of and slower "
+        f"than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
+    )
+    away = sorted(fixtures(scenario.assembly))
+    if away:
+        yield f"Where {_and(away)} ends is free: it is a fixture, used and put away."
+    yield (
+        "As demonstrated: the same, and every contact also when it was made, where it was shown; no part in place "
+        "pushed on the way." + (" Here only that is a success." if scenario.success_means != "assembled" else "")
     )
     yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
     yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."

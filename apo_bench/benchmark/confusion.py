@@ -15,7 +15,10 @@ ALL = "all"
 @final
 @dataclass(frozen=True)
 class Confusion:
-    """Counts over every clearance, carelessness and level of a sweep; fitted means strict success."""
+    """Counts over every clearance, carelessness and level of a sweep.
+
+    Fitted means a success that was made as demonstrated: that is what a plan foretells.
+    """
 
     scenario: str
     method: str
@@ -60,11 +63,11 @@ def confusions(rows: Iterable[Mapping[str, Any]]) -> tuple[Confusion, ...]:
 def _counted(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Confusion:
     excluded = [row for row in rows if row["success"] is None]
     executed = [row for row in rows if row["predicted"] is not None and row["success"] is not None]
-    caught = [row for row in executed if row["predicted"]["fails"] and not row["success"]]
+    caught = [row for row in executed if row["predicted"]["fails"] and not row["as_demonstrated"]]
     stopped = [row for row in caught if row["failure_operation"] is not None]
 
-    def count(fails: bool, success: bool) -> int:
-        return sum((row["predicted"]["fails"], row["success"]) == (fails, success) for row in executed)
+    def count(fails: bool, fitted: bool) -> int:
+        return sum((row["predicted"]["fails"], row["as_demonstrated"]) == (fails, fitted) for row in executed)
 
     return Confusion(
         scenario=scenario,

@@ -22,10 +22,10 @@ from apo_bench.benchmark.run_file import check_same, write_run
 from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
 
-OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3", "apo-bench/row/4")
+OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3", "apo-bench/row/4", "apo-bench/row/5")
 """Rows that say less: nothing about the test of a correction and its posterior, the eye, the fidelity. Reports still
 read them."""
-UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full"}
+UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "as_demonstrated_code": None}
 """What stands in place of what older rows do not say."""
 CHUNK = 1 << 16
 
@@ -134,7 +134,7 @@ def _row(line: bytes, path: Path, number: int) -> dict[str, Any]:
             f"{path}, line {number}: this is not a row of a sweep; remove the line or the folder."
         ) from error
     if row.get("schema") in OLD_ROWS:
-        return {**UNSAID, **row}
+        return {**UNSAID, "as_demonstrated": row.get("success"), **row}
     if row.get("schema") != ROW:
         raise InputError(f"{path}, line {number}: a row of schema '{row.get('schema')}' was given; '{ROW}' is needed.")
     return row

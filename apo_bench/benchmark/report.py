@@ -33,7 +33,8 @@ from apo_bench.errors import InputError
 COLUMNS = (
     *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method"),
     *("grasp", "fidelity", "trials", "successes", "rate", "low_95", "high_95", "executed", "executed_rate"),
-    *("executed_low_95", "executed_high_95", "loose_successes", "loose_rate", "excluded", "failures"),
+    *("executed_low_95", "executed_high_95", "demonstrated", "demonstrated_rate", "loose_successes", "loose_rate"),
+    *("excluded", "failures"),
 )
 MOST_PANELS = 16
 """Of a PNG; laying out more takes minutes."""
@@ -197,7 +198,8 @@ def _line(c: Cell) -> tuple[object, ...]:
     where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg, c.tightness, c.method)
     strict = (c.grasp, c.fidelity, c.trials, c.successes, c.rate, *c.interval)
     executed = (c.executed.trials, c.executed.rate, *c.executed.interval)
-    return (*where, *strict, *executed, c.loose_successes, c.loose_rate, c.excluded, failures(c, 99))
+    other = (c.demonstrated, c.demonstrated_rate, c.loose_successes, c.loose_rate, c.excluded)
+    return (*where, *strict, *executed, *other, failures(c, 99))
 
 
 def _rows(rows: Sequence[Mapping[str, Any]], path: Path) -> Path:

@@ -47,11 +47,13 @@ def result(end: Ending, *, success: bool | None) -> Row:
     """The rest of a row of which nothing but its ending is known."""
     return {
         "success": success,
+        "as_demonstrated": success,
         "loose_success": success,
         "failure_stage": end.stage if end.failed else None,
         "failure_code": end.code if end.failed else None,
         "failure_operation": None if end.operation is None else end.operation + 1,
         "sentence": end.sentence,
+        "as_demonstrated_code": None,
         "conditions": None,
         "worst_gap_mm": None,
         "worst_angle_deg": None,

@@ -32,7 +32,8 @@ NUMBERS: Mapping[str, str] = {
 """Numbers of a row that the page shows, in its order, with what they are called there."""
 SAID = (
     *("schema", "spec_hash", "scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp"),
-    *("arm", "relations", "method", "seed", "timestep_s", "fidelity", "demonstration", "success", "loose_success"),
+    *("arm", "relations", "method", "seed", "timestep_s", "fidelity", "demonstration", "success", "as_demonstrated"),
+    *("loose_success",),
     *("failure_stage", "failure_code", "failure_operation", "sentence", "freed", "predicted"),
 )
 TESTED = (
@@ -41,7 +42,7 @@ TESTED = (
 )
 COLUMNS = (*SAID, *TESTED, *NUMBERS)
 """What is kept of a row; the rest (thresholds, conditions, final poses, attempts) is read again where it is needed."""
-NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
+NEEDED = ("demonstration", "success", "as_demonstrated", "loose_success", "failure_stage", "failure_code")
 """What every row says, besides its key."""
 USUAL = {"fidelity": "full", "arm": "six_axis", "timestep_s": 0.001}
 """What a row that does not say means."""
@@ -63,7 +64,7 @@ def _slim(row: Mapping[str, Any], foretold: dict[Any, Any], folder: str | Path) 
     for name in NEEDED:
         if name not in row:
             raise _wrong(row, folder, f"without '{name}'")
-    for name in ("success", "loose_success"):
+    for name in ("success", "as_demonstrated", "loose_success"):
         if row[name] is not None and type(row[name]) is not bool:
             raise _wrong(row, folder, f"whose '{name}' is neither true, false nor null ({row[name]!r})")
     for name in NUMBERS:

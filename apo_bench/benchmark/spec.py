@@ -11,7 +11,7 @@ from typing import Never, final
 from apo_bench.errors import InputError, unknown
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/5"
+ROW = "apo-bench/row/6"
 EYES = ("noise", "range")
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"

@@ -134,7 +134,14 @@ def attempt(
     """
     result = replay(plan, scene, watch, fidelity=fidelity, branches=branches)
     scenario = scene.scenario
-    verdict = judge(scenario.assembly, result.reached, reference, scenario.thresholds, scene.clearance_mm)
+    verdict = judge(
+        scenario.assembly,
+        result.reached,
+        reference,
+        scenario.thresholds,
+        scene.clearance_mm,
+        scenario.success_means,
+    )
     return Tried(result, verdict)
 
 
@@ -145,4 +152,6 @@ def ending(tried: Tried) -> Ending:
         return Ending("done", "ok", None, sentence("ok"))
     if outcome.code != "ok":
         return Ending(outcome.stage, outcome.code, outcome.operation, outcome.sentence)
-    return Ending("judge", verdict.code, None, sentence(verdict.code))
+    found = verdict.rests_on
+    why = f": {found.why}" if found.why else ""
+    return Ending("judge", found.code, None, sentence(found.code) + why)

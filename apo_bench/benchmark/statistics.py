@@ -74,7 +74,9 @@ class Cell:
     trials: int
     """Trials that count: those whose demonstration was right."""
     successes: int
-    """Strict."""
+    """The finished assembly is right."""
+    demonstrated: int
+    """Successes of which every contact was also made when and where it was shown."""
     loose_successes: int
     not_executed: int
     """Failures of which no plan was carried out: nothing was corrected, or the worker died. They count as failures."""
@@ -85,7 +87,7 @@ class Cell:
 
     @property
     def rate(self) -> float | None:
-        """Strict success rate; None without a trial that counts."""
+        """Success rate; None without a trial that counts."""
         return self.successes / self.trials if self.trials else None
 
     @property
@@ -94,17 +96,21 @@ class Cell:
         return self.clearance_mm / self.level if self.level > 0 else None
 
     @property
+    def demonstrated_rate(self) -> float | None:
+        return self.demonstrated / self.trials if self.trials else None
+
+    @property
     def loose_rate(self) -> float | None:
         return self.loose_successes / self.trials if self.trials else None
 
     @property
     def interval(self) -> Interval:
-        """Wilson's 95 % interval of the strict rate."""
+        """Wilson's 95 % interval of the success rate."""
         return wilson(self.successes, self.trials)
 
     @property
     def executed(self) -> Rate:
-        """Strict success among the trials whose plan was carried out."""
+        """Success among the trials whose plan was carried out."""
         return Rate(self.successes, self.trials - self.not_executed)
 
 
@@ -178,6 +184,7 @@ def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
         **key._asdict(),
         trials=len(counted),
         successes=len(counted) - len(failed),
+        demonstrated=sum(row["as_demonstrated"] for row in counted),
         loose_successes=sum(row["loose_success"] for row in counted),
         not_executed=sum(row["failure_stage"] in NOT_EXECUTED for row in failed),
         excluded=len(rows) - len(counted),

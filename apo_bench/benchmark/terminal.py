@@ -42,14 +42,14 @@ def print_row(row: Mapping[str, Any]) -> None:
 
 
 def print_cells(cells: Sequence[Cell]) -> None:
-    """Strict success rates with their intervals."""
+    """Success rates with their intervals."""
     table = Table(box=None, pad_edge=False)
     unusual = [
         n for n, usual in (("noise", "isotropic"), ("relations", "given")) if {getattr(c, n) for c in cells} - {usual}
     ]
     for name in ("scenario", "clearance", *unusual, "careless", "level", "method"):
         table.add_column(name)
-    for name in ("success", "95 % interval", "n", "loose"):
+    for name in ("success", "95 % interval", "n", "as demonstrated", "loose"):
         table.add_column(name, justify="right")
     table.add_column("failures")
     for c in cells:
@@ -57,7 +57,7 @@ def print_cells(cells: Sequence[Cell]) -> None:
         where = (f"{c.careless:g}", level) if c.method != "oracle" else ("any", "any")
         met = {"noise": c.method != "oracle", "relations": knows_relations(c.method)}
         axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
-        rates = (percent(c.rate), interval(c), str(c.trials), percent(c.loose_rate))
+        rates = (percent(c.rate), interval(c), str(c.trials), percent(c.demonstrated_rate), percent(c.loose_rate))
         table.add_row(c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))
     _console().print(table)
     excluded = sum(c.excluded for c in cells)
@@ -178,7 +178,7 @@ def _result(row: Mapping[str, Any]) -> str:
     if row["success"] is None:
         return "none: the demonstration failed"
     if row["success"]:
-        return "success (strict)"
+        return "success" if row["as_demonstrated"] else f"success, not as demonstrated: {row['as_demonstrated_code']}"
     loosely = ", loosely right" if row["loose_success"] else ""
     where = "" if row["failure_operation"] is None else f", operation {row['failure_operation']}"
     return f"failure at stage {row['failure_stage']}: {row['failure_code']}{where}{loosely}"

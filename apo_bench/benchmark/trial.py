@@ -183,14 +183,17 @@ def _physics(tried: Tried, plan: Plan, truth: Array | None) -> Row:
     fixed, free = None, None
     if truth is not None:
         fixed, free = pose_errors(plan.assembly, plan.start, truth, result.reached)
+    found = verdict.rests_on
     return {
+        "as_demonstrated": verdict.as_demonstrated,
+        "as_demonstrated_code": verdict.demonstrated.code,
         "loose_success": verdict.loose_success,
-        "conditions": dict(verdict.conditions),
-        "worst_gap_mm": _finite(verdict.gap_mm),
-        "worst_angle_deg": _finite(verdict.angle_deg),
-        "least_overlap": _finite(verdict.overlap),
-        "penetration_mm": _finite(verdict.penetration_mm),
-        "pushed_mm": _finite(verdict.pushed_mm),
+        "conditions": dict(found.conditions),
+        "worst_gap_mm": _finite(found.gap_mm),
+        "worst_angle_deg": _finite(found.angle_deg),
+        "least_overlap": _finite(found.overlap),
+        "penetration_mm": _finite(found.penetration_mm),
+        "pushed_mm": _finite(found.pushed_mm),
         "reached": _poses(result.reached.final),
         "pose_error_fixed_mm": _finite(fixed),
         "pose_error_free_mm": _finite(free),

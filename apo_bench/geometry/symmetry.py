@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.pose import apply
 from apo_bench.geometry.solid import Solid
 
 SAME_M = 1e-6
@@ -34,6 +35,7 @@ def quarter_turns() -> Array:
 def symmetries(solid: Solid) -> Array:
     """The displacements g of a solid that leave the space it fills as it is, (m, 4, 4), the identity first.
 
+    Fit faces lie on fit faces then, too: a part that recedes on one side only does not look the same from both.
     A union of axis-aligned boxes has faces towards both ends of all three axes and no others, so a turn that leaves it
     as it is carries axes onto axes: the 24 quarter turns about the centre of volume are all that can. Names of faces
     do not count. Seen at `T g` it looks as it does at `T`.
@@ -44,8 +46,9 @@ def symmetries(solid: Solid) -> Array:
     g = np.tile(np.eye(4), (len(turned), 1, 1))
     g[:, :3, :3] = turned
     g[:, :3, 3] = c - np.array(turned) @ c
-    g.flags.writeable = False
-    return g
+    kept = g[[_keeps_fit(solid, T) for T in g]]
+    kept.flags.writeable = False
+    return kept
 
 
 def folds(symmetric: Array) -> Array:
@@ -72,6 +75,18 @@ def _same(a: list[tuple[Array, Array]], b: list[tuple[Array, Array]]) -> bool:
     cuts = [_cuts(np.array([at[i] + s * half[i] for at, half in a + b for s in (-1.0, 1.0)])) for i in range(3)]
     middles = [(cut[1:] + cut[:-1]) / 2 for cut in cuts]
     return bool(np.array_equal(_filled(a, middles), _filled(b, middles)))
+
+
+def _keeps_fit(solid: Solid, g: Array) -> bool:
+    """Whether a displacement that leaves the space as it is carries every fit face onto a fit face."""
+    fit = [face for face in solid.faces.values() if face.fit]
+    return all(any(_same_corners(apply(g, face.outline), other.outline) for other in fit) for face in fit)
+
+
+def _same_corners(a: Array, b: Array) -> bool:
+    """Whether two outlines, (n, 3) and (m, 3), have the same corners, wherever they begin."""
+    far = np.linalg.norm(a[:, None] - b[None], axis=-1)
+    return bool(len(a) == len(b) and (far.min(axis=0) < SAME_M).all() and (far.min(axis=1) < SAME_M).all())
 
 
 def _cuts(values: Array) -> Array:

@@ -76,9 +76,10 @@ def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot)
         scene.scenario.thresholds,
         scene.clearance_mm,
     )
-    fault = next((fault for fault, found in verdict.conditions.items() if found and fault != "pushed"), None)
+    found = verdict.demonstrated
+    fault = next((fault for fault, there in found.conditions.items() if there and fault != "pushed"), None)
     if fault is None:
         return ""
-    bad = next((c for c in verdict.contacts if not c.strict), None)
+    bad = next((c for c in found.contacts if not c.strict), None)
     where = f" ({bad.contact}, operation {bad.operation + 1})" if bad and fault in ("gap", "overlap") else ""
     return sentence(fault) + where
