@@ -84,17 +84,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     that episode alone; any other key is refused.
 
     ## Episode End
-<<<<<<< HEAD
-    Every step terminates. `info` then holds `is_success`, `loose_success`, `stage` and `code` (`done` and `ok`, or
-    out of `apo_bench.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
-    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and
-    nothing from which it can be drawn.
-=======
     Every step terminates. `info` then holds `is_success`, `as_demonstrated` (each contact was also made when and where
     it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of `apo_bench.outcomes`), `operation`
-    (numbered from 1, or None), `sentence` and, if a plan was carried out,
-    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth.
->>>>>>> bc3eb73 (Two verdicts: success is what a person says who sees the finished assembly, as_demonstrated is today's)
+    (numbered from 1, or None), `sentence` and, if a plan was carried out, `predicted`: what it said about itself
+    before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and nothing from which it can be drawn.
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
     keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
