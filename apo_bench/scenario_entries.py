@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.parts import load_part, part_path
-from apo_bench.parts.mjcf import NAME
+from apo_bench.parts.allowed import NAME
 from apo_bench.scenario import Grasp, Preference, Shift
 from apo_bench.scenario_contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name

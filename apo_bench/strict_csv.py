@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NoReturn, final
 
 from apo_bench.errors import InputError
-from apo_bench.strict_json import LARGEST_BYTES
+from apo_bench.reading import read_text
 
 Columns = Mapping[str, tuple[str, float]]
 """What a column stands for, and the size of its unit."""
@@ -59,7 +59,7 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
     Raises:
         InputError: No such file, too large, not UTF-8, not CSV, unknown, repeated or missing columns, ragged rows.
     """
-    reader = csv.reader(io.StringIO(_text(Path(path)), newline=""), strict=True, skipinitialspace=True)
+    reader = csv.reader(io.StringIO(read_text(path, "CSV file"), newline=""), strict=True, skipinitialspace=True)
     names: list[str] = []
     try:
         for cells in reader:
@@ -80,21 +80,6 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
         raise InputError(f"{path}, line {reader.line_num}: this is not a CSV file ({error}).") from error
     if not names:
         raise InputError(f"{path}: the file is empty; its first line names the columns: {_shown(columns)}.")
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: a file is needed, a folder was given.")
-        if path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give one row per operation."
-            )
-        return path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a CSV file.") from error
 
 
 def _header(place: str, names: Sequence[str], columns: Columns, required: Sequence[str]) -> list[str]:

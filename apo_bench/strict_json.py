@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -14,8 +15,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.reading import read_text
 
-LARGEST_BYTES = 1_000_000
+DEEPEST = 32
+"""Levels of nesting; no file of ours has more than 6."""
+LARGEST_INTEGER = 10**308
+"""Larger ones are no floating-point numbers."""
 
 
 @final
@@ -47,7 +52,7 @@ class Node:
                 near = get_close_matches(key, known, n=1, cutoff=0.5)
                 hint = f"; did you mean '{near[0]}'? Allowed" if near else "; allowed"
                 place = f"{self.file}, {self.key}" if self.key else self.file
-                raise InputError(f"{place}: unknown key '{key}'{hint}: {', '.join(known)}.")
+                raise InputError(f"{place}: unknown key '{key[:60]}'{hint}: {', '.join(known)}.")
         for key in required:
             if key not in self.value:
                 place = f"{self.file}, {self.key}" if self.key else self.file
@@ -105,20 +110,7 @@ def read_json(path: str | Path) -> Node:
     Raises:
         InputError: No such file, too large, not UTF-8, not JSON, a repeated key, NaN or Infinity.
     """
-    path = Path(path)
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: a file is needed, a folder was given.")
-        if path.stat().st_size > LARGEST_BYTES:
-            raise InputError(
-                f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give a single document."
-            )
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a JSON file.") from error
-    return parse_json(text, str(path))
+    return parse_json(read_text(path, "JSON file"), str(path))
 
 
 def parse_json(text: str, file: str) -> Node:
@@ -127,16 +119,15 @@ def parse_json(text: str, file: str) -> Node:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         members = dict(pairs)
         if len(members) < len(pairs):
-            keys = [key for key, _ in pairs]
-            twice = next(key for key in keys if keys.count(key) > 1)
-            raise InputError(f"{file}: the key '{twice}' stands twice in one object; keep one of the two.")
+            twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+            raise InputError(f"{file}: the key '{twice[:60]}' stands twice in one object; keep one of the two.")
         return members
 
     def refuse(constant: str) -> NoReturn:
         raise InputError(f"{file}: every number must be finite, {constant} was given.")
 
     try:
-        return Node(json.loads(text, object_pairs_hook=unique, parse_constant=refuse), file)
+        document = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
     except json.JSONDecodeError as error:
         raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
     except (RecursionError, ValueError) as error:
@@ -145,6 +136,34 @@ def parse_json(text: str, file: str) -> Node:
         raise InputError(
             f"{file}: this is not a JSON document that can be read (nested too deep, or a huge number)."
         ) from error
+    check_plain(document, file)
+    return Node(document, file)
+
+
+def check_plain(document: Any, file: str) -> None:
+    """Raise an `InputError` if a document is nested too deep or holds a huge number, a date or a time."""
+
+    def place(key: str) -> str:
+        return f"{file}, {key}" if key else file
+
+    level: list[tuple[str, Any]] = [("", document)]
+    for _ in range(DEEPEST):
+        below: list[tuple[str, Any]] = []
+        for key, value in level:
+            if isinstance(value, dict):
+                below += [(f"{key}, {name[:60]}" if key else name[:60], entry) for name, entry in value.items()]
+            elif isinstance(value, list):
+                below += [(key, entry) for entry in value]
+            elif isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER:
+                raise InputError(f"{place(key)}: whole numbers go to 1e308, a larger one was given.")
+            elif not isinstance(value, str | int | float | bool | None):
+                raise InputError(
+                    f"{place(key)}: the date or time {value} was given, which no key takes; put it into quotes."
+                )
+        if not below:
+            return
+        level = below
+    raise InputError(f"{file}: the document is nested more than {DEEPEST} levels deep; no file of ours is.")
 
 
 def _fits(value: Any, shape: tuple[int, ...]) -> bool:

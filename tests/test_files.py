@@ -310,7 +310,7 @@ def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none\.json: the file cannot be read"):
+    with pytest.raises(InputError, match=r"none\.json: the JSON file cannot be read"):
         files.read_observation(tmp_path / "none.json")
     with pytest.raises(InputError, match="a folder was given"):
         files.read_observation(tmp_path)

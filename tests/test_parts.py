@@ -151,7 +151,6 @@ GOOD = """<mujoco model="thing">
   <default>
     <geom type="box"/>
     <default class="fit"><site size="0.002"/></default>
-    <default class="round"><geom type="sphere"/></default>
   </default>
   <worldbody>
     <body name="thing">
@@ -163,6 +162,7 @@ GOOD = """<mujoco model="thing">
   </worldbody>
 </mujoco>
 """
+FIT = '<default class="fit"><site size="0.002"/></default>'
 HIGH = '<geom name="high" pos="0 0 0.03" size="0.01 0.02 0.01"/>'
 FOOT = '<site name="foot" pos="0 0 0"/>'
 
@@ -172,24 +172,30 @@ BROKEN = {
     "not_mjcf": (GOOD, "<robot/>", "begins with <mujoco>"),
     "no_body": (GOOD, "<mujoco><worldbody/></mujoco>", "no body"),
     "no_boxes": (GOOD, '<mujoco><worldbody><body name="b"/></worldbody></mujoco>', "no geom"),
-    "two_bodies": ("</worldbody>", '<body name="other"/></worldbody>', "2 bodies"),
-    "geom_outside": ("</worldbody>", '<geom name="g" size="1 1 1"/></worldbody>', "outside the body"),
-    "joint": (FOOT, "<freejoint/>", "only <geom> and <site>"),
-    "body_moved": ('<body name="thing">', '<body name="thing" pos="0 0 1">', "has pos="),
+    "two_bodies": ("</worldbody>", '<body name="other"/></worldbody>', "more than 1 <body>"),
+    "geom_outside": ("</worldbody>", '<geom name="g" size="1 1 1"/></worldbody>', "<geom> stands in <worldbody>"),
+    "joint": (FOOT, "<freejoint/>", "allowed are <geom>, <site>; the scene adds joints"),
+    "body_moved": ('<body name="thing">', '<body name="thing" pos="0 0 1">', "has pos=, which a part may not say"),
     "include": ("<worldbody>", '<include file="x.xml"/><worldbody>', "<include>"),
-    "sphere": (HIGH, '<geom name="high" type="sphere" size="0.01"/>', "'high' is a sphere"),
-    "sphere_by_class": (HIGH, '<geom name="high" class="round" size="0.01"/>', "'high' is a sphere"),
+    "sphere": (HIGH, '<geom name="high" type="sphere" size="0.01"/>', 'has type="sphere"'),
+    "sphere_by_class": (FIT, FIT + '<default class="round"><geom type="sphere"/></default>', 'has type="sphere"'),
+    "sphere_by_nothing": ('<geom type="box"/>', "", "'low' has no type="),
+    "no_size": ('size="0.01 0.02 0.01"', "", "'high' has no size="),
+    "class_twice": (FIT, FIT + FIT, "two <default> have class 'fit'"),
+    "class_without_name": (FIT, "<default/>", "a nested <default> has no class="),
+    "two_densities": ('size="0.01 0.02 0.01"', 'size="0.01 0.02 0.01" density="600"', "densities from 600 to 1000"),
+    "too_light": ('<geom type="box"/>', '<geom type="box" density="1"/>', "weighs 4.8e-05 kg"),
     "unknown_class": (HIGH, '<geom name="high" class="cube" size="1 1 1"/>', "class 'cube'"),
-    "turned": ('name="high"', 'name="high" euler="0 0 45"', "turned by euler="),
+    "turned": ('name="high"', 'name="high" euler="0 0 45"', "has euler="),
     "unnamed": ('name="high" ', "", "has no name"),
     "dotted_name": ('name="high"', 'name="a.b"', "'a.b'"),
     "same_name": ('name="high"', 'name="low"', "two geoms are called 'low'"),
-    "flat": ('size="0.01 0.02 0.01"', 'size="0.01 0 0.01"', "above 0 m"),
-    "negative": ('size="0.01 0.02 0.01"', 'size="0.01 -0.02 0.01"', "above 0 m"),
-    "nan": ('size="0.01 0.02 0.01"', 'size="0.01 nan 0.01"', "3 numbers of at most 10 m"),
-    "infinite": ('pos="0 0 0.03"', 'pos="0 0 inf"', "3 numbers of at most"),
-    "word": ('pos="0 0 0.03"', 'pos="0 0 up"', "3 numbers of at most"),
-    "two_numbers": ('size="0.01 0.02 0.01"', 'size="0.01 0.02"', "3 numbers of at most"),
+    "flat": ('size="0.01 0.02 0.01"', 'size="0.01 0 0.01"', "3 numbers of 0.0005 to 10 m"),
+    "negative": ('size="0.01 0.02 0.01"', 'size="0.01 -0.02 0.01"', "3 numbers of 0.0005"),
+    "nan": ('size="0.01 0.02 0.01"', 'size="0.01 nan 0.01"', "3 numbers of 0.0005 to 10 m"),
+    "infinite": ('pos="0 0 0.03"', 'pos="0 0 inf"', "3 numbers of -10 to 10 m"),
+    "word": ('pos="0 0 0.03"', 'pos="0 0 up"', "3 numbers of -10 to 10 m"),
+    "two_numbers": ('size="0.01 0.02 0.01"', 'size="0.01 0.02"', "3 numbers of 0.0005"),
     "two_names": (FOOT, FOOT + '<site name="sole" pos="0.01 0 0"/>', "'foot' and 'sole' lie on one face"),
     "in_the_air": (FOOT, '<site name="foot" pos="0 0 -0.01"/>', "'foot' at (0, 0, -10) mm lies on no face"),
     "inside": (FOOT, '<site name="foot" pos="0 0 0.01"/>', "lies on no face"),
@@ -225,15 +231,15 @@ def test_the_unbroken_file_loads(tmp_path: Path):
 
 def test_missing_files_and_folders(tmp_path: Path):
     for name, words in (
-        (tmp_path, "is a folder"),
-        (tmp_path / "none.xml", "does not exist"),
+        (tmp_path, "a folder was given"),
+        (tmp_path / "none.xml", "No such file"),
         ("castel", "did you mean 'castle'"),
     ):
         with pytest.raises(InputError, match=words):
             load_part(name)
     binary = tmp_path / "binary.xml"
     binary.write_bytes(bytes(range(256)))
-    with pytest.raises(InputError, match="XML"):
+    with pytest.raises(InputError, match="not UTF-8 text"):
         load_part(binary)
 
 

@@ -61,7 +61,7 @@ BROKEN = {
     "goal_flag": (GOAL3, "goal = { at_mm = [0, 0, true] }", ["operation 3, goal, at_mm", "3 finite numbers"]),
     "turn_far": ("[180, 0, 0] }\ncontacts", "[1e5, 0, 0] }\ncontacts", ["operation 2, goal, turn_deg", "360"]),
     "unknown_part_file": ('file = "stick"', 'file = "stik"', ["parts, stick, file", "did you mean 'stick'"]),
-    "missing_part_file": ('file = "stick"', 'file = "own/stick.xml"', ["parts, stick, file", "does not exist"]),
+    "missing_part_file": ('file = "stick"', 'file = "own/stick.xml"', ["parts, stick, file", "No such file"]),
     "bad_part_name": ("[parts.stick]", '[parts."the.stick"]', ["'the.stick'"]),
     "unknown_moved_part": ('move = "stick"', 'move = "stik"', ["operation 3, move", "did you mean 'stick'"]),
     "unknown_face": ('["bottom", "table.top"]', '["botom", "table.top"]', ["contact 1", "face", "'bottom'"]),
@@ -188,7 +188,7 @@ def test_operations_may_not_be_empty(tmp_path: Path):
 def test_what_is_no_text_file(tmp_path: Path):
     assert "a folder was given" in refused(tmp_path)
     assert "cannot be read" in refused(tmp_path / "none.toml")
-    assert "no ordinary file" in refused(Path(os.devnull))
+    assert "a device was given" in refused(Path(os.devnull))
     assert "cannot be read" in refused("x" * 300 + "/y.toml")
     assert "not a path" in refused("a\0b.toml")
     path = tmp_path / "mine.toml"

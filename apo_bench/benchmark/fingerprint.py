@@ -18,6 +18,7 @@ from apo_bench.benchmark.spec import ROW, TrialSpec
 from apo_bench.observation.empirical import PREFIX
 from apo_bench.observation.noise_file import noise_path
 from apo_bench.observation.relations import KINDS
+from apo_bench.reading import read_bytes
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import scenario_names
@@ -45,7 +46,7 @@ def content_pieces(scenario: Scenario, given: str | Path | Scenario, arm_file: P
     """
     pieces = {
         "scenario": _scenario_bytes(scenario, given),
-        **{f"part {part}": path.read_bytes() for part, path in sorted(scenario.part_files.items())},
+        **{f"part {part}": read_bytes(path, "part file") for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml").read_bytes(),
         "arm": Path(arm_file).read_bytes(),
         "thresholds": json.dumps(asdict(scenario.thresholds), sort_keys=True).encode(),
@@ -72,7 +73,7 @@ def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
 def noise_content(*names: str) -> dict[str, str]:
     """Of the noise models that are files or of one's own: `noise NAME` -> 16 hexadecimal digits over the file."""
     files = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
-    return {name: _hash(path.read_bytes()) for name, path in files.items()} | own_content("noise", *names)
+    return {name: _hash(read_bytes(path, "noise file")) for name, path in files.items()} | own_content("noise", *names)
 
 
 def own_content(kind: str, *names: str) -> dict[str, str]:
@@ -103,7 +104,8 @@ def _hash(text: bytes) -> str:
 def _scenario_bytes(scenario: Scenario, given: str | Path | Scenario) -> bytes:
     if isinstance(given, Scenario):
         return json.dumps(_plain(scenario), sort_keys=True).encode()
-    return (folder("scenarios") / f"{given}.toml" if given in scenario_names() else Path(given)).read_bytes()
+    path = folder("scenarios") / f"{given}.toml" if given in scenario_names() else Path(given)
+    return read_bytes(path, "scenario file")
 
 
 def _plain(value: Any) -> Any:

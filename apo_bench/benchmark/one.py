@@ -19,6 +19,7 @@ from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
 from apo_bench.observed import observed, read_stated
 from apo_bench.program import Observation
+from apo_bench.reading import read_text
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
 
@@ -137,7 +138,7 @@ def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
 
 def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
     seen = read_stated(path, scene.scenario)
-    return run_measured(spec, scene, seen, path.read_text(encoding="utf-8"), watch=film)
+    return run_measured(spec, scene, seen, read_text(path, "observation file"), watch=film)
 
 
 def _spec(request: Request, clearance_mm: float) -> TrialSpec:

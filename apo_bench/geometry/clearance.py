@@ -13,6 +13,8 @@ from apo_bench.geometry.solid import Box, Face, Solid
 
 IN_PLANE_M = 1e-9
 """A face and a side of a box this near to each other lie in one plane."""
+THINNEST_M = 5e-5
+"""Half of what a box is thick at least, [m]; what is thinner, MuJoCo takes for nothing."""
 
 
 def physical_boxes(solid: Solid, clearance_m: float) -> tuple[Box, ...]:
@@ -71,10 +73,10 @@ def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float)
     carries = [[_carries_fit(solid, box, sides, axis, sign) for sign in (-1, 1)] for axis in range(3)]
     recede = clearance_m * np.array(carries, dtype=np.float64)
     half = box.half - recede.sum(axis=1) / 2
-    if (half <= 0).any():
+    if (half < THINNEST_M).any():
         raise InputError(
-            f"a clearance of {1e3 * clearance_m:g} mm leaves nothing of box '{box.name}' of part '{solid.name}'; "
-            f"give less than {1e3 * box.half.min():g} mm."
+            f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * THINNEST_M:g} mm of box '{box.name}' "
+            f"of part '{solid.name}'; give less."
         )
     return Box(box.name, box.center + (recede[:, 0] - recede[:, 1]) / 2, half)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.reading import opened
 from apo_bench.strict_csv import check_separator
 
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
@@ -56,7 +57,7 @@ def read_results(path: str | Path) -> Located:
         InputError: Anything that is not as described, with the line where it stands.
     """
     ids, numbers, lines = array("q"), array("d"), array("q")
-    for line, text in _lines(Path(path)):
+    for line, text in _lines(path):
         place = f"{path}, line {line}"
         if len(lines) == MOST_ROWS:
             raise InputError(f"{place}: a file of at most {MOST_ROWS} rows is needed; split it by scenes.")
@@ -107,13 +108,11 @@ def _refuse_twice(rows: Located) -> None:
         raise InputError(f"{rows.said(again)}: the row of {earlier} stands there once more; keep one of the two.")
 
 
-def _lines(path: Path) -> Iterator[tuple[int, str]]:
+def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
     """Number and text of every line below the first that is not empty."""
     line = 0
     try:
-        if path.is_dir():
-            raise InputError(f"{path}: a file is needed, a folder was given.")
-        with path.open("rb") as stream:
+        with opened(path, "CSV file") as stream:
             for line, raw in enumerate(iter(lambda: stream.readline(LONGEST_LINE + 1), b""), start=1):
                 if len(raw) > LONGEST_LINE:
                     raise InputError(f"{path}, line {line}: a line of at most {LONGEST_LINE} characters is needed.")
@@ -122,8 +121,6 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
                     _check_header(text, f"{path}, line 1")
                 elif text:
                     yield line, text
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a CSV file.") from error
     if not line:

@@ -10,6 +10,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.observation.bop import LARGEST_ID, LARGEST_MM, Located, checked, read_results
+from apo_bench.reading import read_text
 from apo_bench.strict_json import Node, parse_json
 
 LARGEST_BYTES = 32_000_000
@@ -83,26 +84,11 @@ def _which_scene(path: Path, estimates: Located) -> int:
 
 
 def _read_scene(path: Path, scene: int) -> Located:
-    rows = list(_entries(_document(path), scene))
+    rows = list(_entries(parse_json(read_text(path, "JSON file of one scene", LARGEST_BYTES), str(path)), scene))
     if not rows:
         raise InputError(f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
     where, R, t, place = zip(*rows, strict=True)
     return checked(Located(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), place))
-
-
-def _document(path: Path) -> Node:
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: a file is needed, a folder was given.")
-        with path.open("rb") as stream:
-            raw = stream.read(LARGEST_BYTES + 1)
-        if len(raw) > LARGEST_BYTES:
-            raise InputError(f"{path}: the file is larger than {LARGEST_BYTES // 1_000_000} MB; give one scene.")
-        return parse_json(raw.decode("utf-8-sig"), str(path))
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be read ({error.strerror}); check the path.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the file is not UTF-8 text (byte {error.start}); give a JSON file.") from error
 
 
 def _entries(root: Node, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:

@@ -7,6 +7,7 @@ cell is full or empty, and a face is what lies between the two.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,8 +75,12 @@ class Union(NamedTuple):
     """How many solids it is; those that only share an edge or a corner count apart."""
 
 
-def unite(boxes: Sequence[Box]) -> Union:
-    """The union of boxes; every coordinate is that of a side of a box."""
+def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
+    """The union of boxes; every coordinate is that of a side of a box.
+
+    Args:
+        most: Stop at so many surfaces.
+    """
     from scipy.ndimage import label
 
     grid = [_planes(boxes, axis) for axis in range(3)]
@@ -84,7 +89,7 @@ def unite(boxes: Sequence[Box]) -> Union:
     volume = float(volumes.sum())
     middles = [(planes[1:] + planes[:-1]) / 2 for planes in grid]
     centroid = [np.moveaxis(volumes, axis, 0).sum(axis=(1, 2)) @ middles[axis] / volume for axis in range(3)]
-    surfaces = sorted(_surfaces(full, grid), key=lambda s: (s.side, s.height, s.shape.bounds))
+    surfaces = sorted(islice(_surfaces(full, grid), most), key=lambda s: (s.side, s.height, s.shape.bounds))
     return Union(tuple(surfaces), np.array(centroid), volume, int(label(full)[1]))
 
 
@@ -107,6 +112,22 @@ def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_
     return full
 
 
+def _rectangles(bare: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Few rectangles that make up the cells (i, j) of a mask: (4, n), lowest and beyond-highest i, then j.
+
+    Cells in a row are one run, and runs from row to row that are the same are one rectangle.
+    """
+    ends = np.diff(np.pad(bare, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    row, low = np.nonzero(ends == 1)
+    high = np.nonzero(ends == -1)[1]
+    order = np.lexsort((row, high, low))
+    row, low, high = row[order], low[order], high[order]
+    same = (np.diff(row) == 1) & (np.diff(low) == 0) & (np.diff(high) == 0)
+    first = np.flatnonzero(np.concatenate([[True], ~same])[: len(row)])
+    last = np.append(first[1:], len(row))[: len(first)] - 1
+    return np.array([row[first], row[last] + 1, low[first], high[first]], dtype=np.int64)
+
+
 def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surface]:
     """Every face: squares between full and empty cells, gathered by plane, joined where they share an edge."""
     import shapely
@@ -118,7 +139,7 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surfac
         for k, layer in enumerate(layers):
             beyond = k + 1 if forward else k - 1
             bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
-            i, j = np.nonzero(bare)
-            joined = shapely.unary_union(shapely.box(u[i], v[j], u[i + 1], v[j + 1]))
+            low_u, high_u, low_v, high_v = _rectangles(bare)
+            joined = shapely.unary_union(shapely.box(u[low_u], v[low_v], u[high_u], v[high_v]))
             for piece in getattr(joined, "geoms", () if joined.is_empty else (joined,)):
                 yield Surface(side, float(grid[axis][k + forward]), piece)

@@ -8,12 +8,15 @@ import numpy as np
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.solid import Face, Solid
+from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import SIDES, Surface, unite
 from apo_bench.parts.mjcf import Mark, PartFile, read_part
 from apo_bench.resources import folder
 
 ON_FACE_M = 1e-6
 """A site lies on a face if it is this near to its plane and this far from its edges."""
+MOST_FACES = 1000
+LIGHTEST_KG, HEAVIEST_KG = 1e-4, 1e6
 
 
 def part_names() -> tuple[str, ...]:
@@ -38,7 +41,7 @@ def load_part(given: str | Path) -> Solid:
     """The solid of a part file: the union of its boxes, faces named by the sites that lie on them.
 
     Faces without a site are called `auto_px_1`, ...: outward direction, and their number along it. The solid is
-    named after the file.
+    named after the file. What does not come with the package is held against a mesh of the same boxes.
 
     Args:
         given: The short name of a part of the package, or the path of an MJCF file.
@@ -47,13 +50,24 @@ def load_part(given: str | Path) -> Solid:
         InputError: The file breaks a rule; the message names file, element and remedy.
     """
     file = read_part(part_path(given))
-    union = unite(file.boxes)
+    union = unite(file.boxes, MOST_FACES + 1)
     if union.pieces != 1:
         raise InputError(f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece.")
+    if len(union.surfaces) > MOST_FACES:
+        raise InputError(f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.")
+    mass = file.density * union.volume
+    if not LIGHTEST_KG <= mass <= HEAVIEST_KG:
+        raise InputError(
+            f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
+            "so change its size or its density."
+        )
     marks = _matched(file, union.surfaces)
     faces = [_face(surface, marks.get(k), _number(union.surfaces, k)) for k, surface in enumerate(union.surfaces)]
     faces.sort(key=lambda face: face.name.startswith("auto_"))
-    return Solid(file.path.stem, {face.name: face for face in faces}, file.boxes, union.centroid, union.volume)
+    solid = Solid(file.path.stem, {face.name: face for face in faces}, file.boxes, union.centroid, union.volume)
+    if file.path.parent != folder("assets") / "parts":
+        check_solid(solid, str(file.path))
+    return solid
 
 
 def _matched(file: PartFile, surfaces: tuple[Surface, ...]) -> dict[int, Mark]:

@@ -14,6 +14,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import Box
 from apo_bench.layout import layout_at
+from apo_bench.parts import read_part
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario
 from apo_bench.simulation.arm import Arm, Kinematics, find_arm
@@ -143,10 +144,13 @@ def _add_part(
     mjcf: Any, room: Any, scenario: Scenario, part: str, T: Array, clearance_mm: float, settings: Physics
 ) -> Any:
     """Attach a part's file at T, its fit faces receded; returns the body that has the mass (its frame has none)."""
-    model = mjcf.from_path(str(scenario.part_files[part]))
+    file, solid = read_part(scenario.part_files[part]), scenario.assembly.solids[part]
+    if [box.name for box in file.boxes] != [box.name for box in solid.boxes]:
+        raise InputError(f"{file.path}: the boxes are others than those of part '{part}'; load the scenario again.")
+    model = mjcf.from_xml_string(file.xml)
     model.model = part
     _set_contact(model, settings)
-    for box in physical_boxes(scenario.assembly.solids[part], clearance_mm * 1e-3):
+    for box in physical_boxes(solid, clearance_mm * 1e-3):
         geom = model.find("geom", box.name)
         geom.pos, geom.size = box.center, box.half
     if part in scenario.colors:

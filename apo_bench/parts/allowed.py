@@ -1,0 +1,117 @@
+"""All that a part file may say: which elements, with which attributes, with which values. MuJoCo is told no more."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+"""What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""
+LONGEST_NAME = 64
+LARGEST_M = 10.0
+THINNEST_M = 0.0005
+"""Half of the least thickness of a box."""
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+class Numbers(NamedTuple):
+    """Numbers with spaces between them."""
+
+    spans: tuple[tuple[float, float], ...]
+    """The least and the largest value of each."""
+    least: int
+    """So many of them at least."""
+    unit: str = ""
+
+    def allows(self, text: str) -> bool:
+        words = text.split()
+        if not self.least <= len(words) <= len(self.spans) or not all(map(_NUMBER.fullmatch, words)):
+            return False
+        return all(low <= float(word) <= high for word, (low, high) in zip(words, self.spans, strict=False))
+
+    def said(self) -> str:
+        most = len(self.spans)
+        count = f"{most}" if self.least == most else f"{self.least} to {most}"
+        spans = [f"{low:g} to {high:g}" for low, high in dict.fromkeys(self.spans)]
+        return f"{count} number{'s' * (most > 1)} of {', '.join(spans)}{self.unit}"
+
+
+class Words(NamedTuple):
+    """One of some words."""
+
+    words: tuple[str, ...]
+
+    def allows(self, text: str) -> bool:
+        return text in self.words
+
+    def said(self) -> str:
+        return " or ".join(f'"{word}"' for word in self.words)
+
+
+class Name(NamedTuple):
+    """A name."""
+
+    def allows(self, text: str) -> bool:
+        return len(text) <= LONGEST_NAME and NAME.fullmatch(text) is not None
+
+    def said(self) -> str:
+        return f"a name is a letter, then letters, digits and underscores, {LONGEST_NAME} in all at most"
+
+
+class Allowed(NamedTuple):
+    """What an element may have."""
+
+    inside: Mapping[str, int]
+    """Elements, and how many of each."""
+    attributes: Mapping[str, Numbers | Words | Name]
+
+
+NAMED = Name()
+POINT = Numbers(((-LARGEST_M, LARGEST_M),) * 3, 3, " m")
+HALF_SIZES = Numbers(((THINNEST_M, LARGEST_M),) * 3, 3, " m")
+COLOR = Numbers((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
+"""What cannot be seen, a range finder of MuJoCo would not see."""
+SURFACE: Mapping[str, Numbers | Words | Name] = {
+    "type": Words(("box",)),
+    "density": Numbers(((1.0, 25_000.0),), 1, " kg/m^3"),
+    "friction": Numbers(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1),
+    "rgba": COLOR,
+}
+DOT: Mapping[str, Numbers | Words | Name] = {
+    "size": Numbers(((1e-4, 0.1),) * 3, 1, " m"),
+    "group": Words(tuple("012345")),
+    "rgba": COLOR,
+}
+MOST_BOXES, MOST_SITES, MOST_CLASSES = 100, 600, 20
+DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
+ALLOWED: Mapping[str, Allowed] = {
+    "mujoco": Allowed({"default": 1, "worldbody": 1}, {"model": NAMED}),
+    "mujoco/default": Allowed(DEFAULTS, {"class": Words(("main",))}),
+    "default/default": Allowed(DEFAULTS, {"class": NAMED}),
+    "default/geom": Allowed({}, SURFACE),
+    "default/site": Allowed({}, DOT),
+    "mujoco/worldbody": Allowed({"body": 1}, {}),
+    "worldbody/body": Allowed({"geom": MOST_BOXES, "site": MOST_SITES}, {"name": NAMED}),
+    "body/geom": Allowed({}, {"name": NAMED, "class": NAMED, "pos": POINT, "size": HALF_SIZES, **SURFACE}),
+    "body/site": Allowed({}, {"name": NAMED, "class": NAMED, "pos": POINT, **DOT}),
+}
+"""Element, behind the one that it stands in -> what it may have."""
+REMEDIES: Mapping[str, str] = {
+    "include": "write the boxes into the file itself",
+    "body": "a part is one rigid <body>",
+    "joint": "the scene adds joints",
+    "freejoint": "the scene adds joints",
+    "inertial": "the density gives the inertia",
+    "mass": "the density gives the mass",
+    "option": "the scene says how it is simulated",
+    "compiler": "lengths are in metres",
+    "mesh": 'parts are made of boxes (type="box", pos, size)',
+    "fromto": 'parts are made of boxes (type="box", pos, size)',
+    "type": 'parts are made of boxes (type="box", pos, size)',
+    **dict.fromkeys(
+        ("quat", "euler", "axisangle", "xyaxes", "zaxis"),
+        "boxes are aligned with the body, exchange the entries of size= instead",
+    ),
+}
+"""What to do instead, of elements and attributes that people often try."""

@@ -1,0 +1,87 @@
+"""Files that others wrote are opened here: ordinary files only, none larger than allowed, text in UTF-8."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from apo_bench.errors import InputError
+
+LARGEST_BYTES = 1_000_000
+_FLAGS = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
+_KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
+
+
+@contextmanager
+def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
+    """An ordinary file, or a link to one, to read from; nothing else is waited for.
+
+    Args:
+        kind: What the file should be, for the message: `sweep file`.
+
+    Raises:
+        InputError: There is no such file, it is no ordinary one, or it cannot be read, also while it is open.
+    """
+    try:
+        _check_ordinary(path, kind, os.stat(path).st_mode)
+        number = os.open(path, os.O_RDONLY | sum(getattr(os, flag, 0) for flag in _FLAGS))
+        with os.fdopen(number, "rb") as file:
+            _check_ordinary(path, kind, os.fstat(number).st_mode)
+            yield file
+    except OSError as error:
+        raise InputError(f"{path}: the {kind} cannot be read ({error.strerror or error}); check the path.") from error
+    except ValueError as error:
+        if isinstance(error, InputError) or not _is_no_path(path):
+            raise
+        raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
+
+
+def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> bytes:
+    """What stands in a file.
+
+    Raises:
+        InputError: As `opened`, or it is larger than the limit.
+    """
+    with opened(path, kind) as file:
+        found = file.read(limit + 1)
+    if len(found) > limit:
+        raise InputError(f"{path}: the file is larger than {limit / 1e6:g} MB; give a {kind}.")
+    return found
+
+
+def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
+    """The text of a file, without a byte order mark.
+
+    Raises:
+        InputError: As `read_bytes`, or it is not UTF-8.
+    """
+    return decoded(read_bytes(path, kind, limit), str(path), kind)
+
+
+def decoded(raw: bytes, file: str, kind: str) -> str:
+    """The same of bytes; `file` is their name in messages."""
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{file}: the file is not UTF-8 text (byte {error.start}); save the {kind} as UTF-8."
+        ) from error
+
+
+def _check_ordinary(path: str | Path, kind: str, mode: int) -> None:
+    if not stat.S_ISREG(mode):
+        found = next((name for is_one, name in _KINDS if is_one(mode)), "a device")
+        raise InputError(f"{path}: {found} was given; give a {kind}.")
+
+
+def _is_no_path(path: str | Path) -> bool:
+    """Whether the system cannot even look for it: a zero byte in it, or half of a letter."""
+    try:
+        os.fsencode(path)
+    except ValueError:
+        return True
+    return "\0" in str(path)
