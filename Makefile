@@ -15,12 +15,14 @@ headline: OUT ?= runs/headline_$(FIDELITY)
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m numeric -n 2 --dist worksteal \
+    $$(grep -l pytest.mark.numeric tests/test_*.py)
 MIN := import sys; sys.exit(sys.version_info < (3, 11))
 
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test clean
+.PHONY: sweep headline test numeric clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
@@ -37,6 +39,11 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest -q -n 2 --dist worksteal
+	$(NUMERIC)
+
+# the tests marked numeric, under every other kernel of OpenBLAS, NumPy and Numba that the processor allows
+numeric: $(VENV)/.installed-dev
+	$(NUMERIC)
 
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .mypy_cache .ruff_cache .hypothesis

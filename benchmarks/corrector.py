@@ -15,6 +15,7 @@ import time
 from importlib import metadata
 from pathlib import Path
 
+sys.path.pop(0)  # this folder, whose coverage.py Numba takes for another
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -12,10 +12,17 @@ import pytest
 
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
+from benchmarks.switches import missing
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--bop-dir", type=Path, help="Folder of published estimates and truth, BOP results format.")
+
+
+def pytest_configure() -> None:
+    """A run for other kernels than the processor's own proves that it has them, in every process."""
+    if wrong := missing():
+        raise pytest.UsageError(wrong)
 
 
 @pytest.fixture(scope="session")

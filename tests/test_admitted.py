@@ -19,6 +19,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 
 def seen(seed: int = 0) -> Observation:
     built = scenes.stick_in_tower()

@@ -40,12 +40,15 @@ def length(seen: Observation, goals: Array) -> float:
     return float(np.linalg.norm(pose.log(pose.inverse(seen.goals) @ goals) / SIGMA))
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", scenes.ALL)
-@pytest.mark.parametrize(("method", "within"), [("snap", 1e-12), ("least-squares", 1e-12), ("penalty", 1e-4)])
+@pytest.mark.parametrize(("method", "within"), [("snap", 1e-12), ("least-squares", 1e-12), ("penalty", 1e-3)])
 def test_what_is_consistent_stays_as_it_is(method: str, within: float, name: str) -> None:
+    """But for `penalty`: Adam follows gradients that are rounding, and ended up to 4.5e-4 away under other kernels."""
     built = scenes.ALL[name]()
     made = correct(scenes.seen(built, built.goals), method)
     assert made.ok
+    assert made.gap_after_m < 1e-6
     assert np.abs(made.goals - built.goals).max() < within
 
 

@@ -17,6 +17,8 @@ from apo_bench.scenario_file import load_scenario
 from tests import scenes
 from tests.test_equations import random_scene
 
+pytestmark = pytest.mark.numeric
+
 
 def arcs(assembly: Assembly, *ends: str) -> NDArray[np.bool_]:
     """The contacts of these arcs, each as `stick-castle1`, or `cube-table 4` with the operation (from 1)."""

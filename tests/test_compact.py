@@ -20,6 +20,8 @@ from apo_bench.placement import placed
 from tests import scenes
 from tests.test_equations import long_words, random_scene
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 10**6)
 
 

@@ -61,19 +61,21 @@ def _numba() -> None:
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
-    for seed in range(12):
+    for seed in range(6):
         given = drawn(name, *level, seed)
         alike(manifold.nearest(*given), compiled.nearest(*given), LEVELS[level])
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_soft_contacts_are_the_same_too(name: str) -> None:
-    for seed in range(6):
+    for seed in range(3):
         system, goals, L = drawn(name, 2.0, 1.0, seed)
         soft_m = np.repeat(np.arange(len(system)) % 2 * 5e-5, 3)
         alike(manifold.nearest(system, goals, L, soft_m), compiled.nearest(system, goals, L, soft_m), 1e-12)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("own_points", [False, True])
 def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> None:
     draws = [drawn("stick_on_castles", 5.0, 3.0, seed) for seed in range(6)]
@@ -87,6 +89,7 @@ def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> N
     alike(manifold.nearest(system, goals, L), compiled.nearest(system, goals, L), 1e-11)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_compact_equations_are_the_same(name: str) -> None:
     given = load_scenario(name)
@@ -100,6 +103,7 @@ def test_the_compact_equations_are_the_same(name: str) -> None:
         np.testing.assert_allclose(w, v, rtol=0, atol=1e-15)
 
 
+@pytest.mark.numeric
 def test_what_is_not_finite_is_said_and_left_alone() -> None:
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     three = np.array([goals, goals, goals])
@@ -183,6 +187,7 @@ def test_every_loop_is_handed_to_the_compiler() -> None:
     assert written == {loops.solve, loops.summarised, *compiled.HELPERS}
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 0.999, 1.001, 3.0])
 def test_exp_and_its_derivative_in_three_by_three(turn: float) -> None:
     """Uncompiled, against the matrix polynomials, below and above the angle at which the series is cut."""

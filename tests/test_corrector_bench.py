@@ -24,6 +24,8 @@ from benchmarks.corrector_bench.rows import Row, printed, read, written
 from benchmarks.corrector_bench.runner import process, run
 from benchmarks.corrector_bench.suite_wrong import redundant, shifted
 
+pytestmark = pytest.mark.numeric
+
 STATED = {
     "fig2": (20, 18, 11),
     "fig3": (32, 18, 13),
@@ -93,11 +95,12 @@ def test_drift_is_how_far_a_solution_went_along_a_free_direction() -> None:
 
 
 def test_the_truth_has_no_error_and_the_observation_no_drift() -> None:
+    """The way back to where one is is rounding, over standard deviations of a few mm: up to 2e-14 was found."""
     of = problem("fig6")
     given = draw(of, "2/1", 0)
     assert quality(of, given, given.truth).position_mm == 0.0
     assert quality(of, given, given.truth).fixed_error < 1e-9
-    assert quality(of, given, given.seen).length == 0.0
+    assert quality(of, given, given.seen).length < 1e-12
     assert spread(of, given, given.truth) < 1e-20
 
 

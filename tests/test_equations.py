@@ -17,6 +17,8 @@ from apo_bench.geometry.overlap import overlap
 from apo_bench.placement import placed
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 PARTS = ("a", "b", "c", "s", "idle")
 
 

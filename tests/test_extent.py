@@ -10,6 +10,8 @@ import pytest
 from apo_bench.geometry.solid import extent
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 
 @pytest.mark.parametrize("seed", range(10))
 def test_the_farthest_corners_are_the_extent(seed: int) -> None:

@@ -22,6 +22,8 @@ from apo_bench.program import Reached, Snapshot
 from apo_bench.thresholds import Thresholds
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 CLEARANCE_MM = 0.25
 LAYOUT = pose.at((0.1, 0.02, 0.0), (0.0, 0.0, 17.0))
 END = -1

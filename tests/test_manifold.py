@@ -18,6 +18,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 RANKS = {"bridge": 11, "stick_on_castles": 13, "stick_in_tower": 13, "pockets": 28}
 LEVELS = [(2.0, 1.0), (5.0, 3.0), (10.0, 8.0)]
 SEEDS = st.integers(0, 10**6)

@@ -25,6 +25,8 @@ from apo_bench.observation.per_part import LEAST, MOST, PerPart, factors
 from apo_bench.program import Observation
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
 MODELS = [Anisotropic, PerPart]
 LEVEL = Level(3.0, 6.0)

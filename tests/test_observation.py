@@ -17,6 +17,8 @@ from apo_bench.observation.observe import observe
 from apo_bench.program import Demonstration, Observation
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
 CARELESS = np.zeros((3, 6, 6))
 CARELESS[1, 1, 1] = 0.0029**2

@@ -13,6 +13,8 @@ from apo_bench.geometry.overlap import area, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.parts import load_part
 
+pytestmark = pytest.mark.numeric
+
 EYE = np.eye(4)
 OVER = pose.at((0, 0, 0), (180, 0, 0))
 """Turned over, so that the face looks down."""

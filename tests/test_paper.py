@@ -26,6 +26,8 @@ from apo_bench.outcomes import CODES
 from apo_bench.program import Correction, Observation, Step, Try
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 Error = Callable[[Array], Array]
 NOTHING_M = 1e-8
 """A gap that is nothing but the last step of a solver that came to rest."""

@@ -13,6 +13,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import rigid
 
+pytestmark = pytest.mark.numeric
+
 SHAPES = [(), (1,), (3, 1, 2, 1)]
 SCALES = [0.0, 1e-9, 1e-5, 1e-3, 1.0, 3.0]
 

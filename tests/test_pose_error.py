@@ -18,6 +18,8 @@ from apo_bench.pose_error import goal_errors, pose_errors
 from apo_bench.program import Poses, Reached, Snapshot
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 
 def state(poses: Poses) -> Snapshot:
     return Snapshot(poses, penetration_m=0.0, speed_m_s=0.0, spin_rad_s=0.0, released=True)

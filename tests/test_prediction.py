@@ -20,6 +20,8 @@ from apo_bench.scenario import Attach
 from apo_bench.thresholds import Thresholds
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 CLEARANCE_MM = 0.25
 ALLOWED_MM = CLEARANCE_MM + Thresholds().fit_margin_mm
 DOWN, AWAY = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)

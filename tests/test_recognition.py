@@ -64,6 +64,7 @@ def side_by_side(seen: Observation, rules: Rules = NOISE) -> bool:
     return any(str(e.contact) == "B.nx on A.px" for e in recognise(seen, rules).evidence)
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("level", [0.0, 0.5, 1.0])
 def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
@@ -106,6 +107,7 @@ def test_the_contacts_that_came_with_it_are_not_looked_at(name: str, rules: Rule
     assert recognise(seen, rules).evidence == recognise(bare, rules).evidence
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", NAMES)
 def test_the_world_frame_does_not_matter(name: str) -> None:
     scene = scenes.ALL[name]()
@@ -242,6 +244,7 @@ def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, Facing]]:
     ]
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
 def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
     """Central differences. Where parts turn the overlap changes too, so the gap is taken where its middle was."""
@@ -271,6 +274,7 @@ def same(pair: Facing, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> 
     return next(p for p in facing(a, T_a, b, T_b, **WIDE) if (p.a, p.b) == (pair.a, pair.b))
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", NAMES)
 def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
     scene = scenes.ALL[name]()
@@ -291,6 +295,7 @@ def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
             assert_allclose(reach @ xi, moved, rtol=0, atol=1e-6)
 
 
+@pytest.mark.numeric
 @settings(deadline=None, max_examples=50)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:

@@ -12,6 +12,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.stability import unstable
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 
 def falls(scene: scenes.Scene, operation: int, T: Array) -> int | None:
     """The verdict if that operation (from 1) had another goal, displaced in the frame of its part; counted from 1."""

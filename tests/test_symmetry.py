@@ -17,6 +17,8 @@ from apo_bench.geometry.symmetry import folds, nearest, quarter_turns, symmetrie
 from apo_bench.scenario_file import load_scenario
 from tests import scenes
 
+pytestmark = pytest.mark.numeric
+
 UNIT_M = 0.01
 """Side of a voxel."""
 CORNERS = st.tuples(*[st.integers(0, 3)] * 3)

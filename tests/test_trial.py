@@ -182,7 +182,8 @@ def test_the_row_says_what_the_correction_says_of_itself(
 
 
 def test_the_row_says_how_far_the_plan_is_from_the_truth(rows: dict[str, dict[str, Any]]) -> None:
-    assert (rows["oracle"]["planned_error_fixed_mm"], rows["oracle"]["planned_error_free_mm"]) == (0.0, 0.0)
+    """That of `oracle` is rounding: up to 4e-14 mm was found."""
+    assert max(rows["oracle"]["planned_error_fixed_mm"], rows["oracle"]["planned_error_free_mm"]) < 1e-12
     assert rows["none"]["planned_error_fixed_mm"] > 1.0
     assert rows["paper"]["planned_error_fixed_mm"] < 0.1
     assert rows["paper"]["planned_error_free_mm"] > 0.5

@@ -14,6 +14,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import GENERATORS, exp_and_jacobian, right_jacobian
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 10**6)
 ANGLES = st.one_of(st.floats(0.0, 6.0), st.floats(-12, -1).map(lambda power: 10.0**power), st.just(np.pi))
 
@@ -60,7 +62,11 @@ def test_the_jacobian_is_its_power_series(seed: int, angle: float) -> None:
 @given(SEEDS, st.floats(0.0, 2.5))
 @settings(max_examples=50, deadline=None)
 def test_the_jacobian_is_the_difference_of_exponentials(seed: int, angle: float) -> None:
-    xi, by = twist(seed, angle), 1e-6
+    """Of steps that are large: just above 1e-4 rad `pose.exp` loses some 1e-13 m, which a step of 1e-6 makes 1.7e-7.
+
+    With this one the largest error found is 2.6e-9.
+    """
+    xi, by = twist(seed, angle), 5e-5
     back = pose.inverse(pose.exp(xi))
     sides = [pose.log(back @ pose.exp(xi + sign * by * np.eye(6))) for sign in (1.0, -1.0)]
     assert_allclose(right_jacobian(xi), (sides[0] - sides[1]).T / (2 * by), rtol=0, atol=1e-8)

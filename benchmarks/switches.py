@@ -1,0 +1,143 @@
+"""Runs a command again under other kernels of OpenBLAS, NumPy and Numba: `python -m benchmarks.switches COMMAND...`.
+
+All three choose their code by what the processor can do, so results differ between processors in their last bits. A
+switch is used only where a process under it says that it took; one that the processor does not allow is named and left
+out. The command finds in APO_BENCH_KERNELS what it runs on, and `expected` asks whether it does. Without a command: the
+kernels in use here, as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+
+BLAS = ("Haswell", "Zen", "SkylakeX", "Nehalem")
+"""Names that OPENBLAS_CORETYPE knows; one that it does not know or cannot run is passed over in silence."""
+EXPECTED = "APO_BENCH_KERNELS"
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """What runs in one process."""
+
+    blas: tuple[str, ...]
+    """The kernels of every OpenBLAS that is loaded, NumPy's and SciPy's; none where neither uses one."""
+    numpy: tuple[str, ...]
+    """Features above the least that NumPy was built for."""
+    numba: tuple[str, ...]
+    """The processor that Numba compiles for and its features, as LLVM names them; empty without Numba."""
+
+
+@dataclass(frozen=True)
+class Switch:
+    name: str
+    environment: Mapping[str, str]
+    kernels: Kernels
+
+
+def in_use() -> Kernels:
+    """The kernels of this process, after some work with them."""
+    import numpy as np
+    import scipy.linalg
+    from numpy._core import _multiarray_umath as compiled
+    from threadpoolctl import threadpool_info
+
+    A = np.eye(40) + np.arange(1600.0).reshape(40, 40) / 1e5
+    for solved in (np.linalg.solve(A, A), scipy.linalg.solve(A, A)):
+        assert np.allclose(solved, np.eye(40))
+    blas = tuple(sorted(str(one["architecture"]) for one in threadpool_info() if one["internal_api"] == "openblas"))
+    features = compiled.__cpu_features__
+    return Kernels(blas, tuple(name for name in compiled.__cpu_dispatch__ if features[name]), _compiled_for())
+
+
+def _compiled_for() -> tuple[str, ...]:
+    try:
+        from numba.core.registry import cpu_target
+    except ImportError:
+        return ()
+    _, processor, features = cpu_target.target_context.codegen().magic_tuple()
+    return (processor, *sorted(name for name in features.split(",") if name.startswith("+")))
+
+
+def under(environment: Mapping[str, str]) -> Kernels | str:
+    """The kernels of a process with these variables, or why there are none."""
+    ran = subprocess.run(
+        [sys.executable, "-P", __file__],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    if ran.returncode != 0:
+        return f"a process under it ended with {ran.returncode}"
+    return Kernels(**{name: tuple(value) for name, value in json.loads(ran.stdout).items()})
+
+
+def switches(own: Kernels) -> Iterator[Switch | str]:
+    """Every switch that took, or a sentence on one that is not run, given the kernels without any."""
+    for name in BLAS:
+        found = under({"OPENBLAS_CORETYPE": name}) if own.blas else "neither NumPy nor SciPy uses OpenBLAS"
+        if isinstance(found, str):
+            yield f"{name} is not run: {found}"
+        elif {one.lower() for one in found.blas} != {name.lower()}:
+            yield f"{name} is not run: OpenBLAS takes {' and '.join(sorted(set(found.blas)))} for it on this processor"
+        elif found.blas == own.blas:
+            yield f"{name} is not run again: it is what OpenBLAS takes on this processor by itself"
+        else:
+            yield Switch(f"OpenBLAS {name}", {"OPENBLAS_CORETYPE": name}, found)
+    plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(own.numpy), "NUMBA_CPU_NAME": "generic"}
+    found = under(plain)
+    if isinstance(found, str):
+        yield f"vector features off is not run: {found}"
+    elif found.numpy or found.numba[:1] not in ((), ("generic",)):
+        yield f"vector features off is not run: {found.numpy or found.numba} stay on"
+    elif (found.numpy, found.numba) == (own.numpy, own.numba):
+        yield "vector features off is not run again: NumPy and Numba use none on this processor"
+    else:
+        yield Switch("vector features of NumPy and Numba off", plain, found)
+
+
+def taken(own: Kernels) -> Iterator[Switch]:
+    """The switches that took; what is left out is printed."""
+    for switch in switches(own):
+        if isinstance(switch, Switch):
+            yield switch
+        else:
+            print(f"-- {switch}", flush=True)
+
+
+def run(switch: Switch, command: list[str], **options: object) -> subprocess.CompletedProcess[str]:
+    """The command under the switch, told what it has to find."""
+    told = {**os.environ, **switch.environment, EXPECTED: json.dumps(asdict(switch.kernels))}
+    return subprocess.run(command, env=told, text=True, check=False, **options)  # type: ignore[call-overload]
+
+
+def missing() -> str | None:
+    """What is wrong where the kernels of this process are not those that it was started for."""
+    told = os.environ.get(EXPECTED)
+    found = json.loads(json.dumps(asdict(in_use()))) if told is not None else None
+    return None if told is None or found == json.loads(told) else f"the kernels here are {found}, not {told}"
+
+
+def main(command: list[str]) -> int:
+    if not command:
+        print(json.dumps(asdict(in_use())))
+        return 0
+    own = under({})
+    if isinstance(own, str):
+        print(f"the kernels of this processor are not known: {own}")
+        return 1
+    failed = 0
+    for switch in taken(own):
+        print(f"-- under {switch.name}", flush=True)
+        failed |= run(switch, command).returncode != 0
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
