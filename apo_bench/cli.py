@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -27,6 +28,7 @@ from apo_bench import (
     cli_report,
     cli_show,
     cli_sweep,
+    streams,
 )
 from apo_bench.arguments import check_writable
 from apo_bench.cli_replay import NO_RESULT, ArmOption, Clearance, GraspOption, ScenarioArgument, Timestep
@@ -46,18 +48,27 @@ INTERRUPTED = 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code. What `module:name` names may lie in the current folder."""
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)
-    given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        here = streams.prepare()
+        if here not in sys.path:
+            sys.path.append(here)
+        given = list(sys.argv[1:] if arguments is None else arguments)
         code = app(args=given or ["--help"], prog_name="apo-bench", standalone_mode=False)
+        streams.finish()
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
     except (Interrupted, KeyboardInterrupt) as error:
         return _complain(str(error) or "interrupted.", getattr(error, "code", INTERRUPTED))
-    except RuntimeError as error:
+    except (RuntimeError, streams.Unusable) as error:
         return _complain(str(error), NO_RESULT)
+    except MemoryError:
+        return _complain("there is not enough memory.", NO_RESULT)
+    except OSError as error:
+        return _complain(streams.give_up(error), NO_RESULT)
+    except SystemExit as error:
+        if (broken := streams.broken_pipe(error)) is None:
+            raise
+        return _complain(streams.give_up(broken), NO_RESULT)
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise
@@ -68,7 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(sentence: str, code: int) -> int:
-    typer.echo(f"apo-bench: {sentence}", err=True)
+    with suppress(OSError):
+        typer.echo(f"apo-bench: {sentence}", err=True)
     return code
 
 

@@ -1,0 +1,74 @@
+"""The surroundings of a process: standard streams that may be closed or full, and a current folder that may be gone."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+
+class Unusable(Exception):
+    """Nothing can be printed, or no path be found: one sentence."""
+
+
+def prepare() -> str:
+    """The current folder; standard input and error, if they are closed, lead nowhere.
+
+    Nothing may be opened before: it would take the number of a closed stream, and be printed into.
+
+    Raises:
+        Unusable: Standard output is closed, or the current folder was deleted.
+    """
+    if sys.stderr is None:
+        _lead_nowhere(2)
+        sys.stderr = os.fdopen(2, "w", errors="backslashreplace", closefd=False)
+    if sys.stdin is None:
+        _lead_nowhere(0)
+        sys.stdin = os.fdopen(0, closefd=False)
+    if sys.stdout is None:
+        raise Unusable("standard output is closed; send it to a file, or to /dev/null.")
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        return str(Path.cwd())
+    except OSError as error:
+        raise Unusable(
+            f"the current folder cannot be found ({error.strerror}); change into one that exists."
+        ) from error
+
+
+def finish() -> None:
+    """Print what is held back.
+
+    Raises:
+        OSError: Standard output is full, or nobody reads it any more.
+    """
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def give_up(error: OSError) -> str:
+    """What is to be said when something could not be written; what standard output holds back is thrown away."""
+    if error.filename is not None:
+        return f"{error.filename}: {error.strerror}."
+    with suppress(OSError, ValueError, AttributeError):
+        sys.stdout.flush()
+        return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
+    with suppress(OSError, ValueError):
+        _lead_nowhere(1)
+    sys.stdout = sys.__stdout__
+    return f"standard output could not be written ({error.strerror or error}); what was not printed is lost."
+
+
+def broken_pipe(error: SystemExit) -> OSError | None:
+    """What the command line library ends a process for without a word; None if it ends for another reason."""
+    found = error.__context__
+    return found if isinstance(found, OSError) else None
+
+
+def _lead_nowhere(number: int) -> None:
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    if nowhere != number:
+        os.dup2(nowhere, number)
+        os.close(nowhere)
