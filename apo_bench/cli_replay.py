@@ -32,7 +32,7 @@ def replay(
     level_deg: Annotated[float | None, typer.Option(help="Only the degrees; default: the level.")] = None,
     careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
     seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
-    method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "none",
+    method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "contact",
     clearance: Clearance = None,
     grasp: GraspOption = "friction",
     arm: ArmOption = "six_axis",

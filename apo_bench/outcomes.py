@@ -30,6 +30,7 @@ CODES = MappingProxyType(
         "raised": "the corrector raised an error or returned what it must not",
         # plan
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
+        "unreachable_start": "the arm cannot reach {part} where operation {operation} picks it up",
         "unstable_goal": "at the goal of operation {operation} the centre of mass of {part} lies beside its support",
         # pick .. depart
         "lost_grasp": "{part} was lost from the gripper in operation {operation}",

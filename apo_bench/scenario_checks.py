@@ -19,6 +19,7 @@ from apo_bench.placement import placed
 from apo_bench.program import Layout, Poses
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_order import check_order
+from apo_bench.scenario_starts import in_the_air
 
 GAP_M = 1e-6
 """Faces that are said to touch are nearer than this."""
@@ -50,6 +51,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         stages = (case.layout.start, *placed(scenario.assembly, case.layout.start, case.layout.goals))
         if not case.key:
             check_order(scenario.assembly, stages, file)
+        _check_starts(scenario, file, case)
         _check_turns(scenario, file, case, stages)
         _check_contacts(scenario, file, case, stages)
         _check_intrusions(scenario, file, case, stages)
@@ -72,6 +74,14 @@ def _cases(scenario: Scenario) -> Iterator[Case]:
 
 def _refuse(file: str, case: Case, key: str, sentence: str, remedy: str) -> InputError:
     return InputError(f"{file}, {case.key or key}: {sentence}{case.words}; {remedy}.")
+
+
+def _check_starts(scenario: Scenario, file: str, case: Case) -> None:
+    """Every movable part starts on something."""
+    found = in_the_air(scenario.assembly, case.layout.start)
+    if found is not None:
+        part, sentence = found
+        raise _refuse(file, case, f"parts, {part}, start, at_mm", sentence, "let it start on a part, such as the table")
 
 
 def _check_turns(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...]) -> None:

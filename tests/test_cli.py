@@ -17,8 +17,8 @@ from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.spec import ROW
 from apo_bench.scenario_file import load_scenario, scenario_names
 
-TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld")
-MEASURED = ("replay", "stick_in_tower", "--grasp", "weld")
+TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "none")
+MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "none")
 HOPELESS = ("--level", "40")
 """Plans at this level are refused before the arm moves, so that a replay costs little."""
 
@@ -134,6 +134,24 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
     assert [float(x) for x in stick.get("size", "").split()] == pytest.approx([0.11, 0.0096, 0.0096])
 
 
+def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
+    from inspect import signature
+
+    from apo_bench.benchmark.grid import METHODS
+    from apo_bench.benchmark.one import Request
+    from apo_bench.benchmark.spec import METHOD, TrialSpec
+    from apo_bench.cli_correction import correct as correct_command
+    from apo_bench.cli_replay import replay
+    from apo_bench.cli_show import show
+    from apo_bench.corrected import Corrected
+    from apo_bench.correction.correct import correct
+
+    commands = [signature(command).parameters["method"].default for command in (replay, correct_command, show)]
+    doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
+    assert {*commands, *doors, Request("").method, TrialSpec("").method} == {METHOD}
+    assert METHOD in METHODS
+
+
 def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, *TRIAL, "--method", "paper", "--json")
     assert (code, err) == (0, "")
@@ -187,7 +205,7 @@ def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp
 
     path = tmp_path / "mine.toml"
     path.write_text((folder("scenarios") / "stick_in_tower.toml").read_text())
-    code, out, _ = run(capsys, "replay", str(path), "--seed", "5", "--grasp", "weld", *HOPELESS, "--json")
+    code, out, _ = run(capsys, "replay", str(path), "--seed", "5", "--method", "none", *HOPELESS, "--json")
     assert code == 0
     assert json.loads(out)["scenario"] == "mine"
 

@@ -172,7 +172,8 @@ def test_the_page_on_plans_shows_what_is_printed(capsys: pytest.CaptureFixture[s
 def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """A stick in a hole with a block before each end: it cannot be there, or no way leads there."""
     block = '[parts.{0}]\nfile = "block"\nfixed = true\nstart = {{ at_mm = [{1}, 0, 25] }}\n'
-    text = 'schema = 1\ntitle = "own"\n[parts.stick]\nfile = "stick"\nstart = { at_mm = [0, 320, 10] }\n'
+    text = 'schema = 1\ntitle = "own"\n[parts.table]\nfile = "table"\nfixed = true\n'
+    text += '[parts.stick]\nfile = "stick"\nstart = { at_mm = [0, 320, 10] }\n'
     text += '[parts.cube]\nfile = "cube"\nfixed = true\nstart = { at_mm = [0, 0, 25] }\n'
     hole = '["py", "cube.hpy"], ["ny", "cube.hny"], ["pz", "cube.hpz"], ["nz", "cube.hnz"]'
     for at, more, words in (

@@ -128,6 +128,14 @@ def test_a_goal_out_of_reach_is_an_outcome_of_the_plan(tower: Scene) -> None:
     assert verdict.finished.code == "not_made"
 
 
+def test_a_start_out_of_reach_is_not_called_a_goal(tower: Scene) -> None:
+    truth = layout(tower, 2)
+    far = {**truth.start, "castle2": pose.at((0.5, 0, 0)) @ truth.start["castle2"]}
+    result = replay(Plan(tower.scenario.assembly, far, truth.goals), tower)
+    assert (result.outcome.stage, result.outcome.code) == ("plan", "unreachable_start")
+    assert result.outcome.sentence == "the arm cannot reach castle2 where operation 2 picks it up"
+
+
 def test_a_goal_beside_its_support_is_an_outcome_of_the_plan(tower: Scene) -> None:
     goals = np.array(layout(tower, 2).goals)
     goals[1] = goals[1] @ pose.at((0.035, 0, 0))

@@ -82,9 +82,9 @@ def test_a_page_without_graphics_says_so(
     assert "No picture: no picture can be drawn here" in pages.words(made.page)
 
 
-def test_only_what_is_not_a_default_is_said() -> None:
+def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
     usual = {"eye": "noise", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
-    assert replay_command(row("none", 3, **usual)) == "apo-bench replay stick_in_tower --seed 3"
+    assert replay_command(row("none", 3, **usual)) == "apo-bench replay stick_in_tower --method none --seed 3"
     other = row(
         "my mod:it's", 9, level=0.1, level_deg=0.3, careless=0.5, noise="a b.toml", relations="shifted:3", grasp="weld",
         clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "contact", "arm": "mine:arm"}),

@@ -137,6 +137,13 @@ BROKEN = {
     "carries_early": (BOTTOM, BOTTOM + '\ncarries = ["stick"]', ["operation 1, carries", "'stick'", "move it first"]),
     "carries_itself": (ON_TOP, ON_TOP + '\ncarries = ["castle2"]', ["operation 2, carries", "'castle2'"]),
     "carries_fixed": (ON_TOP, ON_TOP + '\ncarries = ["table"]', ["operation 2, carries", "'table' is fixed"]),
+    "start_in_the_air": (
+        STICK_START,
+        "start = { at_mm = [60, 290, 22.5] }",
+        ["parts, stick, start, at_mm", "'stick' starts in the air, 12.5 mm above 'table'"],
+    ),
+    "start_over_a_part": (STICK_START, "start = { at_mm = [0, -290, 72] }", ["32 mm above 'castle1'"]),
+    "start_beside_the_table": (STICK_START, "start = { at_mm = [60, 1990, 10] }", ["with nothing below it"]),
     "idle_part": (TABLE, TABLE + '[parts.block]\nfile = "block"\nstart = { at_mm = [-200, 300, 25] }\n', ["'block'"]),
     "date": ('paper = "Example 5.1, Fig. 8 to 11"', "paper = 1992-07-07", ["paper", "1992-07-07"]),
     "operations_table": ("schema = 1", 'schema = 1\noperations = "later"\n', ["TOML"]),

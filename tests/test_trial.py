@@ -28,7 +28,7 @@ from apo_bench.resources import folder
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.scene import Scene, build_scene
 
-SPEC = TrialSpec("stick_in_tower", grasp="weld", seed=5)
+SPEC = TrialSpec("stick_in_tower", grasp="weld", method="none", seed=5)
 KEYS = (
     *("schema", "env_id", "spec_hash", "scenario", "level", "careless", "clearance_mm", "noise", "grasp"),
     *("relations", "method", "seed", "timestep_s", "thresholds", "demonstration", "success", "loose_success"),

@@ -11,7 +11,7 @@ from apo_bench.benchmark.alone import run_alone
 from apo_bench.benchmark.fingerprint import content_hash
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
-from apo_bench.benchmark.spec import RANGE, TrialSpec, check_clearance
+from apo_bench.benchmark.spec import METHOD, RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import eye_of, run_measured
 from apo_bench.benchmark.worker import row_of
@@ -21,7 +21,11 @@ from apo_bench.observed import observed, read_stated
 from apo_bench.program import Observation
 from apo_bench.reading import read_text
 from apo_bench.scenario_file import load_scenario
+from apo_bench.scenario_starts import in_the_air
 from apo_bench.simulation.scene import Scene, build_scene
+
+MEASURED_AIR_M = 5e-3
+"""A start that was measured may be wrong by so much: as far apart as `loose_success` lets faces be."""
 
 
 @final
@@ -38,7 +42,7 @@ class Request:
     relations: str | None = None
     eye: str | None = None
     seed: int | None = None
-    method: str = "none"
+    method: str = METHOD
     clearance_mm: float | None = None
     grasp: str = "friction"
     arm: str = "six_axis"
@@ -138,6 +142,9 @@ def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
 
 def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
     seen = read_stated(path, scene.scenario)
+    aloft = in_the_air(seen.assembly, seen.start, MEASURED_AIR_M)
+    if aloft is not None:
+        raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
     return run_measured(spec, scene, seen, read_text(path, "observation file"), watch=film)
 
 

@@ -19,7 +19,7 @@ Files = Mapping[str, str]
 
 
 def replay_command(row: Mapping[str, Any], files: Files | None = None) -> str:
-    """`apo-bench replay SCENARIO .. --seed N`, quoted for a shell; only what is not a default of `replay` is said."""
+    """`apo-bench replay SCENARIO .. --seed N`, quoted for a shell; of the defaults it names the method only."""
     return f"{without_seed(row, files)} --seed {row['seed']}"
 
 
@@ -52,7 +52,7 @@ def _options(row: Mapping[str, Any], given: str) -> list[str]:
     say("--arm", row["arm"], "six_axis")
     say("--timestep-ms", milli(row["timestep_s"]), 1.0)
     say("--fidelity", row["fidelity"], "full")
-    say("--method", row["method"], "none")
+    say("--method", row["method"], None)
     if row.get("failure_stage") == "worker":
         say("--trial-limit", LIMIT_S, None)
     return said

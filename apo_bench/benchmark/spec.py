@@ -17,6 +17,8 @@ EYES = ("noise", "range")
 RANGE = "range"
 USUAL = "isotropic"
 """The noise model where none is asked for."""
+METHOD = "contact"
+"""The method where none is asked for."""
 LARGEST_LEVEL = 50.0
 """[mm] and [degrees]: five times that is still inside the room."""
 FIDELITIES = ("full", "contact")
@@ -41,7 +43,7 @@ class TrialSpec:
     noise: str = USUAL
     grasp: str = "friction"
     arm: str = "six_axis"
-    method: str = "none"
+    method: str = METHOD
     seed: int = 0
     timestep_s: float = 0.001
     relations: str = "given"

@@ -73,15 +73,16 @@ def moves(plan: Plan, scene: Scene) -> tuple[Move, ...]:
     return tuple(made)
 
 
-def unreachable(scene: Scene, transfer: Transfer) -> bool:
-    """Whether a tip pose that the transfer needs has no joint angles."""
+def unreachable(scene: Scene, transfer: Transfer) -> str:
+    """The code of the first end of the transfer at which a tip pose has no joint angles, `` where all have."""
     q = np.array(scene.arm.home)
-    for T in key_poses(transfer):
-        found = scene.kinematics.inverse(T, q)
-        if found is None:
-            return True
-        q = found
-    return False
+    for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
+        for T in poses:
+            found = scene.kinematics.inverse(T, q)
+            if found is None:
+                return code
+            q = found
+    return ""
 
 
 def _tasks(plan: Plan, scene: Scene) -> list[_Task]:

@@ -74,8 +74,9 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
         if k is not None:
             return _outcome(plan, "plan", "unstable_goal", k)
     for move in todo:
-        if unreachable(scene, move.transfer):
-            return _outcome(plan, "plan", "unreachable", move.step.operation)
+        code = unreachable(scene, move.transfer)
+        if code:
+            return _outcome(plan, "plan", code, move.step.operation)
     return None
 
 

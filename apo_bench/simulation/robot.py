@@ -204,7 +204,7 @@ class Robot:
 
     def _reached(self, q: Array | None) -> Array:
         if q is None:
-            raise Halt(self.stage, "unreachable")
+            raise Halt(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
 
     def _run(self, targets: Array, guard: Guard | None) -> int:

@@ -111,15 +111,15 @@ def aim(t: Transfer) -> Array:
     return moved(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
 
 
-def key_poses(t: Transfer) -> tuple[Array, ...]:
-    """Tip poses that must be in reach for the transfer to be possible."""
+def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Tip poses that must be in reach for the transfer to be possible: where the part is taken, and where it is put."""
     first, last = t.grips[0].T_part_tip, t.grips[-1].T_part_tip
     carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
     pick, goal = t.T_world_start @ first, t.T_world_goal @ last
     free = moved(t.T_world_start @ carrying, t.out.way, -t.out.travel)
     before = moved(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
-    high = [at_height(T, max(t.safe, T[2, 3])) for T in (free, before)]
-    return (at_height(pick, hover(pick)), pick, *([free] if t.out.level else []), *high, before, goal)
+    above, over = (at_height(T, max(t.safe, T[2, 3])) for T in (free, before))
+    return (at_height(pick, hover(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
 
 
 def hover(grasp: Array) -> float:
