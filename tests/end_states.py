@@ -1,0 +1,102 @@
+"""Constructed end states: an assembly as it should be, but for some edits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.judge import Verdict, judge
+from apo_bench.judgement import Judgement
+from apo_bench.placement import placed
+from apo_bench.program import Reached, Snapshot
+from apo_bench.thresholds import Thresholds
+from tests import scenes
+
+CLEARANCE_MM = 0.25
+LAYOUT = pose.at((0.1, 0.02, 0.0), (0.0, 0.0, 17.0))
+END = -1
+FIELDS = {"penetration_m": 0.0, "speed_m_s": 0.0, "spin_rad_s": 0.0, "released": True}
+"""What a snapshot says besides the poses, when nothing is wrong."""
+
+Edit = Callable[[list[dict]], None]
+"""Changes the states after each operation and at the end: a list of {part: pose, field of Snapshot: value} or None."""
+
+
+def shift(part: str, since: int, *mm_and_turn: object, until: int | None = None) -> Edit:
+    """The part lies elsewhere from the end of that operation on (from 1; END: at the end only), in its own frame."""
+
+    def edit(states: list[dict]) -> None:
+        first = len(states) - 1 if since == END else since - 1
+        for state in states[first : until if until is None else until - 1]:
+            state[part] = state[part] @ scenes.mm(*mm_and_turn)
+
+    return edit
+
+
+def put(part: str, since: int, T: Array) -> Edit:
+    """The part stands there, in the frame of the assembly, from the end of that operation on."""
+
+    def edit(states: list[dict]) -> None:
+        for state in states[since - 1 :]:
+            state[part] = LAYOUT @ T
+
+    return edit
+
+
+def moved(since: int, T: Array, *parts: str, until: int | None = None) -> Edit:
+    """Parts, by default all that are loose, move together by T in the frame of the assembly, from that operation on."""
+    carried = LAYOUT @ T @ pose.inverse(LAYOUT)
+
+    def edit(states: list[dict]) -> None:
+        first = len(states) - 1 if since == END else since - 1
+        for state in states[first : until if until is None else until - 1]:
+            for part in parts or [name for name in state if name not in FIELDS and name != "table"]:
+                state[part] = carried @ state[part]
+
+    return edit
+
+
+def state(when: int, **fields: object) -> Edit:
+    """Fields of the snapshot after that operation, END for the last one."""
+
+    def edit(states: list[dict]) -> None:
+        states[when if when == END else when - 1].update(fields)
+
+    return edit
+
+
+def never(*moments: int) -> Edit:
+    """There is no snapshot of these moments."""
+
+    def edit(states: list[dict]) -> None:
+        for when in moments:
+            states[when if when == END else when - 1].clear()
+
+    return edit
+
+
+def verdict(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds = Thresholds()) -> Verdict:  # noqa: B008
+    """The judge's answer when everything is as it should be but for the edits."""
+    there = scenes.turned(scene, LAYOUT)
+    history = placed(there.assembly, there.start, there.goals)
+    states: list[dict] = [dict(poses) for poses in (*history, history[-1])]
+    for edit in edits:
+        edit(states)
+    snapshots = [snapshot(state) if state else None for state in states]
+    return judge(there.assembly, Reached(tuple(snapshots[:-1]), snapshots[-1]), there.goals, thresholds, CLEARANCE_MM)
+
+
+def shown(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds = Thresholds()) -> Judgement:  # noqa: B008
+    """What the rule of every moment finds: whether it was made as demonstrated."""
+    return verdict(scene, edits, thresholds).demonstrated
+
+
+def snapshot(state: Mapping) -> Snapshot:
+    poses = {name: value for name, value in state.items() if name not in FIELDS}
+    return Snapshot(poses, **{name: state.get(name, value) for name, value in FIELDS.items()})
+
+
+TOWER, CASTLES, FIXTURE = scenes.stick_in_tower, scenes.stick_on_castles, scenes.fixture
+ALIGNED = scenes.fixture_alignment
+CARRIED, POCKETS, BRIDGE = scenes.subassembly_on_castles, scenes.pockets, scenes.bridge
