@@ -113,7 +113,7 @@ def stop_for_two() -> scenes.Scene:
 
 def at_edge(share: float) -> np.ndarray:
     """Puts what stands in the middle of the assembly at the table's edge, so much of 60 mm on it."""
-    return pose.inverse(LAYOUT) @ mm(700 + 30 - 60 * share, 0, 0)
+    return mm(700 + 30 - 60 * share, 0, 0)
 
 
 HALF_X, HALF_Y, HALF_Z = (180, 0, 0), (0, 180, 0), (0, 0, 180)
