@@ -54,7 +54,7 @@ def fixtures(assembly: Assembly) -> frozenset[str]:
     """The parts that were used and put away.
 
     The last operation of such a part breaks its last contacts with movable parts and makes contacts with fixed parts
-    only; none with a movable part is made later.
+    only. One that ends against a movable part is none, even if that part leaves it later.
     """
     relations = assembly.relations()
     last = {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
@@ -66,7 +66,7 @@ def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k:
     movable = [relation for relation in mine if not _on_fixed(assembly, relation.contact)]
     breaks = any(relation.lost == k for relation in movable)
     makes = any(relation.made == k for relation in mine if relation not in movable)
-    return breaks and makes and all(relation.lost is not None for relation in movable)
+    return breaks and makes and all(relation.lost is not None and relation.lost <= k for relation in movable)
 
 
 def _on_fixed(assembly: Assembly, contact: Contact) -> bool:

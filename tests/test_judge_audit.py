@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.audited_states import LOOSE, STATES, Loose, Seen
+from apo_bench.judge_finished import fixtures
+from tests.audited_states import LOOSE, STATES, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
 from tests.end_states import verdict
 
 
@@ -17,3 +18,8 @@ def test_a_person_says_the_same(seen: Seen) -> None:
 def test_a_person_says_nearly(seen: Loose) -> None:
     found = verdict(seen.scene(), seen.edits)
     assert (found.success, found.loose_success) == (False, seen.nearly)
+
+
+def test_a_part_whose_last_contact_another_part_broke_is_no_fixture() -> None:
+    found = {build: fixtures(build().assembly) for build in (kept, used_later, aligned_twice, stop_for_two)}
+    assert found == {kept: set(), used_later: set(), aligned_twice: {"D"}, stop_for_two: {"D"}}
