@@ -398,6 +398,30 @@ FIXTURES = [
 STATES = [*TURNED, *ELSEWHERE, *AFTERWARDS, *ON_THE_WAY, *MARGINS, *FIXTURES]
 
 
+ALIKE = "parts of one kind do not stand for each other: a contact names its parts, and only contacts are asked for"
+NEAR_TRUTH = (
+    "the symmetry of a part is the one nearest to its true pose in the room, so beyond 45 degrees a block, and beyond "
+    "90 degrees a castle or a stick, may be read as turned within the assembly"
+)
+CORNER = "no corner may lie more than 1 mm from where it was put, and the end of a long stick is far from its centre"
+NOT_ENDED = "every operation must have ended"
+DIFFERS = {
+    "bridge, A lies along the seam, turned by 80 degrees": "no contact fixes its turn, and half of each top is covered",
+    "castles, all of it turned by a quarter, give or take a little play": NEAR_TRUTH,
+    "bridge, turned by 60 degrees": NEAR_TRUTH,
+    "bridge, B and C in each other's place": ALIKE,
+    "pockets, the cubes in each other's pocket": f"{ALIKE}; fixed parts have no symmetry either",
+    "tower, all of it turned by 0.6 degrees at the end": CORNER,
+    "tower, the stick turned by 0.6 degrees at the end": CORNER,
+    "tower, the last operation was not ended, yet everything is in its place": NOT_ENDED,
+    "castles, operation 2 was left out and castle 2 stands in its place": NOT_ENDED,
+    "fixture, the cube put down on the finished assembly": "where a fixture ends is free",
+    "pockets, cube 1 on top of the two cubes": "where a fixture ends is free",
+    "stop for two: B pushed by 3 mm when D goes": "D broke the last contact of B, not B itself: B is no fixture",
+}
+"""States of which the rule says otherwise than the person, and what in the rule does."""
+
+
 class Loose(NamedTuple):
     """A state that is not right, and whether a person says that it nearly is: within 5 mm and 5 degrees."""
 
