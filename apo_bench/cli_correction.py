@@ -88,7 +88,7 @@ def correct(
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
     from apo_bench.benchmark.correct_text import correction_form, correction_lines, pose_table, suspect_table
-    from apo_bench.correction.correct import correct as corrected
+    from apo_bench.correction.own import correct_named
     from apo_bench.observed import observed
 
     if out is not None:
@@ -100,7 +100,7 @@ def correct(
     corrector = _corrector(method, if_doubtful)
     seen, loaded, assumed = observed(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
     with aside(as_json):
-        made = corrected(seen, corrector)
+        made = correct_named(seen, corrector)
     found = _explained(seen, made)
     if as_json:
         typer.echo(json.dumps(correction_form(loaded.name, method, seen, made, found, assumed), allow_nan=False))

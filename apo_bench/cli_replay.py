@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from apo_bench.arguments import check_writable
-from apo_bench.cli_sweep import EYE, FIDELITY, NOISE, RELATIONS, interrupted
+from apo_bench.cli_sweep import CORRECTOR_LIMIT_S, EYE, FIDELITY, NOISE, RELATIONS, CorrectorLimit, interrupted
 from apo_bench.output import aside
 
 NO_RESULT = 1
@@ -47,6 +47,7 @@ def replay(
     trial_limit: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Run it in a process of its own, as sweeps do: ended then.")
     ] = None,
+    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
 ) -> None:
     """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
@@ -79,6 +80,7 @@ def replay(
         save_observation=save_observation,
         video=video,
         limit_s=trial_limit,
+        corrector_limit_s=corrector_limit,
     )
     try:
         with aside(as_json):

@@ -66,9 +66,9 @@ def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) 
     from apo_bench.benchmark.believed_picture import belief
     from apo_bench.benchmark.misgivings import misgivings
     from apo_bench.benchmark.planning import planned
-    from apo_bench.correction.correct import correct
+    from apo_bench.correction.own import correct_named
 
-    made = correct(looked, method)
+    made = correct_named(looked, method)
     if not made.ok:
         raise RuntimeError(
             f"{method} did not correct what was seen: {made.sentence.rstrip('.')}; --seen draws what was seen."

@@ -24,6 +24,11 @@ RELATIONS = (
 )
 EYE = "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)"
 FIDELITY = "full, or contact: only the part of each motion in which things may touch is simulated."
+CORRECTOR_LIMIT_S = 120.0
+CorrectorLimit = Annotated[
+    float,
+    typer.Option(metavar="SECONDS", help="A corrector given as package.module:name that takes longer has failed."),
+]
 AXES: Mapping[str, tuple[str, Callable[[str, str], tuple[Any, ...]]]] = {
     "levels": ("levels", numbers),
     "careless": ("careless", numbers),
@@ -94,6 +99,7 @@ def sweep(
     trial_limit: Annotated[
         float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
     ] = 600.0,
+    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
 ) -> None:
@@ -117,7 +123,15 @@ def sweep(
     crew = cores() if workers is None and backend == "local" else workers
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     try:
-        rows = run(grids, out, workers=crew, limit_s=trial_limit, backend=backend, address=address, command=command)
+        rows = run(
+            *(grids, out),
+            workers=crew,
+            limit_s=trial_limit,
+            corrector_limit_s=corrector_limit,
+            backend=backend,
+            address=address,
+            command=command,
+        )
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error
     print_cells(tally(rows))

@@ -15,7 +15,7 @@ def aside(asked: bool) -> Iterator[None]:
     if not asked:
         yield
         return
-    _flush()
+    flush()
     try:
         ours = os.dup(1)
     except OSError:
@@ -27,13 +27,13 @@ def aside(asked: bool) -> Iterator[None]:
         with redirect_stdout(sys.stderr):
             yield
     finally:
-        _flush()
+        flush()
         if ours is not None:
             os.dup2(ours, 1)
             os.close(ours)
 
 
-def _flush() -> None:
+def flush() -> None:
     """Write what Python and the C library still hold back."""
     for stream in (sys.stdout, sys.__stdout__):
         if stream is not None:

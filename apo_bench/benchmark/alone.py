@@ -10,11 +10,12 @@ from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stopping import listening
 from apo_bench.benchmark.terms import Terms, versions
 from apo_bench.benchmark.worker import Timing, in_time
+from apo_bench.correction.own import LIMIT_S, check_correctors
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.arm import find_arm
 
 
-def run_alone(spec: TrialSpec, limit_s: float) -> Row:
+def run_alone(spec: TrialSpec, limit_s: float, corrector_limit_s: float = LIMIT_S) -> Row:
     """The row that a sweep with this limit of wall time per trial has for the trial.
 
     Raises:
@@ -23,6 +24,7 @@ def run_alone(spec: TrialSpec, limit_s: float) -> Row:
         KeyboardInterrupt: A signal asked for an end.
     """
     check_limit(limit_s)
+    check_correctors((spec.method,), corrector_limit_s)
     content = content_hash(load_scenario(spec.scenario), spec.scenario, find_arm(spec.arm).mjcf)
     rows: list[Row] = []
 
@@ -30,6 +32,6 @@ def run_alone(spec: TrialSpec, limit_s: float) -> Row:
         rows.append(in_time(row, timing, limit_s))
 
     with listening() as check:
-        terms = Terms({spec.scenario: content}, versions())
+        terms = Terms({spec.scenario: content}, versions(), corrector_limit_s)
         spread((Unit((spec,)),), terms, workers=1, limit_s=limit_s, emit=emit, check=check)
     return rows[0]

@@ -22,6 +22,7 @@ from apo_bench.benchmark.stopping import SIGNALS
 from apo_bench.benchmark.terms import Terms
 from apo_bench.benchmark.worker import Emit, Worker
 from apo_bench.errors import InputError
+from apo_bench.processes import end_descendants
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 STARTING_S = 300.0
@@ -113,7 +114,8 @@ class Member:
 
 
 def _kill(process: Any) -> None:
-    """End a process, and its session if it has one of its own by now."""
+    """End a process with all that it started, and its session if it has one of its own by now."""
+    end_descendants(process.pid)
     with suppress(OSError, AttributeError):
         if os.getpgid(process.pid) == process.pid:
             os.killpg(process.pid, signal.SIGKILL)
@@ -139,9 +141,10 @@ def _last_word(number: int, terms: Terms, pipe: Any) -> tuple[str, ...]:
 
     def say(*news: Any) -> None:
         if os.getpid() != own:
-            os._exit(1)  # a corrector forked and came back from both: only one of them has a say
+            os._exit(1)  # a noise model forked and came back from both: only one of them has a say
         pipe.send(news)
 
+    worker = None
     try:
         worker = Worker(number, terms)
         while (unit := pipe.recv()) is not None:
@@ -157,7 +160,10 @@ def _last_word(number: int, terms: Terms, pipe: Any) -> tuple[str, ...]:
     except Exception:
         return ("failed", traceback.format_exc())
     except KeyboardInterrupt:
-        os._exit(1)  # signals are ignored here: it is a corrector's own, and ends its process as `sys.exit` does
+        os._exit(1)  # signals are ignored here: it is a noise model's own, and ends its process as `sys.exit` does
+    finally:
+        if worker is not None:
+            worker.close()
     return ("done",)
 
 

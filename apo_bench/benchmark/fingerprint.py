@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 from dataclasses import asdict, fields, is_dataclass
 from functools import cache
-from importlib.util import find_spec
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -89,12 +90,25 @@ def own_content(kind: str, *names: str) -> dict[str, str]:
 @cache
 def _module_hash(module: str) -> str | None:
     """Over the source file of a module as it was when it was first asked for; None if it has none."""
-    try:
-        found = find_spec(module)
-    except (ImportError, ValueError):
-        return None
+    found = _located(module)
     path = Path(found.origin) if found is not None and found.has_location and found.origin else None
     return _hash(path.read_bytes()) if path is not None and path.is_file() else None
+
+
+def _located(module: str) -> ModuleSpec | None:
+    """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
+    found, path = None, None
+    for end in range(1, module.count(".") + 2):
+        name = ".".join(module.split(".")[:end])
+        try:
+            specs = (finder.find_spec(name, path) for finder in sys.meta_path)
+            found = next((spec for spec in specs if spec is not None), None)
+            path = None if found is None else found.submodule_search_locations
+        except (ImportError, ValueError, KeyError, AttributeError):
+            return None
+        if found is None or (path is None and name != module):
+            return None
+    return found
 
 
 def _hash(text: bytes) -> str:

@@ -15,11 +15,13 @@ from apo_bench.benchmark.spec import METHOD, RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import eye_of, run_measured
 from apo_bench.benchmark.worker import row_of
+from apo_bench.correction.own import LIMIT_S, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
 from apo_bench.observed import observed, read_stated
 from apo_bench.program import Observation
 from apo_bench.reading import read_text
+from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
 from apo_bench.scenario_starts import in_the_air
 from apo_bench.simulation.scene import Scene, build_scene
@@ -51,6 +53,8 @@ class Request:
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
+    corrector_limit_s: float = LIMIT_S
+    """Wall time that a corrector named as `module:name` may take."""
     limit_s: float | None = None
     """Wall time; what has one runs in a process of its own, as in a sweep."""
 
@@ -65,7 +69,12 @@ def run_one(request: Request) -> Row:
     spec = _spec(request, scenario.clearance_mm)
     if request.limit_s is not None:
         _refuse_what_is_written(request)
-        return run_alone(spec, request.limit_s)
+        return run_alone(spec, request.limit_s, request.corrector_limit_s)
+    with OwnCorrectors(request.corrector_limit_s) as own:
+        return _run_here(request, spec, scenario, own.find(spec.method))
+
+
+def _run_here(request: Request, spec: TrialSpec, scenario: Scenario, method: Any) -> Row:
     scene = build_scene(
         scenario,
         clearance_mm=spec.clearance_mm,
@@ -75,9 +84,9 @@ def run_one(request: Request) -> Row:
     )
     film = _film(scene) if request.video else None
     if request.observation:
-        row = _measured(request.observation, spec, scene, film)
+        row = _measured(request.observation, spec, scene, method, film)
     else:
-        row = _drawn(request, spec, scene, film)
+        row = _drawn(request, spec, scene, method, film)
     if film is not None and row["sim_seconds"] is not None:
         film.save(request.video)
     return row
@@ -131,21 +140,21 @@ def look(spec: TrialSpec, scene: Scene, shown: Shown) -> Observation:
     return see(scene, shown, eye_of(spec, scene, shown), spec.seed)
 
 
-def _drawn(request: Request, spec: TrialSpec, scene: Scene, film: Any) -> Row:
+def _drawn(request: Request, spec: TrialSpec, scene: Scene, method: Any, film: Any) -> Row:
     shown = show(scene, spec.careless, spec.seed, spec.eye)
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, shown), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    return row_of(spec, scene, shown, content, watch=film)
+    return row_of(spec, scene, shown, content, method=method, watch=film)
 
 
-def _measured(path: Path, spec: TrialSpec, scene: Scene, film: Any) -> Row:
+def _measured(path: Path, spec: TrialSpec, scene: Scene, method: Any, film: Any) -> Row:
     seen = read_stated(path, scene.scenario)
     aloft = in_the_air(seen.assembly, seen.start, MEASURED_AIR_M)
     if aloft is not None:
         raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-    return run_measured(spec, scene, seen, read_text(path, "observation file"), watch=film)
+    return run_measured(spec, scene, seen, read_text(path, "observation file"), method=method, watch=film)
 
 
 def _spec(request: Request, clearance_mm: float) -> TrialSpec:

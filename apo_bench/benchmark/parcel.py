@@ -16,9 +16,8 @@ from apo_bench.benchmark.fingerprint import noise_content, own_content
 from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import RANGE
-from apo_bench.correction.correct import CORRECTORS
+from apo_bench.correction.own import check_correctors
 from apo_bench.errors import InputError
-from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_path
 from apo_bench.observation.relations import make_relations
@@ -71,15 +70,17 @@ def _content(asked: Wanted) -> dict[str, str]:
     }
 
 
-def check_here(asked: Wanted) -> None:
-    """Raise an `InputError` unless everything that is named can be had on this machine, from the same files."""
+def check_here(asked: Wanted) -> set[str]:
+    """Raise an `InputError` unless everything that is named can be had on this machine, from the same files.
+
+    Returns:
+        The files of the modules that correctors of one's own bring in.
+    """
     for scenario in asked.scenarios:
         load_scenario(scenario)
     for arm in asked.arms:
         find_arm(arm)
-    for method in asked.methods:
-        if method not in ("oracle", "none"):
-            resolve(method, CORRECTORS, "corrector")
+    brought = check_correctors(asked.methods)
     for relations in asked.relations:
         if relations not in RECOGNISED:
             make_relations(relations)
@@ -89,6 +90,7 @@ def check_here(asked: Wanted) -> None:
     for name, content in asked.content.items():
         if here.get(name) != content:
             raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
+    return brought
 
 
 def parcel(asked: Wanted) -> dict[str, Path]:
@@ -96,13 +98,14 @@ def parcel(asked: Wanted) -> dict[str, Path]:
 
     Scenario files and their parts, noise files, arms, and every Python module that importing what is named brought in.
     """
-    check_here(asked)
+    brought = check_here(asked)
     files = [Path(name) for name in asked.scenarios if name not in scenario_names()]
     files += [part for name in asked.scenarios for part in load_scenario(name).part_files.values()]
     files += [path for name in asked.noises if (path := noise_path(name)) is not None]
     for name in asked.arms:
         files += _with_named(find_arm(name).mjcf)
     files += [Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))]
+    files += [path for name in brought if (path := Path(name)).is_file()]
     here = Path.cwd()
     own = [Path(path) for path in _installed()]
     found = {}

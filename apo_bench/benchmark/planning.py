@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from apo_bench.benchmark.stages import Ending, unseen
-from apo_bench.correction.correct import correct
 from apo_bench.correction.equations import gap
+from apo_bench.correction.own import correct_named
 from apo_bench.geometry.arrays import Array
 from apo_bench.program import Correction, Observation, Plan, Try
 
@@ -33,7 +33,8 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
     """What a method would have the robot do.
 
     Args:
-        method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one.
+        method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one; what is
+            named as `module:name` runs in a process of its own.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
         told: What a corrector gets in place of `seen`, where the relations it is told are wrong. The plan has the
             right ones all the same: what is executed are goals.
@@ -42,7 +43,7 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
         return _as_it_is(seen, truth, None)
     if isinstance(method, str) and method == "none":
         return _as_it_is(seen, seen.goals, unseen(seen))
-    made = correct(seen if told is None else told, method)
+    made = correct_named(seen if told is None else told, method)
     return Planned(
         plan=planned(seen, made) if made.ok else None,
         refused=None if made.ok else refusal(made),

@@ -19,9 +19,8 @@ from apo_bench.benchmark.spec import level_pair
 from apo_bench.benchmark.stopping import Check, listening
 from apo_bench.benchmark.terms import Terms, versions
 from apo_bench.benchmark.worker import Emit, Timing, Worker, in_time
-from apo_bench.correction.correct import CORRECTORS
+from apo_bench.correction.own import LIMIT_S, check_correctors
 from apo_bench.errors import InputError, unknown
-from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
 from apo_bench.scenario import Scenario
@@ -39,6 +38,7 @@ def sweep(
     *,
     workers: int | None = None,
     limit_s: float = 600.0,
+    corrector_limit_s: float = LIMIT_S,
     backend: str = "local",
     address: str | None = None,
     command: str = "",
@@ -51,9 +51,10 @@ def sweep(
         grids: One, or several whose trials are united.
         out: The folder of the rows; made if it is not there, continued if it holds rows of the same sweep.
         workers: Processes; they are spawned, so a script that calls this needs the usual
-            `if __name__ == "__main__":`. None stands for this process with `local`: then nothing survives a corrector
-            that ends the process, and no trial has a limit. With `ray`, None stands for all that the cluster has.
+            `if __name__ == "__main__":`. None stands for this process with `local`: then no trial has a limit, but
+            its corrector has. With `ray`, None stands for all that the cluster has.
         limit_s: Wall time that a trial may take in a worker; what takes longer is a failed row.
+        corrector_limit_s: Of that, what a corrector named as `module:name` may take.
         backend: `local`, or `ray` for a cluster.
         address: Of a cluster that runs already.
         command: What to note in `run.json` as the command line.
@@ -69,8 +70,9 @@ def sweep(
     grids = (grids,) if isinstance(grids, SweepSpec) else tuple(grids)
     _check_spread(workers, limit_s, backend, address)
     here = workers is None and backend == "local"
-    loaded, arm = _checked(grids)
-    terms = Terms({given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}, versions())
+    loaded, arm = _checked(grids, corrector_limit_s)
+    content = {given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}
+    terms = Terms(content, versions(), corrector_limit_s)
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     run = run_record(described(grids, loaded), _content(grids, loaded, arm), code_files(), terms, files, command)
     with listening() as check, Journal(Path(out), run) as journal:
@@ -96,8 +98,11 @@ def sweep(
 def _here(work: Sequence[Unit], terms: Terms, emit: Emit, check: Check) -> None:
     """Run the work in this process."""
     worker = Worker(0, terms)
-    for unit in work:
-        worker.run(unit, emit, began=lambda spec: check())
+    try:
+        for unit in work:
+            worker.run(unit, emit, began=lambda spec: check())
+    finally:
+        worker.close()
     check()
 
 
@@ -144,7 +149,7 @@ def _check_spread(workers: int | None, limit_s: float, backend: str, address: st
         check_ray(address)
 
 
-def _checked(grids: Sequence[SweepSpec]) -> tuple[Mapping[str, Scenario], Arm]:
+def _checked(grids: Sequence[SweepSpec], corrector_limit_s: float) -> tuple[Mapping[str, Scenario], Arm]:
     """Everything that has a name, found before a folder is made or a process started."""
     check_grids(grids)
     loaded = load_all(grids)
@@ -155,9 +160,7 @@ def _checked(grids: Sequence[SweepSpec]) -> tuple[Mapping[str, Scenario], Arm]:
     for relations in {relations: None for grid in grids for relations in grid.relations}:
         if relations not in RECOGNISED:
             make_relations(relations)
-    for method in _methods(grids):
-        if method not in ("oracle", "none"):
-            resolve(method, CORRECTORS, "corrector")
+    check_correctors(_methods(grids), corrector_limit_s)
     physics(grids[0].timestep_s)
     return loaded, find_arm(grids[0].arm)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from typing import final
 
+from apo_bench.correction.own import LIMIT_S
 from apo_bench.errors import InputError
 
 PACKAGES = (
@@ -26,6 +27,8 @@ class Terms:
     """What was given for a scenario -> its `content_hash`."""
     versions: Mapping[str, str]
     """Package -> version, of `PACKAGES`."""
+    corrector_limit_s: float = LIMIT_S
+    """Wall time that a corrector in a process of its own may take."""
 
     def check_content(self, given: str, found: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""

@@ -44,6 +44,7 @@ def run_trial(
     *,
     shown: Shown | None = None,
     content: str | None = None,
+    method: Any = None,
     watch: Any = None,
     branches: Branches | None = None,
 ) -> Row:
@@ -53,6 +54,7 @@ def run_trial(
         scene: Compiled for the scenario, clearance, grasp, arm and time step of `spec`.
         shown: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
+        method: What `OwnCorrectors.find` makes of the method of `spec`, if it is at hand.
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
         branches: What replays of this scene and seed have in common; changes nothing but the time it takes.
 
@@ -67,7 +69,7 @@ def run_trial(
     seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed)
     told = _told(spec, seen, shown.layout.goals)
     truth = shown.layout.goals
-    planned = plan(spec.method, seen, truth, told)
+    planned = plan(method or spec.method, seen, truth, told)
     said = confidence(planned, seen, told, truth)
     return (
         first
@@ -84,7 +86,9 @@ def eye_of(spec: TrialSpec, scene: Scene, shown: Shown) -> Noise:
     return make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
 
 
-def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, watch: Any = None) -> Row:
+def run_measured(
+    spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, method: Any = None, watch: Any = None
+) -> Row:
     """Replay an observation that came from a file: its truth is not known.
 
     The judge compares overlaps with those of the scenario's nominal goals, put where the first part was seen; level,
@@ -92,6 +96,7 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
 
     Args:
         text: The content of the file, for the hash.
+        method: As in `run_trial`.
 
     Raises:
         InputError: The method is `oracle`, which would need the truth.
@@ -109,7 +114,7 @@ def run_measured(spec: TrialSpec, scene: Scene, seen: Observation, text: str, *,
         "demonstration": "ok",
     }
     told = _told(spec, seen, None)
-    planned = plan(spec.method, seen, None, told)
+    planned = plan(method or spec.method, seen, None, told)
     said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
     return (
         first

@@ -6,6 +6,7 @@ import platform
 import re
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, final
 
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
@@ -16,7 +17,10 @@ from apo_bench.benchmark.stages import Ending, Shown, show
 from apo_bench.benchmark.terms import Terms
 from apo_bench.benchmark.trial import run_trial
 from apo_bench.correction.correct import Misbehaved
+from apo_bench.correction.own import Lost, OwnCorrectors
+from apo_bench.errors import InputError
 from apo_bench.outcomes import sentence
+from apo_bench.program import Observation
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.branches import Branches
 from apo_bench.simulation.scene import Scene, build_scene
@@ -31,7 +35,7 @@ LONGEST_SENTENCE = 1000
 
 @final
 class Worker:
-    """Runs units of work; compiles each scene once."""
+    """Runs units of work; compiles each scene once, and imports each corrector of one's own once."""
 
     def __init__(self, number: int, terms: Terms) -> None:
         """Args:
@@ -44,6 +48,7 @@ class Worker:
         self.number = number
         self._terms = terms
         self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
+        self._own = OwnCorrectors(terms.corrector_limit_s)
 
     def run(
         self,
@@ -58,7 +63,8 @@ class Worker:
 
         Args:
             stopped: Asked between trials; what is not begun then is left.
-            began: Told of each trial when its scene is compiled: from here on its time counts.
+            began: Told of each trial when its scene is compiled and its corrector imported: from here on its time
+                counts.
 
         Raises:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
@@ -70,15 +76,27 @@ class Worker:
                 return
             start = time.perf_counter()
             scene, content = self._scene(spec)
+            method = self._method(spec.method)
             ready = time.perf_counter()
             began(spec)
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
                 demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
             shown = time.perf_counter()
-            row = row_of(spec, scene, demonstrations[key], content, branches=branches)
+            row = row_of(spec, scene, demonstrations[key], content, method=method, branches=branches)
             spent = (ready - start, shown - ready, time.perf_counter() - shown)
             emit(row, timing(row, self.number, *spent))
+
+    def close(self) -> None:
+        """End the processes of correctors."""
+        self._own.close()
+
+    def _method(self, name: str) -> Any:
+        """The corrector; if it could be imported when the sweep began and cannot now, that is its own failure."""
+        try:
+            return self._own.find(name)
+        except InputError as error:
+            return partial(_raise, Misbehaved(str(error)))
 
     def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:
         key = (spec.scenario, spec.clearance_mm, spec.grasp)
@@ -97,7 +115,7 @@ class Worker:
 
 
 def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
-    """The row of a trial, also of one whose corrector raised an error or returned what it must not.
+    """The row of a trial, also of one whose corrector misbehaved.
 
     Args:
         more: As `run_trial` takes it.
@@ -107,17 +125,20 @@ def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: An
     """
     try:
         return run_trial(spec, scene, shown=shown, content=content, **more)
+    except Lost as error:
+        return lost(spec, content, error.code)
     except Misbehaved as error:
         return misbehaved(spec, content, shown.demonstration.code, str(error))
 
 
 def lost(spec: TrialSpec, content: str, code: str) -> Row:
-    """The failed row of a trial whose worker died (`worker_died`) or was ended (`time_limit`).
+    """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
 
     Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
 
     Args:
         content: From the terms of the sweep: `terms.content[spec.scenario]`.
+        code: `worker_died` or `time_limit`.
     """
     return _failed(spec, content, None, Ending("worker", code, None, sentence(code)))
 
@@ -153,6 +174,10 @@ def timing(
         "host": platform.node(),
         "worker": worker,
     }
+
+
+def _raise(error: Exception, seen: Observation) -> None:
+    raise error
 
 
 def _failed(spec: TrialSpec, content: str, demonstration: str | None, end: Ending) -> Row:

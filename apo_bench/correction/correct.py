@@ -61,13 +61,8 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
         Misbehaved: The corrector raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observations((seen,))
-    chosen = resolve(corrector, CORRECTORS, "corrector")
+    chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
-    if not callable(chosen) or isinstance(chosen, type):
-        raise InputError(
-            f"the corrector '{name}' is {kind(chosen)}; give a function that takes an Observation "
-            "and returns a Correction, or an object with such a __call__."
-        )
     try:
         return _admitted(chosen(seen), seen, chosen, name)
     except InputError as error:
@@ -76,6 +71,22 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
         raise Misbehaved(str(error)) from error
     except Exception as error:
         raise Misbehaved(str(failed(f"the corrector '{name}'", error))) from error
+
+
+def checked_corrector(given: Any) -> Any:
+    """The corrector that is named, or was given.
+
+    Raises:
+        InputError: There is no such corrector, or it is no function.
+    """
+    chosen = resolve(given, CORRECTORS, "corrector")
+    if not callable(chosen) or isinstance(chosen, type):
+        name = given if isinstance(given, str) else getattr(chosen, "__name__", type(chosen).__name__)
+        raise InputError(
+            f"the corrector '{name}' is {kind(chosen)}; give a function that takes an Observation "
+            "and returns a Correction, or an object with such a __call__."
+        )
+    return chosen
 
 
 def _admitted(found: Any, seen: Observation, chosen: Any, name: str) -> Correction:

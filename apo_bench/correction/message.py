@@ -1,0 +1,111 @@
+"""What goes between a corrector's process and ours: JSON and numbers, nothing that could be code.
+
+    length of the JSON and of the numbers (4 bytes each, big-endian) | JSON, UTF-8 | numbers, array after array
+
+The JSON says type and shape of every array under `arrays`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import struct
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+HEAD = struct.Struct("!II")
+TYPES = ("float64", "bool")
+LARGEST_JSON, LARGEST_NUMBERS = 1 << 24, 1 << 26
+"""Bytes; beyond, nothing is read."""
+CHUNK = 1 << 20
+
+Form = dict[str, Any]
+Arrays = Mapping[str, NDArray]
+Message = tuple[Form, Arrays]
+Wait = Callable[[], None]
+"""Returns when there is something to read; raises if there never will be."""
+
+
+class Garbled(ValueError):
+    """What came is no such message."""
+
+
+def send(to: socket.socket, form: Form, arrays: Arrays, deadline: float = math.inf) -> None:
+    """Send one message.
+
+    Args:
+        deadline: On the monotonic clock, [s].
+
+    Raises:
+        TimeoutError: The other side does not read.
+        OSError: There is no other side.
+    """
+    stated = {name: [str(array.dtype), list(array.shape)] for name, array in arrays.items()}
+    text = json.dumps({**form, "arrays": stated}).encode()
+    numbers = b"".join(array.tobytes() for array in arrays.values())
+    left = memoryview(HEAD.pack(len(text), len(numbers)) + text + numbers)
+    while left:
+        to.settimeout(_remaining(deadline))
+        left = left[to.send(left) :]
+
+
+def receive(of: socket.socket, wait: Wait = lambda: None) -> Message:
+    """Read one message.
+
+    Args:
+        wait: Called before each piece is read.
+
+    Raises:
+        Garbled: It is none.
+        EOFError: It ends in the middle, or does not begin.
+    """
+    of.settimeout(None)
+    size, length = HEAD.unpack(_read(of, HEAD.size, wait))
+    if size > LARGEST_JSON or length > LARGEST_NUMBERS:
+        raise Garbled("the message is too large")
+    text, numbers = _read(of, size, wait), _read(of, length, wait)
+    try:
+        form = json.loads(text)
+        return form, _arrays(form.pop("arrays"), numbers)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise Garbled("the message cannot be read") from error
+
+
+def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
+    found, at = {}, 0
+    for name, (kind, shape) in stated.items():
+        if kind not in TYPES or not all(type(size) is int and size >= 0 for size in shape):
+            raise Garbled("an array of another type")
+        count = math.prod(shape)
+        if count > LARGEST_NUMBERS:
+            raise Garbled("an array that is too large")
+        found[name] = np.frombuffer(numbers, np.dtype(kind), count, at).reshape(shape)
+        at += found[name].nbytes
+    if at != len(numbers):
+        raise Garbled("numbers that belong to no array")
+    return found
+
+
+def _read(of: socket.socket, size: int, wait: Wait) -> bytes:
+    read = bytearray()
+    while len(read) < size:
+        wait()
+        piece = of.recv(min(size - len(read), CHUNK))
+        if not piece:
+            raise EOFError("the other side is gone")
+        read += piece
+    return bytes(read)
+
+
+def _remaining(deadline: float) -> float | None:
+    if deadline == math.inf:
+        return None
+    left = deadline - time.monotonic()
+    if left <= 0.0:
+        raise TimeoutError("the time is up")
+    return left

@@ -1,0 +1,44 @@
+"""Processes below a process, and how they are ended with all that they started."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Collection
+from contextlib import suppress
+from pathlib import Path
+
+ROUNDS = 100
+"""What goes on starting others while it is being ended is looked for so many times."""
+
+
+def descendants(pid: int) -> list[int]:
+    """Children, their children and so on, those that have ended and are not waited for too; empty without /proc."""
+    found, todo = [], [pid]
+    while todo:
+        below = _children(todo.pop())
+        found += below
+        todo += below
+    return found
+
+
+def end_descendants(pid: int, spared: Collection[int] = ()) -> None:
+    """Kill them all, but for the spared; whoever lost its parent and was not taken in by `pid` is not found."""
+    ended = {*spared}
+    for _ in range(ROUNDS):
+        found = [one for one in descendants(pid) if one not in ended]
+        if not found:
+            return
+        for one in found:
+            with suppress(OSError):
+                os.kill(one, signal.SIGKILL)
+        ended.update(found)
+
+
+def _children(pid: int) -> list[int]:
+    """As Linux lists them for every thread of a process."""
+    found: list[int] = []
+    with suppress(OSError):
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            found += map(int, (thread / "children").read_text().split())
+    return found
