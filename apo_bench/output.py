@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
+
+from apo_bench.processes import flush
 
 
 @contextmanager
@@ -31,13 +32,3 @@ def aside(asked: bool) -> Iterator[None]:
         if ours is not None:
             os.dup2(ours, 1)
             os.close(ours)
-
-
-def flush() -> None:
-    """Write what Python and the C library still hold back."""
-    for stream in (sys.stdout, sys.__stdout__):
-        if stream is not None:
-            with suppress(OSError, ValueError):
-                stream.flush()
-    with suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).fflush(None)

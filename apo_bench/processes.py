@@ -1,9 +1,11 @@
-"""Processes below a process, and how they are ended with all that they started."""
+"""Processes below a process, how they are ended with all that they started, and what one has not written yet."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
+import sys
 from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
@@ -33,6 +35,16 @@ def end_descendants(pid: int, spared: Collection[int] = ()) -> None:
             with suppress(OSError):
                 os.kill(one, signal.SIGKILL)
         ended.update(found)
+
+
+def flush() -> None:
+    """Write to standard output what Python and the C library still hold back."""
+    for stream in (sys.stdout, sys.__stdout__):
+        if stream is not None:
+            with suppress(OSError, ValueError):
+                stream.flush()
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).fflush(None)
 
 
 def _children(pid: int) -> list[int]:

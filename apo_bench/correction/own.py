@@ -19,7 +19,7 @@ from typing import Any, final
 from apo_bench.correction.correct import Misbehaved, checked_corrector, correct
 from apo_bench.correction.forms import observation_message, read_correction
 from apo_bench.correction.message import Arrays, Form, Garbled, Message, receive, send
-from apo_bench.correction.server import NOTICE, can_fork
+from apo_bench.correction.server import NOTICE
 from apo_bench.errors import InputError
 from apo_bench.processes import descendants, end_descendants
 from apo_bench.program import Correction, Observation
@@ -28,11 +28,13 @@ LIMIT_S = 120.0
 """What one correction may take."""
 STARTING_S = 120.0
 """What a module may take to be imported."""
+NOTICE_S = 2.0
+"""How long a fork may be gone before that is said."""
 LONGEST_S = 1e6
 LONGEST_SENTENCE = 2000
 START = (
-    "import sys; fd, module, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
-    "from apo_bench.correction.server import main; main(int(fd), module)"
+    "import sys; fd, module, fork, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
+    "from apo_bench.correction.server import main; main(int(fd), module, fork == 'True')"
 )
 
 
@@ -180,6 +182,8 @@ class Server:
         self._process: subprocess.Popen[bytes] | None = None
         self._control: socket.socket | None = None
         self._asked = 0
+        self._code: int | None = None
+        """With which the fork of the last request has ended, if it has said so."""
         self._helpers: Iterable[int] = ()
         """Processes that importing the module has started."""
 
@@ -194,21 +198,25 @@ class Server:
         process, control = self._running()
         here, there = _pair()
         deadline = time.monotonic() + limit_s
-        self._asked += 1
+        self._asked, self._code = self._asked + 1, None
+        whole = False
         try:
             with here:
                 with there:
                     socket.send_fds(control, [b"?"], [there.fileno()])
                 send(here, form, arrays, deadline)
                 said = receive(here, lambda: self._wait(here, deadline))
-        except BaseException:
-            self.end()
-            raise
-        if can_fork():
-            end_descendants(process.pid, (*self._helpers,))
-        else:
-            self.end()
-        return said
+            whole = True
+            return said
+        except (EOFError, ConnectionError) as error:
+            code = self._exit_code()
+            whole = code is not None
+            raise EOFError(code) from error
+        finally:
+            if whole and can_fork():
+                end_descendants(process.pid, (*self._helpers,))
+            else:
+                self.end()
 
     def end(self) -> None:
         """End it with all that it started."""
@@ -240,7 +248,7 @@ class Server:
         where = None if _is_open(2) else subprocess.DEVNULL
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", START, str(theirs.fileno()), self._module, *sys.path],
+                [sys.executable, "-P", "-c", START, str(theirs.fileno()), self._module, str(can_fork()), *sys.path],
                 stdin=subprocess.DEVNULL,
                 stdout=2 if where is None else where,
                 stderr=where,
@@ -258,22 +266,42 @@ class Server:
         self._helpers = descendants(self._process.pid)
 
     def _wait(self, here: socket.socket, deadline: float) -> None:
-        """Until there is something to read, or the fork has ended without."""
-        control = self._control
-        assert control is not None
+        """Until there is something to read, or the fork has ended without a word."""
+        assert self._control is not None
         while (left := deadline - time.monotonic()) > 0.0:
-            ready = connection.wait([here, control], left)
+            ready = connection.wait([here, self._control], left)
             if here in ready:
                 return
-            if not ready:
-                continue
-            notice = control.recv(NOTICE.size)
-            if len(notice) < NOTICE.size:
-                raise EOFError("the process of the module ended")
-            number, code = NOTICE.unpack(notice)
-            if number == self._asked and not connection.wait([here], 0.0):
-                raise EOFError(code)
+            if ready and self._note() and not connection.wait([here], 0.0):
+                raise EOFError("the fork ended without a word")
         raise TimeoutError("the time is up")
+
+    def _note(self) -> bool:
+        """Read a notice that has come; whether the fork of this request has ended."""
+        assert self._control is not None
+        notice = self._control.recv(NOTICE.size)
+        if len(notice) < NOTICE.size:
+            raise EOFError("the process of the module ended")
+        number, code = NOTICE.unpack(notice)
+        if number == self._asked:
+            self._code = code
+        return self._code is not None
+
+    def _exit_code(self) -> int | None:
+        """Of the fork that is gone; None if the process of the module is gone too, or does not say."""
+        deadline, control = time.monotonic() + NOTICE_S, self._control
+        assert control is not None
+        try:
+            while self._code is None and connection.wait([control], max(0.0, deadline - time.monotonic())):
+                self._note()
+        except (EOFError, OSError):
+            return None
+        return self._code
+
+
+def can_fork() -> bool:
+    """Whether a process may fork: where system libraries survive it, and what a fork leaves behind is found again."""
+    return sys.platform == "linux"
 
 
 def _pair() -> tuple[socket.socket, socket.socket]:
@@ -297,8 +325,8 @@ def _is_open(descriptor: int) -> bool:
 
 def _how(error: BaseException) -> str:
     """` with exit code 3`, ` by signal 9`, or nothing."""
-    code = error.args[0] if error.args else None
-    if not isinstance(code, int) or not isinstance(error, EOFError):
+    code = error.args[0] if isinstance(error, EOFError) and error.args else None
+    if not isinstance(code, int):
         return ""
     return f" with exit code {code}" if code >= 0 else f" by signal {-code}"
 

@@ -21,8 +21,7 @@ from apo_bench.correction.correct import checked_corrector, correct
 from apo_bench.correction.forms import correction_message, read_observation
 from apo_bench.correction.message import Arrays, Form, Message, receive, send
 from apo_bench.errors import InputError
-from apo_bench.output import flush
-from apo_bench.processes import end_descendants
+from apo_bench.processes import end_descendants, flush
 
 NOTICE = struct.Struct("!Ii")
 """To the process that asks: how many requests there were, and the exit code of the one that ended; first 0, 0."""
@@ -37,12 +36,13 @@ IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
 """For the process that asks, which ends this one."""
 
 
-def main(control: int, module: str) -> None:
+def main(control: int, module: str, fork: bool) -> None:
     """The life of the process.
 
     Args:
         control: File descriptor of a socket on which requests come.
         module: To be imported first; what that raises is said in answer to requests.
+        fork: Whether every request has a fork; else it does one request.
     """
     for name in IGNORED:
         signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -56,7 +56,7 @@ def main(control: int, module: str) -> None:
     flush()
     _prctl(DEATH_SIGNAL, 0)
     with socket.socket(fileno=control) as asking:
-        _serve(asking)
+        _serve(asking, fork)
     end_descendants(os.getpid())
     os.killpg(0, signal.SIGKILL)
 
@@ -71,12 +71,7 @@ def answer(request: socket.socket) -> None:
         send(request, said, numbers)
 
 
-def can_fork() -> bool:
-    """Whether a fork is safe: system libraries of macOS do not survive one."""
-    return hasattr(os, "fork") and sys.platform != "darwin"
-
-
-def _serve(asking: socket.socket) -> None:
+def _serve(asking: socket.socket, fork: bool) -> None:
     """Do request after request, until nobody asks."""
     number, child = 0, 0
     with suppress(OSError):
@@ -93,22 +88,15 @@ def _serve(asking: socket.socket) -> None:
             if not word:
                 return
             number += 1
-            child = _hand_over(given[0], asking)
+            child = os.fork() if fork else 0
+            if child == 0:
+                if fork:
+                    asking.close()
+                _do(given[0])
+            os.close(given[0])
 
 
-def _hand_over(given: int, asking: socket.socket) -> int:
-    """A new process for a request; without fork it is done here, and this process has no other."""
-    if not can_fork():
-        _alone(given)
-    pid = os.fork()
-    if pid == 0:
-        asking.close()
-        _alone(given)
-    os.close(given)
-    return pid
-
-
-def _alone(given: int) -> None:
+def _do(given: int) -> None:
     """Do a request and end."""
     with suppress(BaseException), socket.socket(fileno=given) as request:
         answer(request)
