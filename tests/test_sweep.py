@@ -50,8 +50,9 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 
-    def run_trial(spec: Any, scene: Any, *, shown: str, content: str, branches: Any) -> dict[str, Any]:
+    def run_trial(spec: Any, scene: Any, *, shown: str, content: str, method: Any, branches: Any) -> dict[str, Any]:
         did["trial"] += 1
+        assert method == spec.method
         assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
         hashed = spec_hash(spec, content)
