@@ -21,6 +21,8 @@ from apo_bench.scenario_contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario_keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
 from apo_bench.strict_json import Node
 
+MOST_PARTS, MOST_OPERATIONS, MOST_CONTACTS, MOST_SHIFTS = 50, 100, 50, 20
+"""In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
 RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
 LEVEL = 1e-6
@@ -57,6 +59,8 @@ def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
     """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
     if not isinstance(node.value, dict) or not node.value:
         node.fail("at least one table [parts.NAME] is needed")
+    if len(node.value) > MOST_PARTS:
+        refuse(node, f"at most {MOST_PARTS} parts are allowed, {len(node.value)} were given")
     solids: dict[Path, Solid] = {}
     return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
 
@@ -101,6 +105,8 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
     nodes = node.items("operation")
     if not nodes:
         refuse(node, "the list is empty; give at least one [[operations]]")
+    if len(nodes) > MOST_OPERATIONS:
+        refuse(node, f"at most {MOST_OPERATIONS} operations are allowed, {len(nodes)} were given")
     poses = {name: part.start for name, part in parts.items()}
     there = {name for name, part in parts.items() if part.fixed}
     entries = []
@@ -111,6 +117,8 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
+    if sum(len(entry.shifts) for entry in entries) > MOST_SHIFTS:
+        refuse(node, f"at most {MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends")
     return tuple(entries)
 
 
@@ -127,7 +135,10 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
             refuse(keys["carries"], f"'{name}' is carried before any operation has moved it; move it first")
     goal = read_pose(keys["goal"])
     solids = {name: part.solid for name, part in parts.items()}
-    asked = read_contacts(_items(keys["contacts"], "contact"), main, carries, solids, there)
+    contacts = _items(keys["contacts"], "contact")
+    if len(contacts) > MOST_CONTACTS:
+        refuse(keys["contacts"], f"at most {MOST_CONTACTS} contacts are allowed, {len(contacts)} were given")
+    asked = read_contacts(contacts, main, carries, solids, there)
     if not asked:
         refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
     return Entry(

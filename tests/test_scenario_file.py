@@ -61,6 +61,12 @@ BROKEN = {
     "goal_flag": (GOAL3, "goal = { at_mm = [0, 0, true] }", ["operation 3, goal, at_mm", "3 finite numbers"]),
     "turn_far": ("[180, 0, 0] }\ncontacts", "[1e5, 0, 0] }\ncontacts", ["operation 2, goal, turn_deg", "360"]),
     "unknown_part_file": ('file = "stick"', 'file = "stik"', ["parts, stick, file", "did you mean 'stick'"]),
+    "many_parts": (
+        "[site]\n",
+        "".join(f'[parts.p{k}]\nfile = "block"\nfixed = true\n' for k in range(50)) + "[site]\n",
+        ["at most 50 parts"],
+    ),
+    "many_operations": ("[site]\n", '[[operations]]\nmove = "stick"\n' * 100 + "[site]\n", ["at most 100 operations"]),
     "missing_part_file": ('file = "stick"', 'file = "own/stick.xml"', ["parts, stick, file", "No such file"]),
     "bad_part_name": ("[parts.stick]", '[parts."the.stick"]', ["'the.stick'"]),
     "unknown_moved_part": ('move = "stick"', 'move = "stik"', ["operation 3, move", "did you mean 'stick'"]),

@@ -31,6 +31,7 @@ NUMBERS = {"levels": LARGEST_LEVEL, "careless": LARGEST_CARELESS, "clearances_mm
 COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": (0, LARGEST_SEED)}
 SHARED = ("arm", "timestep_ms", "fidelity")
 """One for the whole sweep: they stand at the top of the file only."""
+MOST_ENTRIES = 1000
 KEYS = (*TEXTS, *NUMBERS, *COUNTS)
 
 
@@ -68,7 +69,7 @@ def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
 def _tables(node: Node) -> Sequence[Node]:
     if not isinstance(node.value, list) or not all(isinstance(entry, dict) for entry in node.value):
         raise InputError(f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.")
-    return node.items("also")
+    return _few(node.items("also"), node)
 
 
 def _grid(name: str, said: Mapping[str, Any]) -> SweepSpec:
@@ -96,7 +97,15 @@ def _entries(node: Node, key: str, of: str) -> Sequence[Node]:
         node.fail(f"a list of {of} is needed", f"write {key} = [...]")
     if not node.value:
         node.fail(f"a list of {of} is needed", "an empty grid has no trials, so name at least one or leave the key out")
-    return [Node(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)]
+    return _few([Node(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)], node)
+
+
+def _few(entries: Sequence[Node], node: Node) -> Sequence[Node]:
+    if len(entries) > MOST_ENTRIES:
+        raise InputError(
+            f"{node.file}, {node.key}: at most {MOST_ENTRIES} entries are allowed, {len(entries)} were given."
+        )
+    return entries
 
 
 def _level(node: Node) -> float | tuple[float, float]:

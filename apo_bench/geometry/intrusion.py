@@ -9,6 +9,9 @@ import numpy as np
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.solid import Box, Solid
 
+TOUCHING_M = 1e-6
+"""Balls around solids are apart if this far from each other, whatever was rounded."""
+
 
 def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """The depth of the deepest pair of boxes of two posed solids, [m]; 0 if they are apart or only touch.
@@ -16,6 +19,10 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     Separating axes: two boxes are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
+    (middle_a, reach_a), (middle_b, reach_b) = _ball(a.boxes), _ball(b.boxes)
+    between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
+    if between @ between > (reach_a + reach_b + TOUCHING_M) ** 2:
+        return 0.0
     return max(0.0, float(depths(a.boxes, T_a[:3, :3], T_a[None, :3, 3], b.boxes, T_b)[0]))
 
 
@@ -41,6 +48,14 @@ def depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: A
 def _boxes(boxes: tuple[Box, ...]) -> tuple[Array, Array]:
     """Centres and half sizes, (k, 3) each, in the frame of their solid."""
     return frozen([box.center for box in boxes], None, 3), frozen([box.half for box in boxes], None, 3)
+
+
+@lru_cache(maxsize=1024)
+def _ball(boxes: tuple[Box, ...]) -> tuple[Array, float]:
+    """Middle, (3,), and radius of a ball around boxes, in the frame of their solid."""
+    centers, halves = _boxes(boxes)
+    low, high = (centers - halves).min(axis=0), (centers + halves).max(axis=0)
+    return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
 
 
 def _axes(R_a: Array, R_b: Array) -> Array:

@@ -13,7 +13,7 @@ from apo_bench.observation.bop import LARGEST_ID, LARGEST_MM, Located, checked, 
 from apo_bench.reading import read_text
 from apo_bench.strict_json import Node, parse_json
 
-LARGEST_BYTES = 32_000_000
+LARGEST_BYTES = 8_000_000
 
 
 def read_truth(path: str | Path, estimates: Located, scene: int | None = None) -> Located:
