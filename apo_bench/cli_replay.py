@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.arguments import check_writable
+from apo_bench.arguments import check_writable, path_given
 from apo_bench.cli_sweep import CORRECTOR_LIMIT_S, EYE, FIDELITY, NOISE, RELATIONS, CorrectorLimit, interrupted
 from apo_bench.output import aside
 
@@ -32,6 +32,10 @@ def replay(
     level_deg: Annotated[float | None, typer.Option(help="Only the degrees; default: the level.")] = None,
     careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
     seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
+    salt_file: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="The salt of the sweep that the trial is of."),
+    ] = None,
     method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "contact",
     clearance: Clearance = None,
     grasp: GraspOption = "friction",
@@ -70,6 +74,7 @@ def replay(
         relations=relations,
         eye=eye,
         seed=seed,
+        salt_file=salt_file,
         method=method,
         clearance_mm=clearance,
         grasp=grasp,

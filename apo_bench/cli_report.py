@@ -26,6 +26,10 @@ def register(app: typer.Typer) -> None:
 def report(
     folder: Folder,
     pictures: Annotated[int, typer.Option(help="Failures that are drawn at most; each is run again for it.")] = 6,
+    salt_file: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="Of a salted sweep, to run its failures again."),
+    ] = None,
 ) -> None:
     """Write report.html, which opens anywhere, with tables (CSV, Parquet) and figures (SVG, PNG) beside it."""
     from apo_bench.benchmark.report import report as write_report
@@ -33,7 +37,7 @@ def report(
 
     if not 0 <= pictures <= MOST_PICTURES:
         raise InputError(f"--pictures {pictures} was given; a whole number from 0 to {MOST_PICTURES} is allowed.")
-    made = write_report(folder, pictures)
+    made = write_report(folder, pictures, salt_file)
     print_cells(made.cells)
     print_report(made)
 

@@ -83,6 +83,14 @@ def sweep(
     ] = None,
     trials: Annotated[int | None, typer.Option(help="Per cell, the same seeds in every cell; default: 100.")] = None,
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
+    salt_file: Annotated[
+        Path | None,
+        typer.Option(
+            parser=path_given,
+            metavar="<path>",
+            help="Draw trials that nobody can draw without this file; made if it is not there.",
+        ),
+    ] = None,
     clearance: Annotated[str | None, typer.Option(help="mm per side; default: each scenario's.")] = None,
     grasp: Annotated[
         str | None, typer.Option(help="friction, or weld for an ideal gripper, or both; default: friction.")
@@ -131,6 +139,7 @@ def sweep(
             backend=backend,
             address=address,
             command=command,
+            salt_file=salt_file,
         )
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error

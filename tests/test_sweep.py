@@ -46,7 +46,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["scene"] += 1
         return SimpleNamespace(scenario=scenario, arm=find_arm("six_axis"))
 
-    def show(scene: Any, careless: float, seed: int, eye: str) -> str:
+    def show(scene: Any, careless: float, seed: int, eye: str, salt: Any) -> str:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 

@@ -11,6 +11,7 @@ from apo_bench.benchmark.grid import Key, row_key
 from apo_bench.benchmark.page.ran import read_run
 from apo_bench.benchmark.page.settings import at
 from apo_bench.benchmark.paired import tango
+from apo_bench.benchmark.salt import one_salt, with_salt
 from apo_bench.benchmark.slim import NUMBERS, Row, slim_rows
 from apo_bench.benchmark.statistics import Cell, Interval, Place, Rate, order, place_of, tally
 from apo_bench.errors import InputError
@@ -133,12 +134,19 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     grasp and method; fidelity, arm and time step are not, so that they can be compared.
 
     Raises:
-        InputError: A folder is no sweep, holds a trial twice, or both have no trial in common.
+        InputError: A folder is no sweep, holds a trial twice, or both have no trial in common: salts that differ make
+            other trials of the same seeds.
     """
     sides = [Side(Path(folder), read_run(Path(folder)), slim_rows(folder)) for folder in (first, second)]
     for side in sides:
         if not side.rows:
             raise InputError(f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
+    salts = [one_salt(side.rows) for side in sides]
+    if salts[0] != salts[1]:
+        raise InputError(
+            f"'{first}' was drawn {with_salt(salts[0])} and '{second}' {with_salt(salts[1])}, so that they have no "
+            "trial in common, whatever their seeds; compare sweeps of one salt."
+        )
     ours, theirs = (_by_key(side) for side in sides)
     both = [key for key in ours if key in theirs]
     if not both:

@@ -1,7 +1,7 @@
 """Pictures of a sample of trials that failed, made by running them again.
 
 A trial is run again only where specification, assets and code are those of its row, by its hash; else the parts are
-drawn where the row says that they ended.
+drawn where the row says that they ended. So are those of a salted trial whose salt was not given.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.benchmark.replay_command import Files
+from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.statistics import NOT_EXECUTED, rank
 from apo_bench.errors import InputError
@@ -76,19 +78,20 @@ def _newest(queue: Sequence[Row], chosen: Sequence[Row]) -> int:
 
 
 def failure_pictures(
-    chosen: Sequence[Row], folder: Path, files: Files | None = None
+    chosen: Sequence[Row], folder: Path, files: Files | None = None, salt: Salt | None = None
 ) -> tuple[list[FailurePicture], list[str]]:
     """The pictures that could be made, and sentences on what could not.
 
     Args:
         folder: Of the sweep, whose rows say where parts ended.
+        salt: The one that the trials were drawn with, if any.
     """
     made: list[FailurePicture] = []
     missed: list[str] = []
     scenes: dict[tuple[Any, ...], Any] = {}
     for row in chosen:
         try:
-            made.append(_made(row, folder, files or {}, scenes))
+            made.append(_made(row, folder, files or {}, scenes, salt))
         except (InputError, RuntimeError, OSError, ValueError) as error:
             missed.append(str(error).splitlines()[0] if str(error) else type(error).__name__)
             if "no picture can be drawn here" in missed[-1]:
@@ -96,11 +99,13 @@ def failure_pictures(
     return made, list(dict.fromkeys(missed))
 
 
-def _made(row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any]) -> FailurePicture:
+def _made(
+    row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any], salt: Salt | None
+) -> FailurePicture:
     from apo_bench.benchmark.fingerprint import content_hash, spec_hash
     from apo_bench.simulation.render import picture
 
-    spec = spec_of(row, files)
+    spec = replace(spec_of(row, files), salt=salt)
     scene = _scene(spec, scenes)
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
@@ -113,11 +118,9 @@ def _made(row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], An
     if not poses:
         raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
     image = picture(scene, poses, WIDTH, HEIGHT, _camera(scene, row, poses))
-    return FailurePicture(
-        row,
-        _jpeg(image),
-        "where the parts ended, as the row says; other code or assets made it, so it was not run again",
-    )
+    secret = row.get("salt") is not None and salt is None
+    why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
+    return FailurePicture(row, _jpeg(image), f"where the parts ended, as the row says; {why}, so it was not run again")
 
 
 def spec_of(row: Row, files: Files) -> TrialSpec:

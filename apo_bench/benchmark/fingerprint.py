@@ -58,7 +58,8 @@ def content_pieces(scenario: Scenario, given: str | Path | Scenario, arm_file: P
 def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
     """16 hexadecimal digits over the content and every setting but method, seed and the scenario's path.
 
-    A noise model that is a file, and noise, relations or an arm of one's own, count by what stands in the file as well.
+    A noise model that is a file, and noise, relations or an arm of one's own, count by what stands in the file as well;
+    a salt counts by its hash.
 
     Rows with the same hash differ in method and seed alone, so they may be counted together or paired.
 
@@ -66,7 +67,9 @@ def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
         content: From `content_hash`.
         observation: The text of the observation's file, when it was not drawn.
     """
-    settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario")}
+    settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario", "salt")}
+    if spec.salt is not None:
+        settings["salt"] = spec.salt.hash
     brought = {**noise_content(spec.noise), **own_content("relations", spec.relations), **own_content("arm", spec.arm)}
     return _hash(json.dumps([content, settings, observation, *brought.values()], sort_keys=True).encode())
 

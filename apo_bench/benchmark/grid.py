@@ -8,6 +8,7 @@ from itertools import product
 from numbers import Real
 from typing import Any, final
 
+from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.spec import (
     RANGE,
     USUAL,
@@ -149,7 +150,7 @@ def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
     return loaded
 
 
-def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> Iterator[Unit]:
+def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario], salt: Salt | None = None) -> Iterator[Unit]:
     """All the work of a sweep, each trial once, seeds first, so that every cell of an interrupted sweep is about
     equally full.
 
@@ -160,7 +161,7 @@ def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> Iterato
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
         for given, scenario in loaded.items():
-            yield from _units(those, given, scenario, seed)
+            yield from _units(those, given, scenario, seed, salt)
 
 
 def described(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
@@ -199,17 +200,17 @@ def _per_seed(grid: SweepSpec) -> int:
     return len(grid.scenarios) * max(1, len(grid.clearances_mm)) * len(grid.grasps) * trials
 
 
-def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int) -> Iterator[Unit]:
+def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int, salt: Salt | None) -> Iterator[Unit]:
     """The trials of a scenario and a seed, by what they share."""
     together: dict[tuple[float, float, str], dict[TrialSpec, None]] = {}
     for grid in grids:
         for clearance in (grid.clearances_mm or (scenario.clearance_mm,)) if given in grid.scenarios else ():
-            for trial in _trials(grid, given, clearance, seed):
+            for trial in _trials(grid, given, clearance, seed, salt):
                 together.setdefault((clearance, trial.careless, trial.eye), {})[trial] = None
     return (Unit(tuple(trials)) for trials in together.values())
 
 
-def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int) -> Iterator[TrialSpec]:
+def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: Salt | None) -> Iterator[TrialSpec]:
     def trial(
         method: str, level: Level, careless: float, way: tuple[str, str], relations: str, grasp: str
     ) -> TrialSpec:
@@ -229,6 +230,7 @@ def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int) -> Iter
             relations=relations,
             eye=way[0],
             fidelity=grid.fidelity,
+            salt=salt,
         )
 
     ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]

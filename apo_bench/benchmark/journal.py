@@ -19,13 +19,14 @@ from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.grid import Key, row_key
 from apo_bench.benchmark.recognised import UNCOUNTED
 from apo_bench.benchmark.run_file import check_same, write_run
+from apo_bench.benchmark.salt import check_one
 from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
 
 OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3", "apo-bench/row/4", "apo-bench/row/5")
 """Rows that say less: nothing about the test of a correction and its posterior, the eye, the fidelity. Reports still
 read them."""
-UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "as_demonstrated_code": None}
+UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "as_demonstrated_code": None, "salt": None}
 """What stands in place of what older rows do not say."""
 CHUNK = 1 << 16
 
@@ -96,6 +97,7 @@ class Journal:
                     f"'{self.folder}' holds rows of schema '{row['schema']}', and this version writes '{ROW}'; "
                     "choose another folder."
                 )
+            check_one(f"'{self.folder}'", run.get("salt"), row.get("salt"))
             self.finished[row_key(row)] = row.get("spec_hash", "")
         if self.finished:
             check_same(self.folder, run)

@@ -11,6 +11,7 @@ from apo_bench.benchmark.alone import run_alone
 from apo_bench.benchmark.fingerprint import content_hash
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
+from apo_bench.benchmark.salt import read_salt
 from apo_bench.benchmark.spec import METHOD, RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
 from apo_bench.benchmark.trial import eye_of, run_measured
@@ -44,6 +45,7 @@ class Request:
     relations: str | None = None
     eye: str | None = None
     seed: int | None = None
+    salt_file: Path | None = None
     method: str = METHOD
     clearance_mm: float | None = None
     grasp: str = "friction"
@@ -129,7 +131,7 @@ def watched(request: Request) -> Observation:
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
     scene = build_scene(scenario, clearance_mm=spec.clearance_mm, grasp=spec.grasp, arm=spec.arm)
-    shown = show(scene, spec.careless, spec.seed, spec.eye)
+    shown = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if shown.demonstration.code != "ok":
         raise RuntimeError(f"{misshown(shown.demonstration).sentence}; try another seed")
     return look(spec, scene, shown)
@@ -137,11 +139,11 @@ def watched(request: Request) -> Observation:
 
 def look(spec: TrialSpec, scene: Scene, shown: Shown) -> Observation:
     """The demonstration of a trial through its eye."""
-    return see(scene, shown, eye_of(spec, scene, shown), spec.seed)
+    return see(scene, shown, eye_of(spec, scene, shown), spec.seed, spec.salt)
 
 
 def _drawn(request: Request, spec: TrialSpec, scene: Scene, method: Any, film: Any) -> Row:
-    shown = show(scene, spec.careless, spec.seed, spec.eye)
+    shown = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, shown), name), request.save_observation)
@@ -184,12 +186,14 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
         relations="given" if request.relations is None else request.relations,
         eye="noise" if request.eye is None else request.eye,
         fidelity=request.fidelity,
+        salt=None if request.salt_file is None else read_salt(request.salt_file),
     )
 
 
 def _refuse_contradictions(request: Request) -> None:
     """Nothing is drawn for an observation that comes from a file, but its contacts may be recognised."""
-    for name in ("level", "level_mm", "level_deg", "careless", "noise", "relations", "eye", "seed", "save_observation"):
+    drawn = ("level", "level_mm", "level_deg", "careless", "noise", "relations", "eye", "seed", "salt_file")
+    for name in (*drawn, "save_observation"):
         allowed = name == "relations" and request.relations in ("given", *RECOGNISED)
         if getattr(request, name) is not None and not allowed:
             option = "--" + name.replace("_", "-")

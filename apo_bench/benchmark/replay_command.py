@@ -14,6 +14,8 @@ USUALLY = {"grasp": "friction", "arm": "six_axis", "timestep_s": 0.001}
 """What a row that does not say means."""
 LIMIT_S = 600.0
 """Usual for a trial in a process of its own; given where that process died or was ended."""
+SALT_FILE = "FILE"
+"""Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
@@ -53,6 +55,7 @@ def _options(row: Mapping[str, Any], given: str) -> list[str]:
     say("--timestep-ms", milli(row["timestep_s"]), 1.0)
     say("--fidelity", row["fidelity"], "full")
     say("--method", row["method"], None)
+    say("--salt-file", SALT_FILE if row.get("salt") else None, None)
     if row.get("failure_stage") == "worker":
         say("--trial-limit", LIMIT_S, None)
     return said

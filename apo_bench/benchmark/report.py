@@ -24,6 +24,7 @@ from apo_bench.benchmark.parquet import parquet_beside, write_columns
 from apo_bench.benchmark.rate_text import failures
 from apo_bench.benchmark.recognised_picture import draw_recognitions
 from apo_bench.benchmark.recognised_table import recognitions, write_recognitions
+from apo_bench.benchmark.salt import Salt, check_one, one_salt, read_salt
 from apo_bench.benchmark.slim import COLUMNS as KEPT
 from apo_bench.benchmark.slim import slim_rows
 from apo_bench.benchmark.statistics import Cell
@@ -73,19 +74,23 @@ class Report(NamedTuple):
     """Why others were not."""
 
 
-def report(folder: str | Path, pictures: int = 0) -> Report:
+def report(folder: str | Path, pictures: int = 0, salt_file: str | Path | None = None) -> Report:
     """Write the page, tables and figures beside the rows of a sweep.
 
     Args:
         pictures: So many failures are drawn at most; most are run again for it, which takes as long as it took.
+        salt_file: Of trials that were drawn with a salt; without it none of them is run again.
 
     Raises:
-        InputError: No rows there, or the folder cannot be written.
+        InputError: No rows there, another salt, or the folder cannot be written.
     """
     folder = Path(folder)
     rows = slim_rows(folder)
     if not rows:
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
+    salt = None if salt_file is None else read_salt(salt_file)
+    if salt is not None:
+        check_one(f"'{folder}'", salt.hash, one_salt(rows))
     found = summary(rows)
     if not found.cells:
         raise InputError(
@@ -95,12 +100,12 @@ def report(folder: str | Path, pictures: int = 0) -> Report:
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
-        return _written(folder, rows, found, pictures)
+        return _written(folder, rows, found, pictures, salt)
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures: int) -> Report:
+def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures: int, salt: Salt | None) -> Report:
     run, timing = read_run(folder), read_timing(folder)
     files, told, wrong = scenario_files(run), recognitions(rows), confusions(rows)
     gap, took = gaps(rows), times(timing)
@@ -115,7 +120,7 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
     made = [path for table in tables.values() for path in (table, parquet_beside(table))]
     made.append(_rows(rows, folder / TABLES / "rows.parquet"))
     svg = write_figures(figures, methods_of(found.cells), folder / FIGURES)
-    taken, missed = failure_pictures(sample(rows, pictures), folder, files) if pictures else ([], [])
+    taken, missed = failure_pictures(sample(rows, pictures), folder, files, salt) if pictures else ([], [])
     page = Found(
         name=folder.resolve().name,
         rows=rows,

@@ -37,6 +37,7 @@ def head(spec: TrialSpec, scenario: Scenario, hashed: str) -> Row:
         "relations": spec.relations,
         "method": spec.method,
         "seed": spec.seed,
+        "salt": None if spec.salt is None else spec.salt.hash,
         "timestep_s": spec.timestep_s,
         "fidelity": spec.fidelity,
         "thresholds": asdict(scenario.thresholds),

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.terms import Terms
 from apo_bench.errors import InputError
 
@@ -22,6 +23,7 @@ def run_record(
     terms: Terms,
     files: Mapping[str, str],
     command: str,
+    salt: Salt | None = None,
 ) -> dict[str, Any]:
     """What `run.json` says.
 
@@ -35,6 +37,7 @@ def run_record(
         "schema": RUN,
         "grids": list(grids),
         "files": dict(files),
+        "salt": None if salt is None else salt.hash,
         "content": dict(content),
         "versions": dict(terms.versions),
         "python": platform.python_version(),

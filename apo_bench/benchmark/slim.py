@@ -32,9 +32,9 @@ NUMBERS: Mapping[str, str] = {
 """Numbers of a row that the page shows, in its order, with what they are called there."""
 SAID = (
     *("schema", "spec_hash", "scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp"),
-    *("arm", "relations", "method", "seed", "timestep_s", "fidelity", "demonstration", "success", "as_demonstrated"),
-    *("loose_success",),
-    *("failure_stage", "failure_code", "failure_operation", "sentence", "freed", "predicted"),
+    *("arm", "relations", "method", "seed", "salt", "timestep_s", "fidelity", "demonstration"),
+    *("success", "as_demonstrated", "loose_success", "failure_stage", "failure_code", "failure_operation"),
+    *("sentence", "freed", "predicted"),
 )
 TESTED = (
     *("chi_square", "chi_square_freedom", "test_passes", "suspects", "dropped", "wrong_relation", "inside_95"),

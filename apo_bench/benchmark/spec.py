@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from numbers import Real
 from typing import Never, final
 
+from apo_bench.benchmark.salt import Salt
 from apo_bench.errors import InputError, unknown
 
 ENV_ID = "APOReplay-v0"
@@ -54,6 +55,8 @@ class TrialSpec:
     zero and `noise` is `range`."""
     fidelity: str = "full"
     """`full`, or `contact`: only the part of each motion in which things may touch is simulated."""
+    salt: Salt | None = field(default=None, repr=False)
+    """Enters every stream of chance; None for a trial that everybody can draw."""
 
     def __post_init__(self) -> None:
         check_eye(self.eye)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
+from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.spec import RANGE
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -63,16 +64,16 @@ class Ending(NamedTuple):
         return self.stage != "done"
 
 
-def stream(seed: int, which: int) -> np.random.Generator:
-    """The random numbers of one stage of one trial; nothing but seed and stage is in the key."""
-    return np.random.default_rng([seed, which])
+def stream(seed: int, which: int, salt: Salt | None = None) -> np.random.Generator:
+    """The random numbers of one stage of one trial; nothing but seed, stage and salt is in the key."""
+    return np.random.default_rng([seed, which, *(salt.words(seed, which) if salt else ())])
 
 
-def show(scene: Scene, careless: float, seed: int, eye: str = "noise") -> Shown:
+def show(scene: Scene, careless: float, seed: int, eye: str = "noise", salt: Salt | None = None) -> Shown:
     """Draw the truth of a trial and let the human demonstrate it; with the eye `range` it is watched meanwhile."""
-    layout = draw_layout(scene.scenario, stream(seed, LAYOUT), scene.clearance_mm)
-    watcher = Watcher(scene.shown, stream(seed, TV)) if eye == RANGE else None
-    demonstration = demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION), watcher)
+    layout = draw_layout(scene.scenario, stream(seed, LAYOUT, salt), scene.clearance_mm)
+    watcher = Watcher(scene.shown, stream(seed, TV, salt)) if eye == RANGE else None
+    demonstration = demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION, salt), watcher)
     return Shown(layout, demonstration, watcher.watched() if watcher else None)
 
 
@@ -85,16 +86,18 @@ def through(scene: Scene, shown: Shown, level_mm: float) -> RangeEye:
     return RangeEye(seen.finder, seen.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
 
 
-def see(scene: Scene, shown: Shown, noise: Noise, seed: int) -> Observation:
+def see(scene: Scene, shown: Shown, noise: Noise, seed: int, salt: Salt | None = None) -> Observation:
     """Watch the demonstration of a trial through a noise model."""
-    rng = stream(seed, OBSERVATION)
+    rng = stream(seed, OBSERVATION, salt)
     gap_m, play_m = scene.scenario.gap_mm * 1e-3, scene.clearance_mm * 1e-3
     return observe(shown.demonstration, noise, rng, gap_m=gap_m, play_m=play_m)
 
 
-def tell(seen: Observation, relations: Relations | None, truth: Array, seed: int) -> Observation:
+def tell(
+    seen: Observation, relations: Relations | None, truth: Array, seed: int, salt: Salt | None = None
+) -> Observation:
     """The observation of a trial as a corrector gets it: with relations that may be wrong."""
-    return told(seen, relations, truth, stream(seed, RELATIONS))
+    return told(seen, relations, truth, stream(seed, RELATIONS, salt))
 
 
 def misshown(shown: Demonstration) -> Ending:

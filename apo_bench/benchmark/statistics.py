@@ -10,6 +10,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.salt import one_salt
 from apo_bench.errors import InputError
 
 CONFIDENCE = 0.95
@@ -147,9 +148,12 @@ def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping
     """Cell -> seed -> row.
 
     Raises:
-        InputError: A trial is there twice; counted twice it would make intervals narrower than they are.
+        InputError: A trial is there twice; counted twice it would make intervals narrower than they are. Or the rows
+            were drawn with several salts: their trials differ, whatever their seeds.
     """
     cells: dict[Place, dict[int, Mapping[str, Any]]] = {}
+    rows = list(rows)
+    one_salt(rows)
     for row in rows:
         place = place_of(row)
         if place is None:

@@ -15,6 +15,7 @@ from apo_bench.benchmark.progress import progress
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
 from apo_bench.benchmark.run_file import run_record
+from apo_bench.benchmark.salt import salt_of_sweep
 from apo_bench.benchmark.spec import level_pair
 from apo_bench.benchmark.stopping import Check, listening
 from apo_bench.benchmark.terms import Terms, versions
@@ -42,6 +43,7 @@ def sweep(
     backend: str = "local",
     address: str | None = None,
     command: str = "",
+    salt_file: str | Path | None = None,
 ) -> list[Row]:
     """Run every trial of a sweep that has no row yet.
 
@@ -58,6 +60,8 @@ def sweep(
         backend: `local`, or `ray` for a cluster.
         address: Of a cluster that runs already.
         command: What to note in `run.json` as the command line.
+        salt_file: Holds the salt of the trials, and is made if it is not there; None for trials that everybody can
+            draw.
 
     Returns:
         All rows of the folder, in the order in which they ended.
@@ -74,9 +78,10 @@ def sweep(
     content = {given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}
     terms = Terms(content, versions(), corrector_limit_s)
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
-    run = run_record(described(grids, loaded), _content(grids, loaded, arm), code_files(), terms, files, command)
+    salt = None if salt_file is None else salt_of_sweep(salt_file, out)
+    run = run_record(described(grids, loaded), _content(grids, loaded, arm), code_files(), terms, files, command, salt)
     with listening() as check, Journal(Path(out), run) as journal:
-        work = _left(units(grids, loaded), loaded, terms, journal, check)
+        work = _left(units(grids, loaded, salt), loaded, terms, journal, check)
         with progress(sum(len(unit.trials) for unit in work)) as tell:
 
             def emit(row: Row, timing: Timing) -> None:

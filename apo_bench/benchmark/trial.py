@@ -61,12 +61,12 @@ def run_trial(
     Raises:
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
-    shown = shown or show(scene, spec.careless, spec.seed, spec.eye)
+    shown = shown or show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     first = head(spec, scene.scenario, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
     if shown.demonstration.code != "ok":
         return first | result(misshown(shown.demonstration), success=None)
-    seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed)
+    seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed, spec.salt)
     told = _told(spec, seen, shown.layout.goals)
     truth = shown.layout.goals
     planned = plan(method or spec.method, seen, truth, told)
@@ -138,7 +138,7 @@ def _told(spec: TrialSpec, seen: Observation, truth: Array | None) -> Observatio
         return seen
     if spec.relations in RECOGNISED:
         return understood(seen, spec.relations)
-    return seen if truth is None else tell(seen, make_relations(spec.relations), truth, spec.seed)
+    return seen if truth is None else tell(seen, make_relations(spec.relations), truth, spec.seed, spec.salt)
 
 
 def _contacts(spec: TrialSpec, seen: Observation, told: Observation) -> Row:

@@ -81,7 +81,7 @@ class Worker:
             began(spec)
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
-                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye)
+                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
             shown = time.perf_counter()
             row = row_of(spec, scene, demonstrations[key], content, method=method, branches=branches)
             spent = (ready - start, shown - ready, time.perf_counter() - shown)

@@ -30,6 +30,7 @@ from apo_bench.benchmark.paired_table import WORDS as PAIRED
 from apo_bench.benchmark.recognised_table import WORDS as RECOGNISED
 from apo_bench.benchmark.recognised_table import Recognition, recognition_table
 from apo_bench.benchmark.replay_command import Files, replay_command
+from apo_bench.benchmark.salt import one_salt
 from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Cell, place_of
 from apo_bench.benchmark.summary import Summary
@@ -266,6 +267,12 @@ def _ran(found: Found) -> Html:
         "Commands on this page are to be run where the sweep was run; they give the same rows with the same versions "
         "(trials that a limit ended: with the `--trial-limit` of the sweep)."
     )
+    if drawn := one_salt(rows):
+        said["salt"] = drawn
+        words += (
+            f" The trials were drawn with the salt of hash {drawn}: `FILE` in a command stands for its file, without "
+            "which nobody can draw them again."
+        )
     return joined([prose(words), ran(found.run, said), tag("h3", "Beside this page"), beside])
 
 
