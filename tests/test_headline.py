@@ -44,7 +44,7 @@ OTHERWISE = (
 @cache
 def rows() -> list[dict[str, Any]]:
     found = [json.loads(line) for line in lzma.decompress((KEPT / "rows.jsonl.xz").read_bytes()).splitlines()]
-    return [row if row["schema"] == ROW else {"as_demonstrated": row["success"]} | row for row in found]
+    return [row if row["schema"] == ROW else {"as_demonstrated": row["success"], "salt": None} | row for row in found]
 
 
 def fidelity() -> str:
