@@ -48,6 +48,9 @@ def forks(seen):
     os.fork()
     raise ValueError("twice")
 
+def ends(seen):
+    os._exit(0)
+
 def nonsense(seen):
     return "goals"
 
@@ -165,8 +168,29 @@ def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.Capture
     assert json.loads(capsys.readouterr().out)["failure_code"] == "time_limit"
     assert main([*trial, "--trial-limit", "-1"]) == 2
     assert "a limit of -1 s per trial was given" in capsys.readouterr().err
-    assert main([*trial, "--trial-limit", "6", "--video", str(tmp_path / "film.mp4")]) == 2
-    assert "--video was given together with --trial-limit" in capsys.readouterr().err
+
+
+def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film, seen = tmp_path / "film.gif", tmp_path / "seen.json"
+    trial = ["replay", "block_on_block", "--careless", "0", "--level", "0.1", "--grasp", "weld", "--method", "none"]
+    written = ["--video", str(film), "--save-observation", str(seen)]
+    assert main([*trial, *written, "--trial-limit", "500", "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    assert row["failure_stage"] in (None, "judge")
+    assert film.read_bytes()[:3] == b"GIF"
+    measured = ["replay", "block_on_block", "--grasp", "weld", "--observation", str(seen), "--json"]
+    assert main([*measured, "--method", "none"]) == 0
+    here = json.loads(capsys.readouterr().out)
+    assert main([*measured, "--method", "none", "--trial-limit", "500"]) == 0
+    assert json.loads(capsys.readouterr().out) == here
+    assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
+    late = json.loads(capsys.readouterr().out)
+    assert (late["failure_code"], late["noise"], late["level"]) == ("time_limit", "measured", None)
+    assert list(late) == list(here)
+    film.unlink()
+    assert main([*trial[:-1], "unruly:ends", *written]) == 0
+    assert "nothing was replayed, so" in capsys.readouterr().err
+    assert not film.exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")

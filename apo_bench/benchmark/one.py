@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, final
 
-from apo_bench.benchmark.alone import run_alone
-from apo_bench.benchmark.fingerprint import content_hash
+from apo_bench.benchmark.alone import Say, run_alone
+from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
 from apo_bench.benchmark.salt import read_salt
 from apo_bench.benchmark.spec import METHOD, RANGE, TrialSpec, check_clearance
 from apo_bench.benchmark.stages import Shown, misshown, see, show
-from apo_bench.benchmark.trial import eye_of, run_measured
-from apo_bench.benchmark.worker import row_of
+from apo_bench.benchmark.trial import MEASURED, eye_of, run_measured
+from apo_bench.benchmark.worker import lost, row_of
 from apo_bench.correction.own import LIMIT_S, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.files import observation_form, write_form
@@ -25,6 +26,7 @@ from apo_bench.reading import read_text
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
 from apo_bench.scenario_starts import in_the_air
+from apo_bench.simulation.arm import find_arm
 from apo_bench.simulation.scene import Scene, build_scene
 
 MEASURED_AIR_M = 5e-3
@@ -70,13 +72,20 @@ def run_one(request: Request) -> Row:
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
     if request.limit_s is not None:
-        _refuse_what_is_written(request)
-        return run_alone(spec, request.limit_s, request.corrector_limit_s)
+        return run_alone(partial(_run, request, spec), request.limit_s, partial(_lost, request, spec, scenario))
+    found: list[Row] = []
+    _run(request, spec, lambda kind, *news: found.extend(news))
+    return found[0]
+
+
+def _run(request: Request, spec: TrialSpec, say: Say) -> None:
+    """Run it and say its row, then write the film."""
     with OwnCorrectors(request.corrector_limit_s) as own:
-        return _run_here(request, spec, scenario, own.find(spec.method))
+        _run_by(own.find(spec.method), request, spec, say)
 
 
-def _run_here(request: Request, spec: TrialSpec, scenario: Scenario, method: Any) -> Row:
+def _run_by(method: Any, request: Request, spec: TrialSpec, say: Say) -> None:
+    scenario = load_scenario(request.scenario)
     scene = build_scene(
         scenario,
         clearance_mm=spec.clearance_mm,
@@ -85,13 +94,24 @@ def _run_here(request: Request, spec: TrialSpec, scenario: Scenario, method: Any
         timestep_s=spec.timestep_s,
     )
     film = _film(scene) if request.video else None
+    say("began")
     if request.observation:
         row = _measured(request.observation, spec, scene, method, film)
     else:
         row = _drawn(request, spec, scene, method, film)
+    say("row", row)
     if film is not None and row["sim_seconds"] is not None:
         film.save(request.video)
-    return row
+
+
+def _lost(request: Request, spec: TrialSpec, scenario: Scenario, code: str) -> Row:
+    """The row of a trial whose process died or took too long."""
+    content = content_hash(scenario, spec.scenario, find_arm(spec.arm).mjcf)
+    row = lost(spec, content, code)
+    if request.observation is None:
+        return row
+    text = read_text(request.observation, "observation file")
+    return row | {"spec_hash": spec_hash(spec, content, text), **MEASURED}
 
 
 def looked_at(
@@ -199,15 +219,6 @@ def _refuse_contradictions(request: Request) -> None:
             option = "--" + name.replace("_", "-")
             raise InputError(
                 f"{option} was given together with --observation, which draws nothing; leave one of them out."
-            )
-
-
-def _refuse_what_is_written(request: Request) -> None:
-    for name in ("observation", "save_observation", "video"):
-        if getattr(request, name) is not None:
-            raise InputError(
-                f"--{name.replace('_', '-')} was given together with --trial-limit, which runs the trial in a process "
-                "of its own; leave one of them out."
             )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,9 @@ from apo_bench.pose_error import pose_errors
 from apo_bench.program import Observation, Plan, Snapshot
 from apo_bench.simulation.branches import Branches
 from apo_bench.simulation.scene import Scene
+
+MEASURED = MappingProxyType({"level": None, "level_deg": None, "careless": None, "noise": "measured"})
+"""What a row says of a trial that was not drawn."""
 
 
 def run_trial(
@@ -106,13 +110,7 @@ def run_measured(
             "the method 'oracle' was given for a measured observation, whose truth is not known; use none or paper."
         )
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    first = head(spec, scene.scenario, spec_hash(spec, content, text)) | {
-        "level": None,
-        "level_deg": None,
-        "careless": None,
-        "noise": "measured",
-        "demonstration": "ok",
-    }
+    first = head(spec, scene.scenario, spec_hash(spec, content, text)) | {**MEASURED, "demonstration": "ok"}
     told = _told(spec, seen, None)
     planned = plan(method or spec.method, seen, None, told)
     said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
