@@ -33,7 +33,7 @@ def path_given(text: str) -> Path:
     import typer
 
     if not text.strip():
-        raise typer.BadParameter("an empty path was given; name a folder.")
+        raise typer.BadParameter("an empty path was given; name a file or a folder.")
     return Path(text)
 
 
