@@ -367,7 +367,7 @@ FIXTURES = [
         False,
     ),
     Seen("fixture, castle 2 pushed by 2 mm when the cube was taken", FIXTURE, [shift("castle2", 4, 0, 2, 0)], False),
-    Seen("pockets, cube 1 on top of the two cubes", POCKETS, [put("cube1", 6, mm(0, 150, 69))], False),
+    Seen("pockets, cube 1 on top of cube 3", POCKETS, [put("cube1", 6, mm(60, 150, 69))], False),
     Seen("pockets, cube 1 put away on its side", POCKETS, [put("cube1", 4, mm(-200, -100, 25, QUARTER_X))], True),
     Seen("kept block: B ends 10 mm off C", kept, [shift("B", 4, 10, 0, 0)], False),
     Seen(
@@ -416,7 +416,7 @@ DIFFERS = {
     "tower, the last operation was not ended, yet everything is in its place": NOT_ENDED,
     "castles, operation 2 was left out and castle 2 stands in its place": NOT_ENDED,
     "fixture, the cube put down on the finished assembly": "where a fixture ends is free",
-    "pockets, cube 1 on top of the two cubes": "where a fixture ends is free",
+    "pockets, cube 1 on top of cube 3": "where a fixture ends is free",
     "stop for two: B pushed by 3 mm when D goes": "D broke the last contact of B, not B itself: B is no fixture",
 }
 """States of which the rule says otherwise than the person, and what in the rule does."""

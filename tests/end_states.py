@@ -76,14 +76,20 @@ def never(*moments: int) -> Edit:
     return edit
 
 
-def verdict(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds = Thresholds()) -> Verdict:  # noqa: B008
-    """The judge's answer when everything is as it should be but for the edits."""
+def reached(scene: scenes.Scene, edits: Sequence[Edit]) -> list[dict]:
+    """After each operation and at the end: everything as it should be but for the edits."""
     there = scenes.turned(scene, LAYOUT)
     history = placed(there.assembly, there.start, there.goals)
     states: list[dict] = [dict(poses) for poses in (*history, history[-1])]
     for edit in edits:
         edit(states)
-    snapshots = [snapshot(state) if state else None for state in states]
+    return states
+
+
+def verdict(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds = Thresholds()) -> Verdict:  # noqa: B008
+    """The judge's answer to that."""
+    there = scenes.turned(scene, LAYOUT)
+    snapshots = [snapshot(state) if state else None for state in reached(scene, edits)]
     return judge(there.assembly, Reached(tuple(snapshots[:-1]), snapshots[-1]), there.goals, thresholds, CLEARANCE_MM)
 
 

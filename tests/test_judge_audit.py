@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from apo_bench.judge_finished import fixtures
 from tests.audited_states import DIFFERS, LOOSE, STATES, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
 from tests.end_states import verdict
+from tests.test_judge import FLIPPED
 
 
 @pytest.mark.parametrize("seen", STATES, ids=lambda seen: seen.what)
@@ -25,6 +28,15 @@ def test_every_difference_is_of_a_state() -> None:
 def test_a_person_says_nearly(seen: Loose) -> None:
     found = verdict(seen.scene(), seen.edits)
     assert (found.success, found.loose_success) == (False, seen.nearly)
+
+
+def test_the_page_says_what_was_audited_and_why_the_rule_says_otherwise() -> None:
+    """It is written by `python docs/verdict.py`."""
+    page = (Path(__file__).parents[1] / "docs" / "verdict.md").read_text(encoding="utf-8")
+    for seen in STATES:
+        assert f"| {seen.what} | {'right' if seen.right else 'wrong'} |" in page
+    for what, reason in (DIFFERS | FLIPPED).items():
+        assert any(line.startswith(f"| {what} |") and line.endswith(f"| {reason} |") for line in page.splitlines())
 
 
 def test_a_part_whose_last_contact_another_part_broke_is_no_fixture() -> None:
