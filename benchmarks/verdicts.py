@@ -4,7 +4,8 @@ Reads the sweep of a headline, finished or not, and the verdicts of the headline
 finished assembly (results/headline/before.jsonl.xz: of each row its key, verdict, stage and code). Writes
 docs/headline-verdicts.md and results/headline/verdicts.csv: per cell the old success, the new one, and what is
 as demonstrated; seed by seed where the last two rules part, and where a success was lost because a corner of a part lay
-more than 1 mm from where it was put. `--pictures N` draws the first N of those.
+more than 1 mm from where it was put. `--pictures N` draws how the first N of those ended, `--draw
+stick_in_tower,paper,4,1,17` the trial of that scenario, method, level, carelessness and seed.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ def main() -> None:
     asked.add_argument("folder", type=Path, help="a sweep of benchmarks/headline.toml, or a part of one")
     asked.add_argument("--trials", type=int, help="how many seeds to take")
     asked.add_argument("--pictures", type=int, default=0, help="how many successes lost at corners to draw")
+    asked.add_argument("--draw", action="append", default=[], help="SCENARIO,METHOD,LEVEL,CARELESS,SEED")
     asked.add_argument("--page", type=Path, default=PAGE)
     asked.add_argument("--table", type=Path, default=TABLE)
     given = asked.parse_args()
@@ -57,7 +59,13 @@ def main() -> None:
     if given.trials is not None:
         rows = [row for row in rows if row["seed"] < rows[0]["seed"] + given.trials]
     before = old_verdicts()
-    drawn = draw(lost(rows)[: given.pictures], given.folder, given.page.parent / "pictures")
+    chosen = [row for row in rows if spelled(row) in given.draw]
+    missing = sorted(set(given.draw) - {spelled(row) for row in chosen})
+    if missing:
+        asked.error(
+            f"there is no trial {' nor '.join(missing)} in {given.folder}; such as {spelled(rows[0])} is needed"
+        )
+    drawn = draw([*lost(rows)[: given.pictures], *chosen], given.folder, given.page.parent / "pictures")
     given.page.write_text("\n".join([*page(rows, before), *drawn]) + "\n", encoding="utf-8")
     with given.table.open("w", newline="", encoding="utf-8") as file:
         told = csv.writer(file)
@@ -73,6 +81,11 @@ def old_verdicts() -> dict[tuple[Any, ...], Row]:
 
 def key(row: Row) -> tuple[Any, ...]:
     return tuple(row[name] for name in KEY)
+
+
+def spelled(row: Row) -> str:
+    """`stick_in_tower,paper,4,1,17`, for names of files too."""
+    return f"{row['scenario']},{row['method']},{row['level']:g},{row['careless']:g},{row['seed']}"
 
 
 def place(row: Row) -> tuple[Any, ...]:
@@ -186,13 +199,12 @@ def listed(found: Iterable[tuple[Row, str]]) -> list[str]:
 def draw(rows: Sequence[Row], folder: Path, pictures: Path) -> list[str]:
     """Pictures of how trials ended, and the command that replays each."""
     made, missed = failure_pictures(rows, folder)
-    lines = [] if rows == [] else ["", *missed]
+    lines = ["", *missed] if missed else []
     for found in made:
-        row = found.row
-        name = f"corner_{row['scenario']}_{row['method']}_{row['level']:g}_{row['careless']:g}_{row['seed']}.jpg"
+        name = f"verdict_{spelled(found.row).replace(',', '_')}.jpg"
         (pictures / name).write_bytes(found.jpeg)
-        lines += ["", f"![A corner {row['pushed_mm']:.2f} mm off](pictures/{name})", ""]
-        lines += [f"`{replay_command(row)}`: {row['sentence']} ({found.words})."]
+        lines += ["", f"![{spelled(found.row)}](pictures/{name})", ""]
+        lines += [f"`{replay_command(found.row)}`: {found.row['sentence']} ({found.words})."]
     return lines
 
 
