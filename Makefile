@@ -1,4 +1,4 @@
-# Two commands do everything, on a machine with Python 3.11 or newer and make:
+# Two commands do everything, on a machine with Python 3.11 or 3.12 and make:
 #   make sweep   set up, run a small benchmark, print the table, write the report
 #   make test    set up, check style and types, run every test
 # and one the table of the project (100 trials per cell take some 100 minutes on two cores):
@@ -17,12 +17,12 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m numeric -n 2 --dist worksteal \
     $$(grep -l pytest.mark.numeric tests/test_*.py)
-MIN := import sys; sys.exit(sys.version_info < (3, 11))
+MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test numeric clean
+.PHONY: sweep headline test numeric lowest clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
@@ -45,11 +45,15 @@ test: $(VENV)/.installed-dev
 numeric: $(VENV)/.installed-dev
 	$(NUMERIC)
 
+# the oldest versions that pyproject.toml allows, in an environment of their own
+lowest: $(BIN)/python
+	$(BIN)/python benchmarks/lowest.py
+
 clean:
 	rm -rf $(VENV) build dist runs .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 $(BIN)/python:
-	@$(PYTHON) -c '$(MIN)' || { echo "Python 3.11 or newer is needed; say which with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	@$(PYTHON) -c '$(MIN)' || { echo "Python 3.11 or 3.12 is needed; say which with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
