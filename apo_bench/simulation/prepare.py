@@ -61,13 +61,17 @@ class _Task(NamedTuple):
     target: Array
 
 
-def moves(plan: Plan, scene: Scene) -> tuple[Move, ...]:
-    """What to do for each step of the schedule; what moves with a part is believed to stay with it."""
+def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
+    """What to do for each step of the schedule; what moves with a part is believed to stay with it.
+
+    Args:
+        searches: Whether the robot feels for a hole where a motion into it is stopped.
+    """
     believed: Poses = dict(plan.start)
     made = []
     for task in _tasks(plan, scene):
         operation = plan.assembly.operations[task.step.operation]
-        made.append(Move(task.step, _transfer(plan, scene, task, believed)))
+        made.append(Move(task.step, _transfer(plan, scene, task, believed, searches)))
         T = task.target @ pose.inverse(believed[operation.main])
         believed = {**believed, **{part: T @ believed[part] for part in operation.moves}}
     return tuple(made)
@@ -116,7 +120,7 @@ def _tasks(plan: Plan, scene: Scene) -> list[_Task]:
     return tasks
 
 
-def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfer:
+def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: bool) -> Transfer:
     k, undo = task.step
     operation = plan.assembly.operations[k]
     part, start, target = operation.main, believed[operation.main], task.target
@@ -126,7 +130,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
     leaves = what.after if undo or task.was == k else what.before
     comes = what.before if undo else what.after
     contacts = tuple(each.contact for each in comes.touched)
-    into = line(comes, target)
+    into, inserts = line(comes, target), any(macro.inserts for macro in comes.macros)
     if undo and not into.level:
         into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
     grips, out, into = _grips(scene, task, part, line(leaves, start), into, believed, after)
@@ -155,7 +159,21 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses) -> Transfe
         insert_n=INSERT_WEIGHTS * min(near, default=held),
         slide_n=SLIDE_WEIGHTS * min(near, default=held),
         clearance=1e-3 * scene.clearance_mm,
+        front=_front(scene, part, operation.moves, after, into.way) if searches and inserts else None,
     )
+
+
+def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: Array) -> Array:
+    """The middle of where what moves ends ahead, in the frame of its main part, (3,), [m]."""
+    T = {p: pose.inverse(poses[part]) @ poses[p] for p in moves}
+
+    def ends(axis: Array) -> tuple[float, float]:
+        found = [np.add(extent(scene.boxes[p], axis @ T[p][:3, :3]), axis @ T[p][:3, 3]) for p in moves]
+        return float(np.min(found)), float(np.max(found))
+
+    middle = np.array([np.mean(ends(axis)) for axis in np.eye(3)])
+    ahead = poses[part][:3, :3].T @ way
+    return np.asarray(middle + (ends(ahead)[1] - middle @ ahead) * ahead)
 
 
 def _is_level(plan: Plan, scene: Scene, k: int) -> bool:

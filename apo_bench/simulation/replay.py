@@ -32,6 +32,7 @@ def replay(
     parts_at: Poses | None = None,
     fidelity: str = "full",
     branches: Branches | None = None,
+    searches: bool = False,
 ) -> ReplayResult:
     """Carry out a plan.
 
@@ -41,9 +42,10 @@ def replay(
         fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out, and what rests
             untouched is not stepped.
         branches: What replays of this scene have in common; changes nothing but the time it takes.
+        searches: The robot feels for a hole where a motion into it is stopped by force.
     """
     start = plan.start if parts_at is None else parts_at
-    todo = moves(plan, scene)
+    todo = moves(plan, scene, searches)
     refused = _refusal(plan, scene, todo)
     branches = Branches() if branches is None or watch is not None else branches
     way = marks(scene, start, fidelity, todo)

@@ -19,7 +19,7 @@ from apo_bench.program import Poses
 from apo_bench.simulation.gripper import gripper_boxes
 from apo_bench.simulation.leap import leap
 from apo_bench.simulation.near import Moving, clear, near_spans
-from apo_bench.simulation.paths import Line, smooth, unwound
+from apo_bench.simulation.paths import Line, moved, smooth, unwound
 from apo_bench.simulation.reach import along, at_end
 from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.world import fresh, part_pose, timestep, unfelt, unstable
@@ -28,6 +28,8 @@ TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
+SHIFT_M = 0.001
+"""How far the tip is shifted in thought to see how the joints turn."""
 
 Watch = Callable[[Any], None]
 
@@ -105,6 +107,33 @@ class Robot:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
         for T in unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
+
+    def servo(self, law: Callable[[Array], Array | None]) -> None:
+        """Shift the tip a little, step by step, as the force on the part in the hand has it.
+
+        Args:
+            law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip shall be off
+                where it began, (3,) world, [m], or None to end.
+
+        Raises:
+            Halt: The arm does not reach around there, or something went wrong on the way.
+        """
+        q, T, offset, passed = self.q, self.T, np.zeros(3), 0
+        moves = np.array([self._across(q, T, axis) for axis in np.eye(3)])
+        while (asked := law(self.force())) is not None:
+            offset, passed = asked, passed + 1
+            self.data.ctrl[self._drives] = q + offset @ moves
+            mujoco.mj_step(self.model, self.data)
+            self._feel()
+            if passed % self._every == 0:
+                self._look()
+        self.q, self.T = q + offset @ moves, moved(T, offset, 1.0)
+
+    def _across(self, q: Array, T: Array, axis: Array) -> Array:
+        """How the joints turn while the tip is shifted, (joints,), [rad/m]; as good as exact over some millimetres."""
+        inverse = self.scene.kinematics.inverse
+        ends = [self._reached(inverse(moved(T, axis, by), q)) for by in (-SHIFT_M, SHIFT_M)]
+        return np.asarray((ends[1] - ends[0]) / (2 * SHIFT_M))
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still; each physics step may be taken in so many parts."""

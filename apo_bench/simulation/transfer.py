@@ -10,6 +10,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.macros import Name
 from apo_bench.simulation.paths import at_height, moved
+from apo_bench.simulation.touch import WALL_MARGIN_M
 
 UP = np.array([0.0, 0.0, 1.0])
 SAFE_M = 0.15
@@ -89,6 +90,14 @@ class Transfer:
     """Guard of a slide, below the force at which what is touched would slide, [N]."""
     clearance: float
     """What lay free falls by this onto the floor of its slot, [m]."""
+    front: Array | None = None
+    """The middle of where the part, with what it carries, ends ahead on its way, in its own frame, (3,), [m]; None where
+    a hole is not felt for."""
+
+    @property
+    def depth(self) -> float:
+        """How deep a motion from above goes between walls, [m]."""
+        return self.slow - WALL_MARGIN_M
 
     @property
     def sides(self) -> tuple[Array, ...]:
