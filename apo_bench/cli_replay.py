@@ -36,7 +36,9 @@ def replay(
         Path | None,
         typer.Option(parser=path_given, metavar="<path>", help="The salt of the sweep that the trial is of."),
     ] = None,
-    method: Annotated[str, typer.Option(help="oracle, none, a corrector, or package.module:name.")] = "contact",
+    method: Annotated[
+        str, typer.Option(help="oracle, none, search, a corrector or package.module:name; +search after one.")
+    ] = "contact",
     clearance: Clearance = None,
     grasp: GraspOption = "friction",
     arm: ArmOption = "six_axis",

@@ -79,7 +79,8 @@ def sweep(
     ] = None,
     careless: Annotated[str | None, typer.Option(help="Carelessness of the human; default: 0,1.")] = None,
     methods: Annotated[
-        str | None, typer.Option(help="oracle, none and correctors; default: oracle,none,paper,contact.")
+        str | None,
+        typer.Option(help="oracle, none, search, correctors, any with +search; default: oracle,none,paper,contact."),
     ] = None,
     trials: Annotated[int | None, typer.Option(help="Per cell, the same seeds in every cell; default: 100.")] = None,
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,

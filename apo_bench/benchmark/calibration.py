@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.method import knows_relations, knows_truth
 from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.statistics import rank, rank_relations
 
@@ -57,7 +58,7 @@ def calibrations(rows: Iterable[Mapping[str, Any]]) -> tuple[Calibration, ...]:
     """One per scenario, noise, relations and method; the oracle has nothing to be calibrated."""
     groups: dict[tuple[str, str, str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
-        if row["level"] is not None and row["success"] is not None and row["method"] != "oracle":
+        if row["level"] is not None and row["success"] is not None and not knows_truth(row["method"]):
             groups.setdefault((row["scenario"], row["noise"], row["relations"], row["method"]), []).append(row)
     order = sorted(groups, key=lambda k: (k[0], k[1], rank_relations(k[2]), rank(k[3]), k[3]))
     return tuple(_calibration(*key, groups[key]) for key in order)
@@ -100,7 +101,7 @@ def _calibration(
 
 def _line(c: Calibration) -> tuple[object, ...]:
     errors = (_number(c.fixed_mm, " mm"), _number(c.fixed_over_clearance, ""), _number(c.free_mm, " mm"))
-    told = c.relations if c.method != "none" else "any"
+    told = c.relations if knows_relations(c.method) else "any"
     return (c.scenario, c.noise, told, c.method, c.planned, c.covered, *errors, c.failed_tests, c.culprits)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from apo_bench.benchmark.compare import Agreement, Comparison, Pair
 from apo_bench.benchmark.figure import level_label
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page.behind import verdict, why
 from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.page.pairs import points
@@ -118,7 +119,7 @@ def _cell(pair: Pair) -> tuple[object, ...]:
     assert one is not None
     place = at(one)
     where = (place.scenario, ", ".join(setting_of(place._replace(fidelity="full")).conditions()), place.method)
-    level = "any" if place.method == "oracle" else level_label(place.level, place.level_deg, place.noise)
+    level = "any" if knows_truth(place.method) else level_label(place.level, place.level_deg, place.noise)
     counts = (pair.shared, pair.only_first, pair.only_second)
     return (*where, level, _rate(pair.first), _rate(pair.second), *counts, points(pair.difference, pair.interval))
 

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.benchmark.spec import RANGE, knows_relations
+from apo_bench.benchmark.method import knows_relations, knows_truth
+from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Place, by_place, order
 from apo_bench.geometry.arrays import Array
 
@@ -60,7 +61,11 @@ def curves(rows: Iterable[Mapping[str, Any]]) -> tuple[Curve, ...]:
     cells = by_place(rows)
     for place in sorted(cells, key=order):
         results = {seed: row["success"] for seed, row in cells[place].items() if row["success"] is not None}
-        if results and place.method != "oracle" and place.level_deg == (0.0 if place.noise == RANGE else place.level):
+        if (
+            results
+            and not knows_truth(place.method)
+            and place.level_deg == (0.0 if place.noise == RANGE else place.level)
+        ):
             groups.setdefault(setting_of(place), {})[place.level] = results
     return tuple(_curve(setting, found) for setting, found in groups.items() if len(found) > 1)
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from apo_bench.benchmark.method import as_seen, knows_relations, knows_truth
 from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Cell
 
@@ -30,8 +31,8 @@ class Row(NamedTuple):
     def holds(self, c: Cell) -> bool:
         """Whether a cell is drawn here: the oracle meets no noise, and it and `none` are not told any relations."""
         where = c.scenario == self.scenario and self.clearance_mm in (None, c.clearance_mm)
-        noise = c.method == "oracle" or c.noise == self.noise
-        return where and noise and (c.method in ("oracle", "none") or c.relations == self.relations)
+        noise = knows_truth(c.method) or c.noise == self.noise
+        return where and noise and (not knows_relations(c.method) or c.relations == self.relations)
 
     def title(self, careless: float) -> str:
         """`stick_in_tower, careful human, 0.25 mm clearance`, and what is not as usual."""
@@ -53,6 +54,7 @@ class Style(NamedTuple):
 
 STYLES = {
     "none": Style("#D55E00", "o", "-"),
+    "search": Style("#E7298A", "8", (0, (4, 1.5))),
     "contact": Style("#332288", "p", "-"),
     "paper": Style("#0072B2", "s", "-"),
     "paper-track": Style("#009E73", "D", "-"),
@@ -73,7 +75,7 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    swept = [cell for cell in cells if cell.method != "oracle"]
+    swept = [cell for cell in cells if not knows_truth(cell.method)]
     rows = rows_of(cells)
     careless = sorted({c.careless for c in swept}) or [0.0]
     lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
@@ -109,14 +111,14 @@ def legend(figure: Any, axes: Any, columns: int) -> None:
 
 def rows_of(cells: Sequence[Cell]) -> list[Row]:
     """What panels show, in the order of the cells; the cells of methods that meet everything decide."""
-    keen = [c for c in cells if c.method not in ("oracle", "none")]
-    fewer = keen or [c for c in cells if c.method == "none"] or list(cells)
+    keen = [c for c in cells if knows_relations(c.method)]
+    fewer = keen or [c for c in cells if as_seen(c.method)] or list(cells)
     return list(dict.fromkeys(Row(c.scenario, c.clearance_mm, c.noise, c.relations) for c in fewer))
 
 
 def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
     """One panel: levels side by side at equal distances, since they span two decades and zero."""
-    here = [c for c in cells if c.method != "oracle" and c.careless == careless]
+    here = [c for c in cells if not knows_truth(c.method) and c.careless == careless]
     levels = sorted({(c.level, c.level_deg) for c in here})
     place = {level: x for x, level in enumerate(levels)}
     for ceiling in (c for c in cells if c.method == "oracle" and c.rate is not None):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.figure import legend, rows_of, styles
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.statistics import Cell
 
 DODGE = 1.03
@@ -24,7 +25,7 @@ def draw_tightness(cells: Sequence[Cell], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    seen = [c for c in cells if c.method != "oracle" and c.tightness and c.rate is not None]
+    seen = [c for c in cells if not knows_truth(c.method) and c.tightness and c.rate is not None]
     rows = list(dict.fromkeys(row._replace(clearance_mm=None) for row in rows_of(cells)))
     lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
     careless = sorted({c.careless for c in seen})

@@ -8,6 +8,7 @@ from itertools import product
 from numbers import Real
 from typing import Any, final
 
+from apo_bench.benchmark.method import checked_method, knows_relations, knows_truth
 from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.spec import (
     RANGE,
@@ -18,10 +19,8 @@ from apo_bench.benchmark.spec import (
     check_eye,
     check_fidelity,
     check_level,
-    check_method,
     check_seed,
     checked_relations,
-    knows_relations,
     level_pair,
     refuse_noise,
 )
@@ -80,6 +79,7 @@ class SweepSpec:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
+        object.__setattr__(self, "methods", tuple(map(checked_method, self.methods)))
         for name in AXES:
             object.__setattr__(self, name, tuple(dict.fromkeys(map(_plain, getattr(self, name)))))
         for name in AXES:
@@ -104,8 +104,6 @@ class SweepSpec:
             check_careless(careless)
         for clearance in self.clearances_mm:
             check_clearance(clearance)
-        for method in self.methods:
-            check_method(method)
         for grasp in self.grasps:
             check_grasp(grasp)
         check_fidelity(self.fidelity, *self.grasps)
@@ -195,8 +193,10 @@ def check_grasp(grasp: str) -> None:
 def _per_seed(grid: SweepSpec) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
     ways = sum(len(_ways(eye, grid.noises)) for eye in grid.eyes)
-    told = sum(len(grid.relations) if knows_relations(method) else 1 for method in grid.methods if method != "oracle")
-    trials = len(grid.careless) * len(grid.levels) * ways * told + ("oracle" in grid.methods)
+    told = sum(
+        len(grid.relations) if knows_relations(method) else 1 for method in grid.methods if not knows_truth(method)
+    )
+    trials = len(grid.careless) * len(grid.levels) * ways * told + sum(map(knows_truth, grid.methods))
     return len(grid.scenarios) * max(1, len(grid.clearances_mm)) * len(grid.grasps) * trials
 
 
@@ -234,10 +234,10 @@ def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: S
         )
 
     ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]
-    if "oracle" in grid.methods:
-        yield from (trial("oracle", 0.0, 0.0, ways[0], "given", grasp) for grasp in grid.grasps)
+    for method, grasp in product(filter(knows_truth, grid.methods), grid.grasps):
+        yield trial(method, 0.0, 0.0, ways[0], "given", grasp)
     for grasp, careless, level, way, method in product(grid.grasps, grid.careless, grid.levels, ways, grid.methods):
-        if method != "oracle":
+        if not knows_truth(method):
             for relations in grid.relations if knows_relations(method) else ("given",):
                 yield trial(method, level, careless, way, relations, grasp)
 

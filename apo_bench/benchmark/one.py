@@ -10,6 +10,7 @@ from typing import Any, final
 
 from apo_bench.benchmark.alone import Say, run_alone
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+from apo_bench.benchmark.method import parsed
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
 from apo_bench.benchmark.salt import read_salt
@@ -81,7 +82,7 @@ def run_one(request: Request) -> Row:
 def _run(request: Request, spec: TrialSpec, say: Say) -> None:
     """Run it and say its row, then write the film."""
     with OwnCorrectors(request.corrector_limit_s) as own:
-        _run_by(own.find(spec.method), request, spec, say)
+        _run_by(own.find(parsed(spec.method).plan), request, spec, say)
 
 
 def _run_by(method: Any, request: Request, spec: TrialSpec, say: Say) -> None:

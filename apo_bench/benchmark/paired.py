@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.benchmark.adjust import DEFAULT, adjusted
 from apo_bench.benchmark.mcnemar import mcnemar
-from apo_bench.benchmark.spec import knows_relations
+from apo_bench.benchmark.method import knows_relations, knows_truth
 from apo_bench.benchmark.statistics import CONFIDENCE, Interval, Place, Rate, by_place, order
 from apo_bench.geometry.arrays import Array
 
@@ -95,7 +95,7 @@ def paired(
         _paired(place, reference, cells[place], cells[place_of_reference(place, reference)])
         for place in cells
         for reference in references
-        if place.method not in ("oracle", reference) and place_of_reference(place, reference) in cells
+        if place.method != reference and not knows_truth(place.method) and place_of_reference(place, reference) in cells
     ]
     p = {_comparison(pair): pair.p for pair in found if pair.p is not None}
     raised = adjusted(p, adjust)

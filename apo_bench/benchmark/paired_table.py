@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from apo_bench.benchmark.figure import level_label
+from apo_bench.benchmark.method import knows_relations
 from apo_bench.benchmark.paired import Paired
 from apo_bench.benchmark.statistics import Interval, Place, Rate
 
@@ -81,7 +82,7 @@ def _fields(r: Rate) -> tuple[float | None, ...]:
 
 
 def _told(place: Place) -> str:
-    return "any" if place.method == "none" else place.relations
+    return place.relations if knows_relations(place.method) else "any"
 
 
 def _points(p: Paired) -> str:

@@ -14,6 +14,7 @@ from typing import final
 
 from apo_bench.benchmark.fingerprint import noise_content, own_content
 from apo_bench.benchmark.grid import Unit
+from apo_bench.benchmark.method import parsed
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.spec import RANGE
 from apo_bench.correction.own import check_correctors
@@ -80,7 +81,7 @@ def check_here(asked: Wanted) -> set[str]:
         load_scenario(scenario)
     for arm in asked.arms:
         find_arm(arm)
-    brought = check_correctors(asked.methods)
+    brought = check_correctors(parsed(method).plan for method in asked.methods)
     for relations in asked.relations:
         if relations not in RECOGNISED:
             make_relations(relations)

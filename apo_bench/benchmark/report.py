@@ -12,6 +12,7 @@ from apo_bench.benchmark.confusion_table import write_confusions
 from apo_bench.benchmark.failure_pictures import failure_pictures, sample
 from apo_bench.benchmark.figure import draw, rows_of
 from apo_bench.benchmark.figure_tightness import draw_tightness, varies
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page.figures import figures_of, methods_of, write_figures
 from apo_bench.benchmark.page.gaps import gaps, write_gaps
 from apo_bench.benchmark.page.halves import write_areas, write_halves
@@ -167,7 +168,7 @@ def _remove_older(folder: Path) -> None:
 def _drawn(folder: Path, cells: Sequence[Cell], told: Sequence[Any]) -> dict[str, Path]:
     """Figures as PNG."""
     made: dict[str, Path] = {}
-    few = len(rows_of(cells)) * len({c.careless for c in cells if c.method != "oracle"}) <= MOST_PANELS
+    few = len(rows_of(cells)) * len({c.careless for c in cells if not knows_truth(c.method)}) <= MOST_PANELS
     if few:
         made["success_over_level"] = folder / "success_over_level.png"
         draw(cells, made["success_over_level"])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import Never, final
 
+from apo_bench.benchmark.method import checked_method
 from apo_bench.benchmark.salt import Salt
 from apo_bench.errors import InputError, unknown
 
@@ -64,7 +65,7 @@ class TrialSpec:
         check_level(self.level_deg, "level in degrees")
         check_careless(self.careless)
         check_clearance(self.clearance_mm)
-        check_method(self.method)
+        object.__setattr__(self, "method", checked_method(self.method))
         check_seed(self.seed)
         check_fidelity(self.fidelity, self.grasp)
         object.__setattr__(self, "relations", checked_relations(self.relations))
@@ -139,15 +140,6 @@ def refuse_noise(*noises: object) -> Never:
     )
 
 
-def check_method(method: str) -> None:
-    """Raise an `InputError` unless it is `oracle`, `none`, a corrector by name, or `module:name`."""
-    from apo_bench.correction.correct import CORRECTORS
-
-    known = ("oracle", "none", *CORRECTORS)
-    if ":" not in method and method not in known:
-        raise InputError(unknown("method", method, known) + " Or give your own corrector as 'package.module:name'.")
-
-
 def checked_relations(given: str) -> str:
     """The relations as rows spell them; raise an `InputError` unless there are such."""
     from apo_bench.benchmark.recognised import KINDS as RECOGNISED
@@ -159,11 +151,6 @@ def checked_relations(given: str) -> str:
     if ":" not in name and name not in known:
         raise InputError(unknown("kind of relations", given, known) + " Or give your own as 'package.module:name'.")
     return name
-
-
-def knows_relations(method: str) -> bool:
-    """Whether a method is told what touches what; the oracle and `none` do not ask."""
-    return method not in ("oracle", "none")
 
 
 def _within(x: float, low: float, high: float, what: str, meaning: str) -> None:

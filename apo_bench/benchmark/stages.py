@@ -128,14 +128,16 @@ def attempt(
     watch: Any = None,
     fidelity: str = "full",
     branches: Branches | None = None,
+    searches: bool = False,
 ) -> Tried:
     """Replay a plan and judge what was reached.
 
     Args:
         reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
         watch: Called with the `MjData` about every 20 ms of simulated time.
+        searches: The robot feels for a hole where a motion into it is stopped by force.
     """
-    result = replay(plan, scene, watch, fidelity=fidelity, branches=branches)
+    result = replay(plan, scene, watch, fidelity=fidelity, branches=branches, searches=searches)
     scenario = scene.scenario
     verdict = judge(
         scenario.assembly,

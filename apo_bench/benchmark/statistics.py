@@ -10,6 +10,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.method import parsed
 from apo_bench.benchmark.salt import one_salt
 from apo_bench.errors import InputError
 
@@ -127,9 +128,13 @@ def wilson(successes: int, trials: int) -> Interval:
 
 
 def rank(method: str) -> int:
-    """The ceiling first, then what has no correction, then `contact`, the paper's two ways, and all others."""
-    first = ("oracle", "none", "contact", "paper", "paper-track")
-    return first.index(method) if method in first else len(first)
+    """The ceiling first, then what has no correction, then `contact`, the paper's two ways, and all others.
+
+    A method with `+search` ranks like the method.
+    """
+    first = ("oracle", "none", "search", "contact", "paper", "paper-track")
+    plain = method if method in first else parsed(method).plan
+    return first.index(plain) if plain in first else len(first)
 
 
 def rank_relations(relations: str) -> tuple[int, str]:

@@ -11,6 +11,7 @@ from apo_bench.benchmark.crew import check_limit, spread
 from apo_bench.benchmark.fingerprint import content_hash, content_pieces, noise_content, own_content, spec_hash
 from apo_bench.benchmark.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
 from apo_bench.benchmark.journal import Journal
+from apo_bench.benchmark.method import parsed
 from apo_bench.benchmark.progress import progress
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.row import Row
@@ -165,7 +166,7 @@ def _checked(grids: Sequence[SweepSpec], corrector_limit_s: float) -> tuple[Mapp
     for relations in {relations: None for grid in grids for relations in grid.relations}:
         if relations not in RECOGNISED:
             make_relations(relations)
-    check_correctors(_methods(grids), corrector_limit_s)
+    check_correctors((parsed(method).plan for method in _methods(grids)), corrector_limit_s)
     physics(grids[0].timestep_s)
     return loaded, find_arm(grids[0].arm)
 

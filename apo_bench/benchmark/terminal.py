@@ -12,8 +12,9 @@ from rich.table import Table
 from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.figure import level_label
+from apo_bench.benchmark.method import knows_relations, knows_truth
 from apo_bench.benchmark.rate_text import failures, interval, percent
-from apo_bench.benchmark.spec import RANGE, knows_relations
+from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Cell
 from apo_bench.scenario import Scenario
 
@@ -54,8 +55,8 @@ def print_cells(cells: Sequence[Cell]) -> None:
     table.add_column("failures")
     for c in cells:
         level = level_label(c.level, c.level_deg, c.noise)
-        where = (f"{c.careless:g}", level) if c.method != "oracle" else ("any", "any")
-        met = {"noise": c.method != "oracle", "relations": knows_relations(c.method)}
+        where = (f"{c.careless:g}", level) if not knows_truth(c.method) else ("any", "any")
+        met = {"noise": not knows_truth(c.method), "relations": knows_relations(c.method)}
         axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
         rates = (percent(c.rate), interval(c), str(c.trials), percent(c.demonstrated_rate), percent(c.loose_rate))
         table.add_row(c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))

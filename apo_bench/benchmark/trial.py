@@ -11,11 +11,12 @@ import numpy as np
 
 from apo_bench.benchmark.confidence import confidence
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+from apo_bench.benchmark.method import knows_relations, knows_truth, parsed
 from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.recognised import counted, understood
 from apo_bench.benchmark.row import Row, head, result
-from apo_bench.benchmark.spec import RANGE, TrialSpec, knows_relations
+from apo_bench.benchmark.spec import RANGE, TrialSpec
 from apo_bench.benchmark.stages import (
     Shown,
     Tried,
@@ -73,14 +74,9 @@ def run_trial(
     seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed, spec.salt)
     told = _told(spec, seen, shown.layout.goals)
     truth = shown.layout.goals
-    planned = plan(method or spec.method, seen, truth, told)
+    planned = plan(method or parsed(spec.method).plan, seen, truth, told)
     said = confidence(planned, seen, told, truth)
-    return (
-        first
-        | _carry_out(planned, scene, truth, truth, watch, spec.fidelity, branches)
-        | said
-        | _contacts(spec, seen, told)
-    )
+    return first | _carry_out(planned, scene, truth, truth, watch, spec, branches) | said | _contacts(spec, seen, told)
 
 
 def eye_of(spec: TrialSpec, scene: Scene, shown: Shown) -> Noise:
@@ -105,18 +101,19 @@ def run_measured(
     Raises:
         InputError: The method is `oracle`, which would need the truth.
     """
-    if spec.method == "oracle":
+    if knows_truth(spec.method):
         raise InputError(
-            "the method 'oracle' was given for a measured observation, whose truth is not known; use none or paper."
+            f"the method '{spec.method}' was given for a measured observation, whose truth is not known; use none or "
+            "paper."
         )
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     first = head(spec, scene.scenario, spec_hash(spec, content, text)) | {**MEASURED, "demonstration": "ok"}
     told = _told(spec, seen, None)
-    planned = plan(method or spec.method, seen, None, told)
+    planned = plan(method or parsed(spec.method).plan, seen, None, told)
     said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
     return (
         first
-        | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch, spec.fidelity, None)
+        | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch, spec, None)
         | said
     )
 
@@ -150,7 +147,7 @@ def _carry_out(
     reference: Array,
     truth: Array | None,
     watch: Any,
-    fidelity: str,
+    spec: TrialSpec,
     branches: Branches | None,
 ) -> Row:
     said = _correction(planned)
@@ -158,7 +155,8 @@ def _carry_out(
         assert planned.refused is not None
         return result(planned.refused, success=False) | said
     said |= {"predicted": foretold(planned.plan, scene)}
-    tried = attempt(planned.plan, scene, reference, watch, fidelity, branches)
+    searches = parsed(spec.method).searches
+    tried = attempt(planned.plan, scene, reference, watch, spec.fidelity, branches, searches)
     return result(ending(tried), success=tried.verdict.success) | said | _physics(tried, planned.plan, truth)
 
 

@@ -11,6 +11,7 @@ from typing import Any, final
 
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.grid import KEY, Unit
+from apo_bench.benchmark.method import parsed
 from apo_bench.benchmark.row import Row, head, result
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stages import Ending, Shown, show
@@ -76,7 +77,7 @@ class Worker:
                 return
             start = time.perf_counter()
             scene, content = self._scene(spec)
-            method = self._method(spec.method)
+            method = self._method(parsed(spec.method).plan)
             ready = time.perf_counter()
             began(spec)
             key = (spec.careless, spec.eye)

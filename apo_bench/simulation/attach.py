@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.fingers import change
 from apo_bench.simulation.paths import moved, smooth, steady
 from apo_bench.simulation.robot import Guard, Robot
-from apo_bench.simulation.search import RADIUS_M, SEARCHES, ease_in, search
+from apo_bench.simulation.search import after, press_in
 from apo_bench.simulation.transfer import ASIDE_M, UP, Grip, Transfer, aim
 
 PLACE, TOUCH, INSERT, SLIDE = 0.06, 0.01, 0.06, 0.005
@@ -47,7 +44,7 @@ def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
     guard, rise, found = Guard(t.into.way, t.insert_n), t.floats, None
     if t.into.left is not None and second is not None:
         there = moved(moved(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
-        left, found = press_in(robot, t, grip, there @ grip.T_part_tip, INSERT, guard)
+        left, found = press_in(robot, t, grip, there @ grip.T_part_tip, INSERT, guard, ARRIVED_M)
         if left > ARRIVED_M:
             return left + t.into.left, grip
         change(robot, t, grip, second, after(found, moved(there, UP, -rise) @ second.T_part_tip))
@@ -55,11 +52,11 @@ def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
         robot.follow(smooth(robot.T, moved(robot.T, UP, rise), 0.01))
     goal = after(found, moved(aim(t) @ grip.T_part_tip, UP, rise))
     if any(macro.name == "move-to-bottom" for macro in t.macros):
-        left, found = press_in(robot, t, grip, moved(goal, t.into.way, -BOTTOM_M), INSERT, guard)
+        left, found = press_in(robot, t, grip, moved(goal, t.into.way, -BOTTOM_M), INSERT, guard, ARRIVED_M)
         if left == 0.0:
             robot.follow(steady(robot.T, after(found, moved(goal, t.into.way, OVERTRAVEL_M)), TOUCH), guard)
     else:
-        left, _ = press_in(robot, t, grip, goal, INSERT, guard)
+        left, _ = press_in(robot, t, grip, goal, INSERT, guard, ARRIVED_M)
     lower = moved(robot.T, UP, -rise - OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
@@ -71,47 +68,12 @@ def come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
     robot.stage = "attach"
     down = Guard(t.into.way, t.place_n)
     goal = aim(t) @ grip.T_part_tip
-    left, found = press_in(robot, t, grip, moved(goal, t.into.way, -t.slow), PLACE, down)
+    left, found = press_in(robot, t, grip, moved(goal, t.into.way, -t.slow), PLACE, down, 0.0)
     if left == 0.0:
         end = after(found, moved(goal, t.into.way, OVERTRAVEL_M))
         press_in(robot, t, grip, end, TOUCH, down, OVERTRAVEL_M + t.depth / 2)
     robot.wait(0.05)
     return 0.0
-
-
-def press_in(
-    robot: Robot, t: Transfer, grip: Grip, end: Array, speed: float, guard: Guard, near: float = ARRIVED_M
-) -> tuple[float, Array | None]:
-    """A guarded motion of the tip, on which the hole is felt for where it is stopped farther than `near` from its end.
-
-    Returns:
-        What is left of it, [m], and what brings poses that were meant to those that were found; None if that is nothing.
-    """
-    left, found = robot.follow(steady(robot.T, end, speed), guard), None
-    if t.front is None:
-        return left, None
-    meant, far = end, 0.0
-    for _ in range(SEARCHES):
-        if left <= near or far >= RADIUS_M:
-            break
-        stopped = moved(end, guard.way, (robot.T - end)[:3, 3] @ guard.way)
-        front = (stopped @ pose.inverse(grip.T_part_tip))[:3] @ [*t.front, 1.0]
-        more = search(robot, guard, t.slide_n, stopped, front, far)
-        if more is None:
-            break
-        guard, found = Guard(more[:3, :3] @ guard.way, guard.newton), more if found is None else more @ found
-        end = more @ end
-        left = ease_in(robot, end, guard)
-        aside = (robot.T - end)[:3, 3]
-        aside -= (aside @ guard.way) * guard.way
-        found, end = moved(found, aside, 1.0), moved(end, aside, 1.0)
-        far = float(np.linalg.norm(end[:3, 3]-meant[:3, 3]))
-    return left, found
-
-
-def after(found: Array | None, T: Array) -> Array:
-    """A pose that was meant, as it has to be after a search."""
-    return T if found is None else found @ T
 
 
 def _slide(robot: Robot, t: Transfer, side: Array) -> None:

@@ -91,8 +91,8 @@ class Transfer:
     clearance: float
     """What lay free falls by this onto the floor of its slot, [m]."""
     front: Array | None = None
-    """The middle of where the part, with what it carries, ends ahead on its way, in its own frame, (3,), [m]; None where
-    a hole is not felt for."""
+    """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
+    where a hole is not searched for."""
 
     @property
     def depth(self) -> float:

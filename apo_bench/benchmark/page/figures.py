@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.benchmark.confusion import Confusion
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page import gaps as gap
 from apo_bench.benchmark.page.chart import Entry, Panel, entries, legend
 from apo_bench.benchmark.page.curves import difference_panels, looks_of, success_panels
@@ -70,7 +71,7 @@ def figures_of(
 
 def methods_of(cells: Sequence[Cell]) -> list[str]:
     """Those that have a colour, as a reader looks for them."""
-    return [m for m in dict.fromkeys(c.method for c in cells) if m != "oracle"]
+    return [m for m in dict.fromkeys(c.method for c in cells) if not knows_truth(m)]
 
 
 def write_figures(figures: Mapping[str, Figure], methods: Sequence[str], folder: Path) -> list[Path]:

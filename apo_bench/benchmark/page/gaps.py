@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.benchmark.figure import Style, level_label
+from apo_bench.benchmark.method import knows_relations
 from apo_bench.benchmark.page.chart import HEIGHT, Axes, Entry, Panel, Point, panel
 from apo_bench.benchmark.page.curves import counted
 from apo_bench.benchmark.page.markup import Html, Table, joined, tag
@@ -58,7 +59,7 @@ def gaps(rows: Iterable[Mapping[str, Any]]) -> tuple[Gap, ...]:
     for row in rows:
         place = place_of(row)
         both = (row.get("gap_before_mm"), row.get("gap_after_mm"))
-        if place is not None and place.method not in ("oracle", "none") and None not in both:
+        if place is not None and knows_relations(place.method) and None not in both:
             groups.setdefault(place, []).append((float(both[0] or 0.0), float(both[1] or 0.0)))
     return tuple(_gap(place, groups[place]) for place in sorted(groups, key=order))
 

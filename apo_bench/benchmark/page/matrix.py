@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page.markup import Html, joined, tag
 from apo_bench.benchmark.page.settings import Setting, at, level_of, level_unit, level_words, levels_of
 from apo_bench.benchmark.rate_text import interval, percent
@@ -45,7 +46,7 @@ def _matrix(setting: Setting, cells: Sequence[Cell], numbers: Mapping[Place, int
     lines = []
     for method in dict.fromkeys(c.method for c in cells):
         own = {level_of(c): c for c in cells if c.method == method}
-        if method == "oracle":
+        if knows_truth(method):
             (ceiling,) = own.values()
             boxes = [tag("td", _button(ceiling, setting, numbers, opened), colspan=spread)]
         else:
@@ -63,7 +64,7 @@ def _matrix(setting: Setting, cells: Sequence[Cell], numbers: Mapping[Place, int
 def _button(cell: Cell, setting: Setting, numbers: Mapping[Place, int], opened: set[int]) -> Html:
     """What a cell says; a cell that stands in several matrices has its anchor in the first."""
     number = numbers[at(cell)]
-    level = "" if cell.method == "oracle" else f", level {level_words(level_of(cell), cell.noise)}"
+    level = "" if knows_truth(cell.method) else f", level {level_words(level_of(cell), cell.noise)}"
     said = f"{cell.method}{level}: {percent(cell.rate)}, {cell.successes} of {cell.trials}"
     anchor = None if number in opened else f"cell-{number}"
     opened.add(number)

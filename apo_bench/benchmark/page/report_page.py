@@ -16,6 +16,7 @@ from apo_bench.benchmark.confusion_table import confusion_table
 from apo_bench.benchmark.effort import WORDS as EFFORT
 from apo_bench.benchmark.effort import effort_table, efforts
 from apo_bench.benchmark.failure_pictures import FailurePicture
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page import gaps as gap
 from apo_bench.benchmark.page import halves, times
 from apo_bench.benchmark.page.behind import behind, packed, why
@@ -148,7 +149,7 @@ def _success(found: Found, numbers: Mapping[Any, int]) -> Html:
 def _levels(found: Found) -> Html:
     figure = found.figures.get("success_over_level")
     if figure is None:
-        here = sorted({f"{c.level:g}" for c in found.summary.cells if c.method != "oracle"})
+        here = sorted({f"{c.level:g}" for c in found.summary.cells if not knows_truth(c.method)})
         what = f"every trial was at level {here[0]}" if len(here) == 1 else "no setting has two levels"
         return tag("p", f"No level varied: {what}, so there is no curve to draw.", class_="none")
     words = (

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from apo_bench.benchmark.figure import level_label
-from apo_bench.benchmark.spec import RANGE, USUAL, knows_relations
+from apo_bench.benchmark.method import as_seen, knows_relations, knows_truth
+from apo_bench.benchmark.spec import RANGE, USUAL
 from apo_bench.benchmark.statistics import Place, rank_relations
 
 Item = TypeVar("Item")
@@ -28,7 +29,7 @@ class Setting(NamedTuple):
 
         The oracle meets neither noise nor carelessness, and it and `none` are not told any relations.
         """
-        ceiling = cell.method == "oracle"
+        ceiling = knows_truth(cell.method)
         return (
             (cell.scenario, cell.clearance_mm, cell.grasp, cell.fidelity)
             == (self.scenario, self.clearance_mm, self.grasp, self.fidelity)
@@ -66,9 +67,9 @@ def settings(cells: Iterable[Any]) -> list[Setting]:
     places = [at(cell) for cell in cells]
     found = {setting_of(p) for p in places if knows_relations(p.method)}
     told_right = {s._replace(relations="given") for s in found}
-    found |= {setting_of(p) for p in places if p.method == "none" and setting_of(p) not in told_right}
+    found |= {setting_of(p) for p in places if as_seen(p.method) and setting_of(p) not in told_right}
     covered = {_site(s) for s in found}
-    found |= {setting_of(p) for p in places if p.method == "oracle" and _site(p) not in covered}
+    found |= {setting_of(p) for p in places if knows_truth(p.method) and _site(p) not in covered}
     return sorted(found, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
 
 
@@ -83,7 +84,7 @@ def members(found: Sequence[Setting], items: Iterable[Item]) -> dict[Setting, li
 
 def levels_of(items: Iterable[Any]) -> list[tuple[float, float]]:
     """Levels in mm and degrees of all but the oracle, sorted."""
-    return sorted({level_of(item) for item in items if at(item).method != "oracle"})
+    return sorted({level_of(item) for item in items if not knows_truth(at(item).method)})
 
 
 def level_of(item: Any) -> tuple[float, float]:

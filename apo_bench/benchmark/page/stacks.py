@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
+from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page.chart import WIDTH, Entry, Panel, patch
 from apo_bench.benchmark.page.markup import Html, html
 from apo_bench.benchmark.page.paint import stage_paint, stages_in_order
@@ -84,7 +85,7 @@ def _beside(cell: Cell, setting: Setting) -> float:
 
 
 def _level(cell: Cell, setting: Setting) -> str:
-    return "" if cell.method == "oracle" else level_words(level_of(cell), setting.noise)
+    return "" if knows_truth(cell.method) else level_words(level_of(cell), setting.noise)
 
 
 def _x(share: float) -> float:
