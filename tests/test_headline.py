@@ -60,9 +60,10 @@ def key(row: dict[str, Any]) -> tuple[Any, ...]:
 def test_a_part_of_the_headline_runs_again_to_the_same_rows(name: str) -> None:
     kept, found = {key(row): row for row in rows()}, list[dict[str, Any]]()
     terms = Terms({name: content_hash(load_scenario(name), name, find_arm("six_axis").mjcf)}, versions())
+    worker = Worker(0, terms)
     for seed in SEEDS:
         trials = [TrialSpec(name, LEVEL, LEVEL, CARELESS, method=m, seed=seed, fidelity=fidelity()) for m in METHODS]
-        Worker(0, terms).run(Unit(tuple(trials)), lambda row, _: found.append(row))
+        worker.run(Unit(tuple(trials)), lambda row, _: found.append(row))
     for method in METHODS:
         mine = [row for row in found if row["method"] == method]
         theirs = [kept[key(row)] for row in mine]
