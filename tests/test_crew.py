@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import shlex
 import signal
@@ -10,12 +11,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from apo_bench.benchmark import crew_member
 from apo_bench.benchmark.crew import MOST_FALSE_STARTS, spread
 from apo_bench.benchmark.grid import SweepSpec, Unit, load_all, units
 from apo_bench.benchmark.replay_command import replay_command
@@ -28,7 +30,7 @@ from apo_bench.cli import main
 from apo_bench.errors import InputError
 
 CODE = """
-import ctypes, os, subprocess, sys, time
+import ctypes, os, shutil, subprocess, sys, time
 
 def dies_of_b(seen):
     if "B" in seen.assembly.solids:
@@ -50,6 +52,10 @@ def forks(seen):
 
 def ends(seen):
     os._exit(0)
+
+def removes(seen):
+    shutil.rmtree("run")
+    raise ValueError("gone")
 
 def nonsense(seen):
     return "goals"
@@ -268,6 +274,47 @@ def test_processes_that_cannot_begin_are_given_up() -> None:
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
         spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
     assert MOST_FALSE_STARTS == 3
+
+
+def test_a_corrector_that_removes_the_folder_of_the_rows(tmp_path: Path) -> None:
+    rows = sweep(grid("removes", "raises", trials=2), "run", workers=1)
+    assert len(rows) == 4
+    assert {row["failure_code"] for row in rows} == {"raised"}
+    assert count(tmp_path / "run") == 4
+
+
+@pytest.mark.parametrize("methods", [("raises",), ("raises", "none")])
+def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
+    methods: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first process is killed after its first row, and those after it before they begin."""
+    asked = replace(grid("raises", trials=2), methods=tuple(m if m == "none" else f"unruly:{m}" for m in methods))
+    terms = Terms(dict.fromkeys(asked.scenarios, "ab"), versions())
+    monkeypatch.setattr(Terms, "check_content", lambda *_: None)
+    asked_for: list[Any] = []
+
+    def start(target: Any, *given: Any) -> Any:
+        asked_for.append(target)
+        return real(target if len(asked_for) == 1 else os._exit, *given)
+
+    real = crew_member.start
+    monkeypatch.setattr(crew_member, "start", start)
+    rows: list[dict[str, Any]] = []
+
+    def emit(row: Any, timing: Any) -> None:
+        rows.append(dict(row))
+        if len(rows) == 1:
+            for process in multiprocessing.active_children():
+                process.kill()
+                process.join()
+
+    work = tuple(units([asked], load_all([asked])))
+    if "none" in methods:
+        with pytest.raises(RuntimeError, match="before they have begun a trial"):
+            spread(work, terms, workers=1, limit_s=60.0, emit=emit)
+    else:
+        spread(work, terms, workers=1, limit_s=60.0, emit=emit)
+        assert [row["failure_code"] for row in rows] == ["raised", "worker_died"]
 
 
 PATIENT = """

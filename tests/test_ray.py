@@ -431,6 +431,18 @@ def test_workers_that_never_begin_end_the_sweep(monkeypatch: pytest.MonkeyPatch)
         crew.turn(refuse_news)
 
 
+def test_workers_that_begin_no_more_cost_the_trials_of_own_correctors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
+    ray = Nodes(monkeypatch, [HELLO, ENDED[:2], *[Gone()] * (ray_crew.DEATHS - 1), *[HELLO, Gone()] * 9])
+    heard: list[Any] = []
+    spec = replace(SPEC, methods=("not_there:one", "not_there:two"), trials=1)
+    crew = ray_crew.Crew(terms_of(spec)[0], lambda number: ray.actor, lambda: 1, 60.0)
+    for _ in range(30):
+        if crew.busy:
+            crew.turn(heard.append)
+    assert [(news[0], *news[2:3]) for news in heard][1:] == [("lost", "worker_died")]
+
+
 def test_a_driver_that_was_asleep_finds_nobody_late(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
     now = [0.0]

@@ -12,9 +12,9 @@ from types import MappingProxyType
 
 AFTERWARDS = """
     adjust alone area bounded calibration compare confusion crew crew_member crew_process curve effort eye_one
-    failure_pictures falling half_level journal mcnemar misgivings on_ray one paired parcel parquet plan_lines
-    power progress ray_crew ray_driver ray_hand replay_command report run_file slim statistics stopping summary
-    sweep sweep_file terminal
+    failure_pictures falling half_level journal kept_file mcnemar misgivings on_ray one paired parcel parquet
+    plan_lines power progress ray_crew ray_driver ray_hand replay_command report run_file slim statistics stopping
+    summary sweep sweep_file terminal
 """
 LEFT_OUT = (
     *("cli*.py", "arguments.py", "output.py", "benchmark/page/*", "benchmark/figure*.py", "benchmark/graph_*.py"),

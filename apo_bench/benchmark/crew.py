@@ -13,6 +13,7 @@ from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.stopping import Check, never
 from apo_bench.benchmark.terms import Terms
 from apo_bench.benchmark.worker import Emit, lost, timing
+from apo_bench.correction.own import is_own
 from apo_bench.errors import InputError
 
 TURN_S = 0.5
@@ -60,7 +61,7 @@ def spread(
             _hear(crew, emit)
             for member in crew:
                 if member.unit is not None and (not member.process.is_alive() or member.overdue(limit_s)):
-                    _replace(member, limit_s, waiting, emit, check)
+                    _replace(member, limit_s, waiting, emit, check, any(one.has_begun for one in crew))
     except KeyboardInterrupt:
         _end_cleanly(crew, emit)
         raise
@@ -78,8 +79,14 @@ def _hear(crew: Sequence[Member], emit: Emit) -> None:
             pass
 
 
-def _replace(member: Member, limit_s: float, waiting: deque[Unit], emit: Emit, check: Check) -> None:
-    """End a process that is dead or too long at a trial: that trial is lost, the rest of its unit waits."""
+def _replace(
+    member: Member, limit_s: float, waiting: deque[Unit], emit: Emit, check: Check, begun_before: bool
+) -> None:
+    """End a process that is dead or too long at a trial: that trial is lost, the rest of its unit waits.
+
+    Args:
+        begun_before: Whether a process of this sweep has begun a trial.
+    """
     code = "time_limit" if member.process.is_alive() else "worker_died"
     if code == "worker_died":
         time.sleep(MOMENT_S)
@@ -89,22 +96,32 @@ def _replace(member: Member, limit_s: float, waiting: deque[Unit], emit: Emit, c
     if member.unit is None or (code == "time_limit" and not member.overdue(limit_s)):
         return
     unit, done, since = member.unit, member.done, member.since
-    if since is None:
-        _count_false_start(member, code)
+    spec = unit.trials[done] if unit.trials[done:] else None
+    given_up = since is None and _gives_up(member, code, begun_before and spec is not None and is_own(spec.method))
     member.end()
-    if since is not None:
-        spec = unit.trials[done]
+    if spec is not None and (since is not None or given_up):
         row = lost(spec, member.terms.content[spec.scenario], code)
-        emit(row, timing(row, member.number, None, None, time.monotonic() - since))
+        emit(row, timing(row, member.number, None, None, None if since is None else time.monotonic() - since))
         done += 1
     if unit.trials[done:]:
         waiting.appendleft(Unit(unit.trials[done:]))
 
 
-def _count_false_start(member: Member, code: str) -> None:
+def _gives_up(member: Member, code: str, correctors_doing: bool) -> bool:
+    """Whether a process has ended too often before a trial began; if that is the corrector's doing, the trial is lost.
+
+    Args:
+        correctors_doing: Processes have begun trials before, and this one has a corrector of one's own.
+
+    Raises:
+        RuntimeError: It is not.
+    """
     member.false_starts += 1
     if member.false_starts < MOST_FALSE_STARTS:
-        return
+        return False
+    if correctors_doing:
+        member.false_starts = 0
+        return True
     how = "are not ready in time" if code == "time_limit" else f"end with exit code {member.process.exitcode}"
     raise RuntimeError(
         f"worker processes {how} before they have begun a trial; use fewer of them if memory is short, and in a script "

@@ -34,6 +34,8 @@ class Member:
         """When the trial under way began; None where none is."""
         self.heard = 0.0
         """When it last said something, or was given work."""
+        self.has_begun = False
+        """Whether it has ever begun a trial."""
         self.false_starts = 0
         """How often in a row it ended before a trial had begun."""
         self.process: Any = None
@@ -57,7 +59,7 @@ class Member:
             return False
         self.heard = time.monotonic()
         if kind == "began":
-            self.since = self.heard
+            self.since, self.has_begun = self.heard, True
         elif kind == "row":
             self.done, self.since, self.false_starts = self.done + 1, None, 0
             emit(*news)

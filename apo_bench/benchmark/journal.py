@@ -13,10 +13,11 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, final
+from typing import IO, Any, final
 
 from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.grid import Key, row_key
+from apo_bench.benchmark.kept_file import is_there, put_back
 from apo_bench.benchmark.recognised import UNCOUNTED
 from apo_bench.benchmark.run_file import check_same, write_run
 from apo_bench.benchmark.salt import check_one
@@ -42,18 +43,20 @@ class Journal:
             InputError: The folder cannot be written, is being written, or holds trials of another sweep.
         """
         self.folder = folder
+        self._place, self._run = folder.absolute(), run
         self.finished: dict[Key, str] = {}
         """The trials that have a row, and its `spec_hash`."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._trials = (folder / "trials.jsonl").open("ab", buffering=0)
+            self._trials: IO[bytes] = (folder / "trials.jsonl").open("a+b", buffering=0)
             try:
                 _lock(self._trials.fileno(), folder)
                 for name in ("trials.jsonl", "timing.jsonl"):
                     _set_torn_line_aside(folder / name)
                 self._read(run)
                 write_run(folder, run)
-                self._timing = (folder / "timing.jsonl").open("ab", buffering=0)
+                self._timing: IO[bytes] = (folder / "timing.jsonl").open("a+b", buffering=0)
+                self._size = os.fstat(self._trials.fileno()).st_size
             except BaseException:
                 self._trials.close()
                 raise
@@ -75,8 +78,9 @@ class Journal:
         Raises:
             RuntimeError: The row could not be written, such as on a full disk; what was written of it is taken back.
         """
+        self._keep()
         try:
-            _append(self._trials.fileno(), row)
+            self._size += _append(self._trials.fileno(), row)
         except OSError as error:
             raise RuntimeError(
                 f"a row could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); the "
@@ -88,7 +92,31 @@ class Journal:
 
     def rows(self) -> list[dict[str, Any]]:
         """All rows of the folder."""
+        self._keep()
         return read_rows(self.folder)
+
+    def _keep(self) -> None:
+        """Put the files back where they were if somebody has removed them.
+
+        Raises:
+            RuntimeError: They cannot be, or rows were taken out of them.
+        """
+        lost = f"the rows of this sweep were removed from '{self.folder}' by somebody else, and"
+        if os.fstat(self._trials.fileno()).st_size < self._size:
+            raise RuntimeError(f"{lost} are lost; the same command runs their trials again.")
+        if is_there(self._trials, self._place / "trials.jsonl"):
+            return
+        try:
+            trials = put_back(self._trials, self._place / "trials.jsonl")
+            self._trials.close()
+            self._trials = trials
+            _lock(trials.fileno(), self.folder)
+            timing = put_back(self._timing, self._place / "timing.jsonl")
+            self._timing.close()
+            self._timing = timing
+            write_run(self._place, self._run)
+        except OSError as error:
+            raise RuntimeError(f"{lost} cannot be put back ({error.strerror}); the same command runs them.") from error
 
     def _read(self, run: Mapping[str, Any]) -> None:
         for row in each_row(self.folder):
@@ -158,9 +186,9 @@ def _lock(file: int, folder: Path) -> None:
         return
 
 
-def _append(file: int, line: Mapping[str, Any]) -> None:
-    """Add a line whole, or not at all."""
-    left = json.dumps(line, allow_nan=False).encode() + b"\n"
+def _append(file: int, line: Mapping[str, Any]) -> int:
+    """Add a line whole, or not at all; how many bytes it has."""
+    whole = left = json.dumps(line, allow_nan=False).encode() + b"\n"
     before = os.fstat(file).st_size
     try:
         while left:
@@ -169,6 +197,7 @@ def _append(file: int, line: Mapping[str, Any]) -> None:
         with suppress(OSError):
             os.ftruncate(file, before)
         raise
+    return len(whole)
 
 
 def _set_torn_line_aside(path: Path) -> None:

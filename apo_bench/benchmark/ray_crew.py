@@ -14,6 +14,7 @@ from typing import Any, final
 
 from apo_bench.benchmark.grid import Unit
 from apo_bench.benchmark.spec import TrialSpec
+from apo_bench.correction.own import is_own
 from apo_bench.errors import InputError
 
 Tell = Callable[[tuple[Any, ...]], None]
@@ -72,6 +73,7 @@ class Crew:
         self._size, self._looked = size(), time.monotonic()
         self._deaths: Counter[TrialSpec] = Counter()
         self._made = self._false_starts = 0
+        self._begun = False
         self._clock, self._ticked = 0.0, time.monotonic()
 
     @property
@@ -166,7 +168,7 @@ class Crew:
     def _take(self, post: Post, news: tuple[Any, ...], tell: Tell) -> None:
         kind, *said = news
         if kind == "began":
-            post.since, self._false_starts = self._clock, 0
+            post.since, self._false_starts, self._begun = self._clock, 0, True
         elif kind == "row":
             del post.unit[0]
             post.since, post.ready = None, self._clock
@@ -201,8 +203,9 @@ class Crew:
         """A worker is gone, or has to go; its trial under way is lost if that was the trial's own doing."""
         self._discharge(post)
         rest, since = post.unit, post.since
-        if since is None and code is not None:
-            self._count_false_start(why)
+        given_up = since is None and code is not None and self._gives_up(rest, why)
+        if given_up:
+            tell(("lost", rest.pop(0), code, post.number, 0.0, {"host": post.host, "node": post.node}))
         elif since is not None and code == "worker_died":
             self._deaths[rest[0]] += 1
         if since is not None and (code == "time_limit" or self._deaths[rest[0]] >= DEATHS):
@@ -211,13 +214,18 @@ class Crew:
         if rest:
             self._waiting.appendleft(rest)
 
-    def _count_false_start(self, why: str) -> None:
+    def _gives_up(self, rest: Sequence[TrialSpec], why: str) -> bool:
+        """Whether workers end too often before a trial began; if that is the corrector's doing, its trial is lost."""
         self._false_starts += 1
+        if self._false_starts >= FALSE_STARTS and self._begun and rest and is_own(rest[0].method):
+            self._false_starts = 0
+            return True
         if self._false_starts >= FALSE_STARTS:
             if "all references to the actor were removed" in why:
                 why = "the cluster was started without a token and this machine has one; set RAY_AUTH_MODE=disabled"
             why = " ".join(why.split()) or f"no trial began within {STARTING_S:g} s"
             raise RuntimeError(f"workers on the Ray cluster end before they have begun a trial: {why}")
+        return False
 
     def _discharge(self, post: Post) -> None:
         import ray

@@ -75,7 +75,7 @@ class OwnCorrectors:
         Raises:
             InputError: It cannot be imported, or is no function.
         """
-        if not isinstance(method, str) or ":" not in method:
+        if not is_own(method):
             return method
         if method not in self._found:
             module = method.partition(":")[0]
@@ -98,6 +98,11 @@ class OwnCorrectors:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def is_own(method: Any) -> bool:
+    """Whether it is named as `module:name`."""
+    return isinstance(method, str) and ":" in method
 
 
 def correct_named(seen: Observation, corrector: Any) -> Correction:
