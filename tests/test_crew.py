@@ -19,6 +19,7 @@ import pytest
 
 from apo_bench.benchmark import crew_member
 from apo_bench.benchmark.crew import MOST_FALSE_STARTS, spread
+from apo_bench.benchmark.fingerprint import content_hash
 from apo_bench.benchmark.grid import SweepSpec, Unit, load_all, units
 from apo_bench.benchmark.replay_command import replay_command
 from apo_bench.benchmark.spec import TrialSpec
@@ -28,6 +29,8 @@ from apo_bench.benchmark.terms import Terms, versions
 from apo_bench.benchmark.worker import Worker, lost, misbehaved
 from apo_bench.cli import main
 from apo_bench.errors import InputError
+from apo_bench.scenario_file import load_scenario
+from apo_bench.simulation.arm import find_arm
 
 CODE = """
 import ctypes, os, shutil, subprocess, sys, time
@@ -289,8 +292,8 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
 ) -> None:
     """The first process is killed after its first row, and those after it before they begin."""
     asked = replace(grid("raises", trials=2), methods=tuple(m if m == "none" else f"unruly:{m}" for m in methods))
-    terms = Terms(dict.fromkeys(asked.scenarios, "ab"), versions())
-    monkeypatch.setattr(Terms, "check_content", lambda *_: None)
+    content = content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").mjcf)
+    terms = Terms({"block_on_block": content}, versions())
     asked_for: list[Any] = []
 
     def start(target: Any, *given: Any) -> Any:
