@@ -87,6 +87,19 @@ def test_nothing_to_draw_with_is_one_sentence() -> None:
 
 
 @linux
+@pytest.mark.parametrize("first", ["mujoco", "mujoco.gl_context", "mujoco.rendering.classic.gl_context"])
+def test_a_context_is_there_for_whoever_asks_for_one(first: str) -> None:
+    """Whichever name is asked first, it is the same class; a name that is not there is none."""
+    ask = f"from {first} import GLContext as asked\n"
+    ask += "import mujoco, mujoco.gl_context\nfrom mujoco.rendering.classic import gl_context as own\n"
+    ask += "print(asked is mujoco.GLContext is mujoco.gl_context.GLContext is own.GLContext, asked.__module__)\n"
+    done = python(f"import apo_bench.simulation\n{ask}print(hasattr(mujoco, 'GLContexts'))\n", "egl")
+    if "libEGL" in done.stderr or "NoneType" in done.stderr:
+        pytest.skip("no EGL")
+    assert (done.returncode, done.stdout) == (0, "True mujoco.egl\nFalse\n"), done.stderr
+
+
+@linux
 def test_what_somebody_else_draws_with_dm_control_is_drawn_as_ever() -> None:
     draw = (
         "from dm_control import mjcf\n"

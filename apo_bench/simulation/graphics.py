@@ -28,8 +28,8 @@ def import_mujoco() -> None:
     with _without_backend():
         mujoco = importlib.import_module("mujoco")
     contexts = importlib.import_module("mujoco.rendering.classic.gl_context")
-    _choose_later(contexts, contexts, "GLContext")
-    _choose_later(mujoco, contexts, "GLContext")
+    for module in (contexts, mujoco, importlib.import_module("mujoco.gl_context")):
+        _choose_later(module, contexts, "GLContext")
 
 
 def import_mjcf() -> Any:
@@ -77,10 +77,10 @@ def renderer(model: Any, width: int, height: int) -> Any:
     Raises:
         InputError: There is nothing to draw with.
     """
-    import mujoco
-    from mujoco.rendering.classic import gl_context
-
     try:
+        import mujoco
+        from mujoco.rendering.classic import gl_context
+
         if VARIABLE not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
             os.environ[VARIABLE] = "egl"
             importlib.reload(gl_context)  # where somebody else imported MuJoCo it has chosen already
