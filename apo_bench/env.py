@@ -41,6 +41,8 @@ LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
 LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
 """How far an action can move a goal per axis, [m, rad]."""
 PICTURE = (480, 640)
+LONGEST_REPLAY_S = 1000.0
+"""Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
 MOST_TRIES = 30
 """So many demonstrations in a row may go wrong before `reset()` gives up."""
 
@@ -88,6 +90,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of `apo_bench.outcomes`), `operation`
     (numbered from 1, or None), `sentence` and, if a plan was carried out, `predicted`: what it said about itself
     before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and nothing from which it can be drawn.
+    A replay that takes more than 1000 s of simulated time, which only a schedule of a great many steps does, begins no
+    further step: code `time_limit`. Wall time has no limit.
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
     keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
 
@@ -314,7 +318,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if self._refused is not None:
             return failed, self._refused, None
         said = foretold(plan, self._scene)
-        tried = attempt(plan, self._scene, shown.layout.goals, self._watch())
+        tried = attempt(plan, self._scene, shown.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
         if tried.result.reached.final is not None:
             self._poses = tried.result.reached.final.poses
         judged = tried.verdict

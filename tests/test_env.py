@@ -14,6 +14,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import apo_bench
+from apo_bench import env as envs
 from apo_bench import outcomes
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.trial import run_trial
@@ -23,6 +24,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.infos import predicted_info, whole
 from apo_bench.program import Correction, Observation, Step
+from apo_bench.simulation import replay as replays
 
 SEED = 5
 
@@ -118,7 +120,7 @@ def _check_episode(env: Any, row: dict[str, Any]) -> None:
 
 def test_an_action_moves_each_goal_in_the_frame_of_its_part(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_: asked.append(plan) or _nothing())
+    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
     env.reset(seed=SEED)
     twist = np.linspace(-0.09, 0.09, 18).reshape(3, 6)
     env.step(twist)
@@ -138,7 +140,7 @@ def _nothing() -> Any:
 
 def test_correction_aims_and_an_action_composes_on_top(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_: asked.append(plan) or _nothing())
+    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
     corrected = apo_bench.Corrected(env, "apo_bench.correction.paper:paper")
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "converged"
@@ -176,7 +178,7 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
     env: APOReplay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_: asked.append(plan) or _nothing())
+    monkeypatch.setattr("apo_bench.env.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
     corrected = apo_bench.Corrected(env, rebuilds)
     corrected.reset(seed=SEED)
     made = rebuilds(env.seen)
@@ -218,6 +220,22 @@ def test_info_never_holds_the_truth(env: APOReplay) -> None:
     assert {f.name for f in fields(env.seen)} == {
         *("assembly", "start", "goals", "covariance", "seen", "gap_m", "play_m")
     }
+
+
+def test_simulated_time_has_a_limit(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
+    env.reset(seed=SEED)
+    again = (Step(0), Step(0, undo=True)) * 600
+    env.aim(env.seen.goals, (*again, *(Step(k) for k in range(3))))
+    monkeypatch.setattr(replays, "moves", _nothing)
+    info = env.step(zeros(env))[4]
+    assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
+    monkeypatch.undo()
+    monkeypatch.setattr(envs, "LONGEST_REPLAY_S", 5.0)
+    env.reset(seed=SEED)
+    info = env.step(zeros(env))[4]
+    assert [info[key] for key in ("is_success", "stage", "code")] == [False, "pick", "time_limit"]
+    assert info["operation"] > 1
+    assert info["sentence"] == "the trial took longer than its limit"
 
 
 def test_one_step_is_one_episode(env: APOReplay) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
@@ -129,6 +130,7 @@ def attempt(
     fidelity: str = "full",
     branches: Branches | None = None,
     searches: bool = False,
+    most_s: float = math.inf,
 ) -> Tried:
     """Replay a plan and judge what was reached.
 
@@ -136,8 +138,9 @@ def attempt(
         reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
         watch: Called with the `MjData` about every 20 ms of simulated time.
         searches: The robot feels for a hole where a motion into it is stopped by force.
+        most_s: Simulated time that the replay may take.
     """
-    result = replay(plan, scene, watch, fidelity=fidelity, branches=branches, searches=searches)
+    result = replay(plan, scene, watch, fidelity=fidelity, branches=branches, searches=searches, most_s=most_s)
     scenario = scene.scenario
     verdict = judge(
         scenario.assembly,

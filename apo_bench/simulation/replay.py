@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
@@ -20,6 +22,8 @@ SETTLE_S = 0.5
 REST_M_S, REST_RAD_S = 5e-5, 1e-3
 """Slower than this, all parts rest and the next operation may begin; a stick that rocks in its slot takes a while."""
 LOOK_S, PATIENCE_S = 0.04, 1.5
+SHORTEST_STEP_S = 1.0
+"""Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
 STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
 """What has moved so long, [s], rocks: steps are taken in so many parts. Of 19 states that rocked on for ever in whole
 steps quarters end 17, halves 10, and all of these in turn every one."""
@@ -33,6 +37,7 @@ def replay(
     fidelity: str = "full",
     branches: Branches | None = None,
     searches: bool = False,
+    most_s: float = math.inf,
 ) -> ReplayResult:
     """Carry out a plan.
 
@@ -43,19 +48,21 @@ def replay(
             untouched is not stepped.
         branches: What replays of this scene have in common; changes nothing but the time it takes.
         searches: The robot feels for a hole where a motion into it is stopped by force.
+        most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
     """
     start = plan.start if parts_at is None else parts_at
-    todo = moves(plan, scene, searches)
-    refused = _refusal(plan, scene, todo)
+    too_long = len(plan.schedule) * SHORTEST_STEP_S > most_s
+    todo = () if too_long else moves(plan, scene, searches)
+    refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
     branches = Branches() if branches is None or watch is not None else branches
     way = marks(scene, start, fidelity, todo)
-    ended = None if refused or not way else branches.ended(way[-1])
+    ended = None if refused or not way or most_s < math.inf else branches.ended(way[-1])
     if ended is not None:
         return ended
     robot, after = Robot(scene, start, watch, fidelity), list[Snapshot | None]([None] * len(plan.assembly))
     timeline = list[tuple[Step, float]]()
     with sleeping(scene.work, fidelity == "contact"):
-        outcome = refused or _carry_out(plan, robot, todo, after, timeline, branches, way)
+        outcome = refused or _carry_out(plan, robot, todo, after, timeline, branches, way, most_s)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
         reached=Reached(after=tuple(after), final=final),
@@ -64,7 +71,7 @@ def replay(
         sim_seconds=float(robot.data.time),
         timeline=tuple(timeline),
     )
-    if way and not refused:
+    if way and not refused and outcome.code != "time_limit":
         branches.end(way[-1], result)
     return result
 
@@ -101,6 +108,7 @@ def _carry_out(
     timeline: list[tuple[Step, float]],
     branches: Branches,
     way: list[bytes],
+    most_s: float,
 ) -> Outcome:
     done, kept = branches.resume(way, robot)
     if kept is None:
@@ -108,6 +116,8 @@ def _carry_out(
     else:
         after[:], timeline[:] = kept.after, kept.timeline
     for i, (step, t) in list(enumerate(todo))[done // 2 :]:
+        if robot.data.time > most_s:
+            return _late(plan, "pick", step)
         try:
             if kept is None or done <= 2 * i:
                 grip = take(robot, t)
@@ -153,6 +163,10 @@ def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
         if halt.code == "unstable_simulation":
             return None
     return snapshot(robot.scene.work, robot.data, plan.start)
+
+
+def _late(plan: Plan, stage: str, step: Step) -> Outcome:
+    return _outcome(plan, stage, "time_limit", step.operation)
 
 
 def _outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:
