@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
+from apo_bench.writing import check_target
 
 
 def numbers(text: str, option: str) -> tuple[float, ...]:
@@ -42,6 +43,8 @@ def check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
     allowed = " or ".join(endings)
     if path.suffix.lower() not in endings:
         raise InputError(f"{option} {path} was given; a file name that ends in {allowed} is allowed.")
+    if not path.is_dir():
+        check_target(path)
     folder = path.parent
     if path.is_dir() or not folder.is_dir() or not os.access(path if path.exists() else folder, os.W_OK):
         raise InputError(f"{option} {path} cannot be written; name a file in a folder that exists and can be written.")

@@ -30,6 +30,9 @@ def report(
         Path | None,
         typer.Option(parser=path_given, metavar="<path>", help="Of a salted sweep, to run its failures again."),
     ] = None,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="For pictures, import and run code of others that the rows name.")
+    ] = False,
 ) -> None:
     """Write report.html, which opens anywhere, with tables (CSV, Parquet) and figures (SVG, PNG) beside it."""
     from apo_bench.benchmark.report import report as write_report
@@ -37,7 +40,7 @@ def report(
 
     if not 0 <= pictures <= MOST_PICTURES:
         raise InputError(f"--pictures {pictures} was given; a whole number from 0 to {MOST_PICTURES} is allowed.")
-    made = write_report(folder, pictures, salt_file)
+    made = write_report(folder, pictures, salt_file, trust_code=trust_code)
     print_cells(made.cells)
     print_report(made)
 

@@ -12,6 +12,8 @@ from typing import BinaryIO
 from apo_bench.errors import InputError
 
 LARGEST_BYTES = 1_000_000
+LONGEST_LINE = 1 << 20
+"""Bytes; ten times the longest line that a sweep writes."""
 _FLAGS = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
 _KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
 
@@ -60,6 +62,24 @@ def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
         InputError: As `read_bytes`, or it is not UTF-8.
     """
     return decoded(read_bytes(path, kind, limit), str(path), kind)
+
+
+def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
+    """The lines of a file, numbered from 1; a last one without an end, torn as it was written, is left out.
+
+    Raises:
+        InputError: As `opened`, or a line is longer than any that is written.
+    """
+    with opened(path, kind) as file:
+        number = 0
+        while line := file.readline(LONGEST_LINE + 1):
+            number += 1
+            if len(line) > LONGEST_LINE:
+                raise InputError(
+                    f"{path}, line {number}: at most {LONGEST_LINE:,} bytes are allowed in a line; remove it."
+                )
+            if line.endswith(b"\n"):
+                yield number, line
 
 
 def decoded(raw: bytes, file: str, kind: str) -> str:

@@ -16,6 +16,7 @@ from apo_bench.benchmark.confusion_table import confusion_lines
 from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.paired import paired
 from apo_bench.benchmark.statistics import Cell, tally
+from apo_bench.benchmark.verdicts import by_verdict, verdict_of
 
 ROOT = Path(__file__).parents[1]
 ROWS = ROOT / "benchmarks" / "results" / "rows.jsonl.gz"
@@ -128,10 +129,11 @@ def main() -> None:
 
 
 def unpacked(packed: Path) -> list[dict[str, Any]]:
-    """The rows, older ones with what they do not hold as null."""
+    """The rows, older ones with what they do not hold as null, and with the verdict that they have."""
     with tempfile.TemporaryDirectory() as folder, gzip.open(packed) as source:
         (Path(folder) / "trials.jsonl").write_bytes(source.read())
-        return read_rows(folder)
+        rows = read_rows(folder)
+    return list(by_verdict(rows, verdict_of(rows, packed)))
 
 
 def crossed(

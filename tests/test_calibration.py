@@ -9,7 +9,10 @@ from typing import Any
 import pytest
 
 from apo_bench.benchmark.calibration import calibration_lines, calibrations
-from apo_bench.benchmark.journal import OLD_ROWS, UNSAID, read_rows
+from apo_bench.benchmark.confidence import UNKNOWN
+from apo_bench.benchmark.fields import ROW_FIELDS
+from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.recognised import UNCOUNTED
 from apo_bench.benchmark.report import report
 from apo_bench.errors import InputError
 from tests import pages
@@ -54,10 +57,13 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
 
 
 def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:
-    old = {k: v for k, v in row().items() if k not in UNSAID} | {"schema": OLD_ROWS[0]}
-    new = row() | {"seed": 1, "schema": OLD_ROWS[1]}
+    unsaid = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "arm": "six_axis", "timestep_s": 0.001}
+    old = {k: v for k, v in row().items() if k not in unsaid} | {"schema": "apo-bench/row/2"}
+    new = row() | {"seed": 1, "schema": "apo-bench/row/3"}
     folder = write(tmp_path / "old", [old, new])
-    assert read_rows(folder) == [{**UNSAID, **old}, {**UNSAID, **new}]
+    empty = dict.fromkeys(ROW_FIELDS)
+    today = {"success": None, "as_demonstrated": True}
+    assert read_rows(folder) == [{**empty, **unsaid, **old, **today}, {**empty, **unsaid, **new, **today}]
     assert "stick_in_tower, careless human, 0.25 mm clearance" in pages.words(report(folder).page)
     with pytest.raises(InputError, match="a row of schema 'apo-bench/row/1' was given"):
         read_rows(write(tmp_path / "older", [old | {"schema": "apo-bench/row/1"}]))

@@ -31,7 +31,7 @@ def test_an_empty_path_does_not_stand_for_this_folder(command: list[str], capsys
 def test_a_verdict_that_is_none_is_refused(value: Any, tmp_path: Path) -> None:
     for name in ("a", "b"):
         write(tmp_path / name, [row("contact", 1, True) | {"success": value}])
-    with pytest.raises(InputError, match="whose 'success' is neither true, false nor null"):
+    with pytest.raises(InputError, match=r"a/trials\.jsonl, line 1, field success: true or false or null is needed"):
         compare(tmp_path / "a", tmp_path / "b")
 
 
@@ -46,9 +46,11 @@ def second() -> list[dict[str, Any]]:
     made = [{**r, "fidelity": "contact"} for r in first() if r["seed"] != 3]
     for r in made:
         if r["scenario"] == "stick_in_tower" and r["seed"] == 1:
-            r |= {"success": False, "loose_success": True, "failure_stage": "judge", "failure_code": "gap"}
+            lost = {"success": False, "as_demonstrated": False, "loose_success": True}
+            r |= lost | {"failure_stage": "judge", "failure_code": "gap"}
         if r["scenario"] == "stick_in_tower" and r["seed"] == 0:
-            r |= {"success": True, "loose_success": True, "failure_stage": None, "failure_code": None}
+            won = {"success": True, "as_demonstrated": True, "loose_success": True}
+            r |= won | {"failure_stage": None, "failure_code": None}
         if r["scenario"] == "stick_in_tower" and r["seed"] == 2:
             r["worst_gap_mm"] += 0.5
     return [*made, row("contact", 77, True, fidelity="contact")]
@@ -92,13 +94,13 @@ def test_a_sweep_is_the_same_as_itself(folders: tuple[Path, Path]) -> None:
 
 def test_trials_of_one_seed_count_once_where_independence_is_asked_for(tmp_path: Path) -> None:
     ours = [row(method, seed, True) for method in ("paper", "contact") for seed in range(10)]
-    theirs = [{**r, "success": r["seed"] != 4} for r in ours]
+    theirs = [row(r["method"], r["seed"], r["seed"] != 4) for r in ours]
     (a, _) = compare(write(tmp_path / "a", ours), write(tmp_path / "b", theirs)).agreements
     assert (a.same, a.same_everywhere) == ((18, 20), (9, 10))
 
 
 def test_one_run_file_that_is_not_there_is_one_difference(folders: tuple[Path, Path]) -> None:
-    (folders[1] / "run.json").write_text("{", encoding="utf-8")
+    (folders[1] / "run.json").unlink()
     found = compare(*folders)
     assert [(d.what, d.first, d.second) for d in found.differences] == [
         ("run.json can be read", True, None),

@@ -23,8 +23,10 @@ from apo_bench.benchmark import journal as journals
 from apo_bench.benchmark.code_version import code_files
 from apo_bench.benchmark.grid import KEY
 from apo_bench.benchmark.journal import Journal, read_rows
+from apo_bench.benchmark.row import result
 from apo_bench.benchmark.run_file import run_record
 from apo_bench.benchmark.spec import ROW
+from apo_bench.benchmark.stages import Ending
 from apo_bench.benchmark.terms import Terms, versions
 from apo_bench.errors import InputError
 
@@ -42,7 +44,10 @@ def run(**changed: Any) -> dict[str, Any]:
 
 def row(seed: int) -> dict[str, Any]:
     key = ("block_on_block", 0.25, seed, 1.0, 1.0, 1.0, "isotropic", "given", "friction", "none")
-    return {"schema": ROW, "spec_hash": "ab", **dict(zip(KEY, key, strict=True)), "reached": [0.1 * seed] * 50}
+    ended = {"demonstration": "ok", **result(Ending("done", "ok", None, "all was done"), success=True)}
+    ended |= {"sim_seconds": 20.0, "extra_operations": 0}
+    reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
+    return {"schema": ROW, "spec_hash": "ab", **dict(zip(KEY, key, strict=True)), **ended, "reached": reached}
 
 
 def line(seed: int) -> bytes:
@@ -277,8 +282,8 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
             "this version writes 'apo-bench/row/6'",
         ),
         ("trials.jsonl", json.dumps(row(1) | {"schema": "apo-bench/row/9"}) + "\n", "'apo-bench/row/6' is needed"),
-        ("trials.jsonl", "{}\n", "line 1: this is not a row of a sweep"),
-        ("trials.jsonl", "[1, 2]\n", "line 1: this is not a row of a sweep"),
+        ("trials.jsonl", "{}\n", "line 1, field schema: it is missing"),
+        ("trials.jsonl", "[1, 2]\n", "line 1: an object is needed, a list was given"),
         ("trials.jsonl", "\xff\n", "line 1: this is not a row of a sweep"),
     ],
 )

@@ -53,7 +53,18 @@ def test_pure_modules_import_without_any_simulator() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-HEAVY = ("mujoco", "dm_control", "trimesh", "manifold3d", "mink", "matplotlib", "scipy.optimize", "glfw", "OpenGL")
+HEAVY = (
+    "mujoco",
+    "dm_control",
+    "trimesh",
+    "manifold3d",
+    "mink",
+    "matplotlib",
+    "scipy.optimize",
+    "glfw",
+    "OpenGL",
+    "msgspec",
+)
 
 
 def test_importing_the_package_is_light_and_silent() -> None:

@@ -300,7 +300,7 @@ def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
         report(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no finished trial"):
         report(write(tmp_path / "empty", []))
-    with pytest.raises(InputError, match=r"line 2: this is not a row"):
+    with pytest.raises(InputError, match=r"line 2, field schema: it is missing"):
         report(write(tmp_path / "bad", [row(), {"seed": 1}]))
     with pytest.raises(InputError, match="row of schema 'apo-bench/row/1'"):
         report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))

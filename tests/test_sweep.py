@@ -25,7 +25,9 @@ from apo_bench.benchmark import worker
 from apo_bench.benchmark.fingerprint import spec_hash
 from apo_bench.benchmark.grid import KEY, SweepSpec, Unit, load_all, row_key, trial_key, units
 from apo_bench.benchmark.journal import read_rows
+from apo_bench.benchmark.row import result
 from apo_bench.benchmark.spec import ROW
+from apo_bench.benchmark.stages import Ending
 from apo_bench.correction.correct import CORRECTORS
 from apo_bench.errors import InputError
 from apo_bench.scenario_file import load_scenario
@@ -55,8 +57,10 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         assert method == spec.method
         assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
-        hashed = spec_hash(spec, content)
-        return {"schema": ROW, "spec_hash": hashed, **dict(zip(KEY, key, strict=True)), "success": spec.seed % 2 == 0}
+        hashed, success = spec_hash(spec, content), spec.seed % 2 == 0
+        ended = result(Ending("done", "ok", None, "") if success else Ending("judge", "gap", None, ""), success=success)
+        ended |= {"demonstration": "ok", "sim_seconds": 1.0, "extra_operations": 0}
+        return {"schema": ROW, "spec_hash": hashed, **dict(zip(KEY, key, strict=True)), **ended}
 
     monkeypatch.setattr("apo_bench.benchmark.grid.load_scenario", LOAD)
     monkeypatch.setattr(worker, "load_scenario", LOAD)

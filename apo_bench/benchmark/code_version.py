@@ -11,8 +11,8 @@ from importlib.resources.abc import Traversable
 from types import MappingProxyType
 
 AFTERWARDS = """
-    adjust alone area bounded calibration compare confusion crew crew_member crew_process curve effort eye_one
-    failure_pictures falling half_level journal kept_file mcnemar misgivings on_ray one paired parcel parquet
+    adjust alone area bounded calibration compare confusion crew crew_member crew_process csv_file curve effort eye_one
+    failure_pictures falling half_level journal kept_file mcnemar misgivings on_ray one own_code paired parcel parquet
     plan_lines power progress ray_crew ray_driver ray_hand replay_command report run_file slim statistics stopping
     summary sweep sweep_file terminal
 """

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.benchmark.grid import Key, row_key
-from apo_bench.benchmark.page.ran import read_run
 from apo_bench.benchmark.page.settings import at
 from apo_bench.benchmark.paired import tango
+from apo_bench.benchmark.run_file import read_run
 from apo_bench.benchmark.salt import one_salt, with_salt
 from apo_bench.benchmark.slim import NUMBERS, Row, slim_rows
+from apo_bench.benchmark.spec import ROW
 from apo_bench.benchmark.statistics import Cell, Interval, Place, Rate, order, place_of, tally
+from apo_bench.benchmark.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.errors import InputError
 
 RUN = "run.json can be read"
@@ -28,6 +30,8 @@ class Side(NamedTuple):
     folder: Path
     run: Mapping[str, Any]
     rows: Sequence[Row]
+    verdict: str
+    """What its rows have as success: that, or `as_demonstrated`, of older rows."""
 
 
 class Difference(NamedTuple):
@@ -134,10 +138,10 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     grasp and method; fidelity, arm and time step are not, so that they can be compared.
 
     Raises:
-        InputError: A folder is no sweep, holds a trial twice, or both have no trial in common: salts that differ make
-            other trials of the same seeds.
+        InputError: A folder is no sweep, holds a trial twice, both have no trial in common (of other salts a seed is
+            another trial), or one is of older rows with another verdict.
     """
-    sides = [Side(Path(folder), read_run(Path(folder)), slim_rows(folder)) for folder in (first, second)]
+    sides = [_side(Path(folder)) for folder in (first, second)]
     for side in sides:
         if not side.rows:
             raise InputError(f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
@@ -146,6 +150,13 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         raise InputError(
             f"'{first}' was drawn {with_salt(salts[0])} and '{second}' {with_salt(salts[1])}, so that they have no "
             "trial in common, whatever their seeds; compare sweeps of one salt."
+        )
+    if sides[0].verdict != sides[1].verdict:
+        old, new = sides if sides[0].verdict == AS_DEMONSTRATED else sides[::-1]
+        raise InputError(
+            f"the rows in '{old.folder}' are older than '{ROW}' and say only whether all was as demonstrated, those in "
+            f"'{new.folder}' say success, which is another verdict, so the two are not paired; run the older sweep "
+            "again with this version."
         )
     ours, theirs = (_by_key(side) for side in sides)
     both = [key for key in ours if key in theirs]
@@ -204,6 +215,12 @@ def numbers(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
     return tuple(found)
 
 
+def _side(folder: Path) -> Side:
+    rows = slim_rows(folder)
+    verdict = verdict_of(rows, folder)
+    return Side(folder, read_run(folder), by_verdict(rows, verdict), verdict)
+
+
 def _by_key(side: Side) -> dict[Key, Row]:
     found: dict[Key, Row] = {}
     for row in side.rows:
@@ -236,7 +253,7 @@ def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
 
 
 def _identical(a: Row, b: Row) -> bool:
-    told = ("loose_success", "failure_operation", "sentence", "freed")
+    told = ("as_demonstrated", "loose_success", "failure_operation", "sentence", "freed")
     return all(a.get(name) == b.get(name) for name in (*ENDING, *told, *NUMBERS))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from apo_bench.benchmark import verdicts
 from apo_bench.benchmark.compare import Agreement, Comparison, Pair
 from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.method import knows_truth
@@ -71,7 +72,8 @@ def changed_table(found: Comparison) -> Table:
 
 
 def in_words(found: Comparison) -> str:
-    """The whole in two or three sentences."""
+    """The whole in some sentences."""
+    older = verdicts.words(found.first.verdict)
     total = found.agreements[-1]
     low, high = total.same.interval
     return (
@@ -79,7 +81,7 @@ def in_words(found: Comparison) -> str:
         f"alone). Verdicts agree in {total.same.successes:,} of {total.same.trials:,}: {share(total.same.rate)} "
         f"(95 %: {100 * low:.2f} to {100 * high:.2f} %, as if every trial were one of its own; in "
         f"{total.same_everywhere.successes:,} of {total.same_everywhere.trials:,} seeds all of them agree). "
-        f"{found.identical:,} trials are the same to the last digit."
+        f"{found.identical:,} trials are the same to the last digit.{f' {older}' * bool(older)}"
     )
 
 
@@ -89,6 +91,7 @@ def comparison_form(found: Comparison) -> dict[str, Any]:
         "schema": SCHEMA,
         "first": str(found.first.folder),
         "second": str(found.second.folder),
+        "verdict": found.first.verdict,
         "shared": found.shared,
         "first_alone": found.alone[0],
         "second_alone": found.alone[1],

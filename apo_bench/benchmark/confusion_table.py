@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
 from apo_bench.benchmark.confusion import Confusion
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.page.markup import Table
 
 COLUMNS = (
@@ -25,12 +25,11 @@ WORDS = (
 
 def write_confusions(found: Sequence[Confusion], path: Path) -> None:
     """One line per scenario and method, and one of them all."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for c in found:
-            counts = (c.fit_fitted, c.fit_failed, c.fail_fitted, c.fail_failed, c.agreement)
-            writer.writerow([c.scenario, c.method, *counts, c.same_operation, c.stopped, c.not_executed, c.excluded])
+    lines = []
+    for c in found:
+        counts = (c.fit_fitted, c.fit_failed, c.fail_fitted, c.fail_failed, c.agreement)
+        lines.append((c.scenario, c.method, *counts, c.same_operation, c.stopped, c.not_executed, c.excluded))
+    write_csv(path, COLUMNS, lines)
 
 
 def confusion_table(found: Sequence[Confusion]) -> Table:

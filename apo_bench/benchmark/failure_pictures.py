@@ -15,6 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from apo_bench.benchmark.checked import row_of
+from apo_bench.benchmark.grid import row_key
+from apo_bench.benchmark.own_code import left_out, own_code
 from apo_bench.benchmark.replay_command import Files
 from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.spec import TrialSpec
@@ -23,6 +26,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.solid import extent
 from apo_bench.program import Poses
+from apo_bench.reading import each_line
 
 WIDTH, HEIGHT, QUALITY = 640, 480, 82
 NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
@@ -41,15 +45,18 @@ class FailurePicture(NamedTuple):
     """How it was made."""
 
 
-def sample(rows: Iterable[Row], most: int) -> list[Row]:
+def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[Row]:
     """Failures to be drawn: kinds of failure by turns, the most frequent first, methods and scenarios varied.
 
     The same rows, in any order, give the same sample. Trials that were not carried out have nothing to be seen.
+
+    Args:
+        trust_code: Also trials that name code of somebody's own.
     """
     kinds: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         moved = row.get("sim_seconds") and row["failure_stage"] not in (*NOT_EXECUTED, "plan")
-        if row["success"] is False and moved and row["level"] is not None:
+        if row["success"] is False and moved and row["level"] is not None and (trust_code or not own_code(row)):
             kinds.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
     queues = [
         sorted(found, key=_order) for _, found in sorted(kinds.items(), key=lambda kind: (-len(kind[1]), kind[0]))
@@ -78,18 +85,27 @@ def _newest(queue: Sequence[Row], chosen: Sequence[Row]) -> int:
 
 
 def failure_pictures(
-    chosen: Sequence[Row], folder: Path, files: Files | None = None, salt: Salt | None = None
+    chosen: Sequence[Row],
+    folder: Path,
+    files: Files | None = None,
+    salt: Salt | None = None,
+    *,
+    trust_code: bool = False,
 ) -> tuple[list[FailurePicture], list[str]]:
     """The pictures that could be made, and sentences on what could not.
 
     Args:
         folder: Of the sweep, whose rows say where parts ended.
         salt: The one that the trials were drawn with, if any.
+        trust_code: Import code of somebody's own that rows name; else none of it is.
     """
     made: list[FailurePicture] = []
     missed: list[str] = []
     scenes: dict[tuple[Any, ...], Any] = {}
     for row in chosen:
+        if not trust_code and own_code(row):
+            missed.append(left_out([row]))
+            continue
         try:
             made.append(_made(row, folder, files or {}, scenes, salt))
         except (InputError, RuntimeError, OSError, ValueError) as error:
@@ -103,8 +119,11 @@ def _made(
     row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any], salt: Salt | None
 ) -> FailurePicture:
     from apo_bench.benchmark.fingerprint import content_hash, spec_hash
+    from apo_bench.scenario_file import scenario_names
     from apo_bench.simulation.render import picture
 
+    if row["scenario"] not in files and row["scenario"] not in scenario_names():
+        raise InputError(f"run.json says no file of the scenario '{row['scenario']}'")
     spec = replace(spec_of(row, files), salt=salt)
     scene = _scene(spec, scenes)
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
@@ -146,12 +165,12 @@ def spec_of(row: Row, files: Files) -> TrialSpec:
 def whole_row(folder: Path, row: Row) -> dict[str, Any]:
     """The row as it stands in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
     wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["spec_hash"]).encode())
-    with (folder / "trials.jsonl").open("rb") as file:
-        for line in file:
-            if all(part in line for part in wanted):
-                found = json.loads(line)
-                if found["method"] == row["method"] and found["scenario"] == row["scenario"]:
-                    return dict(found)
+    path = folder / "trials.jsonl"
+    for number, line in each_line(path, "table of trials"):
+        if all(part in line for part in wanted):
+            found = row_of(line, f"{path}, line {number}")
+            if row_key(found) == row_key(row):
+                return found
     return {}
 
 

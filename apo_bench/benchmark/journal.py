@@ -1,7 +1,7 @@
 """The folder of a sweep: rows that are only ever appended, whole, and what the sweep was asked to do.
 
 trials.jsonl   one row per trial; nothing but what specification and seed determine
-timing.jsonl   one line per trial: wall times, host, worker; lines that are missing or torn do not matter
+timing.jsonl   one line per trial: wall times, host, worker; lines that are missing do not matter
 run.json       grids, code, content, versions, command line
 torn.txt       half lines that an interrupted sweep left behind, if any
 """
@@ -15,20 +15,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, final
 
-from apo_bench.benchmark.confidence import UNKNOWN
+from apo_bench.benchmark.checked import row_of, unwritable
 from apo_bench.benchmark.grid import Key, row_key
 from apo_bench.benchmark.kept_file import is_there, put_back
-from apo_bench.benchmark.recognised import UNCOUNTED
 from apo_bench.benchmark.run_file import check_same, write_run
 from apo_bench.benchmark.salt import check_one
 from apo_bench.benchmark.spec import ROW
 from apo_bench.errors import InputError
+from apo_bench.reading import each_line
+from apo_bench.writing import check_target, to_write
 
-OLD_ROWS = ("apo-bench/row/2", "apo-bench/row/3", "apo-bench/row/4", "apo-bench/row/5")
-"""Rows that say less: nothing about the test of a correction and its posterior, the eye, the fidelity. Reports still
-read them."""
-UNSAID = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "as_demonstrated_code": None, "salt": None}
-"""What stands in place of what older rows do not say."""
 CHUNK = 1 << 16
 
 
@@ -48,14 +44,14 @@ class Journal:
         """The trials that have a row, and its `spec_hash`."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._trials: IO[bytes] = (folder / "trials.jsonl").open("a+b", buffering=0)
+            self._trials: IO[bytes] = to_write(folder / "trials.jsonl", "a+b", 0)
             try:
                 _lock(self._trials.fileno(), folder)
                 for name in ("trials.jsonl", "timing.jsonl"):
                     _set_torn_line_aside(folder / name)
                 self._read(run)
                 write_run(folder, run)
-                self._timing: IO[bytes] = (folder / "timing.jsonl").open("a+b", buffering=0)
+                self._timing: IO[bytes] = to_write(folder / "timing.jsonl", "a+b", 0)
                 self._size = os.fstat(self._trials.fileno()).st_size
             except BaseException:
                 self._trials.close()
@@ -77,7 +73,13 @@ class Journal:
 
         Raises:
             RuntimeError: The row could not be written, such as on a full disk; what was written of it is taken back.
+                Or it is none by the table of fields, so that nobody could read it again.
         """
+        wrong = unwritable(row)
+        if wrong:
+            raise RuntimeError(
+                f"a row was made that is none ({wrong}); the {len(self.finished)} before it are kept in {self.folder}."
+            )
         self._keep()
         try:
             self._size += _append(self._trials.fileno(), row)
@@ -125,8 +127,8 @@ class Journal:
                     f"'{self.folder}' holds rows of schema '{row['schema']}', and this version writes '{ROW}'; "
                     "choose another folder."
                 )
-            check_one(f"'{self.folder}'", run.get("salt"), row.get("salt"))
-            self.finished[row_key(row)] = row.get("spec_hash", "")
+            check_one(f"'{self.folder}'", run.get("salt"), row["salt"])
+            self.finished[row_key(row)] = row["spec_hash"] or ""
         if self.finished:
             check_same(self.folder, run)
 
@@ -143,31 +145,12 @@ def read_rows(folder: str | Path) -> list[dict[str, Any]]:
 def each_row(folder: str | Path) -> Iterator[dict[str, Any]]:
     """The same, one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
-    try:
-        with path.open("rb") as file:
-            for i, line in enumerate(file, start=1):
-                if line.endswith(b"\n"):
-                    yield _row(line, path, i)
-    except OSError as error:
+    if not path.exists():
         raise InputError(
-            f"the folder '{folder}' holds no sweep ({error.strerror}: {path.name}); give the one that "
-            "`apo-bench sweep --out` wrote."
-        ) from error
-
-
-def _row(line: bytes, path: Path, number: int) -> dict[str, Any]:
-    try:
-        row = json.loads(line)
-        row_key(row)
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"{path}, line {number}: this is not a row of a sweep; remove the line or the folder."
-        ) from error
-    if row.get("schema") in OLD_ROWS:
-        return {**UNSAID, "as_demonstrated": row.get("success"), **row}
-    if row.get("schema") != ROW:
-        raise InputError(f"{path}, line {number}: a row of schema '{row.get('schema')}' was given; '{ROW}' is needed.")
-    return row
+            f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote."
+        )
+    for number, line in each_line(path, "table of trials"):
+        yield row_of(line, f"{path}, line {number}")
 
 
 def _lock(file: int, folder: Path) -> None:
@@ -202,6 +185,7 @@ def _append(file: int, line: Mapping[str, Any]) -> int:
 
 def _set_torn_line_aside(path: Path) -> None:
     """What follows the last end of a line is no row: a copy of it is kept, and it goes."""
+    check_target(path)
     if not path.exists():
         return
     with path.open("rb+") as file:
@@ -214,6 +198,6 @@ def _set_torn_line_aside(path: Path) -> None:
             tail = file.read(end - at)
         torn = tail[tail.rfind(b"\n") + 1 :]
         if torn:
-            with (path.parent / "torn.txt").open("ab") as aside:
+            with to_write(path.parent / "torn.txt", "ab") as aside:
                 aside.write(torn + b"\n")
             file.truncate(end - len(torn))

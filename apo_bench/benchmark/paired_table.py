@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.method import knows_relations
 from apo_bench.benchmark.paired import Paired
@@ -38,14 +38,13 @@ WORDS = (
 
 def write_paired(found: Sequence[Paired], path: Path) -> None:
     """One line per cell, method and reference."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for p in found:
-            counts = (p.pairs, p.only_method, p.only_reference, p.difference, *p.interval, p.p, p.p_adjusted)
-            mended = (*_fields(p.recovered), *_fields(p.harmed))
-            free = (p.free_mm, *(p.free_interval or (None, None)))
-            writer.writerow([*p.place, p.reference, *counts, *mended, p.planned, *free])
+    lines = []
+    for p in found:
+        counts = (p.pairs, p.only_method, p.only_reference, p.difference, *p.interval, p.p, p.p_adjusted)
+        mended = (*_fields(p.recovered), *_fields(p.harmed))
+        free = (p.free_mm, *(p.free_interval or (None, None)))
+        lines.append((*p.place, p.reference, *counts, *mended, p.planned, *free))
+    write_csv(path, COLUMNS, lines)
 
 
 def paired_lines(found: Sequence[Paired]) -> list[str]:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, final
 
+from apo_bench.plain_text import clean
+
 Tell = Callable[[Mapping[str, Any]], None]
 """Takes every row as it comes."""
 BESIDE = ("scenario", "clearance_mm", "grasp", "noise", "relations", "careless", "method")
@@ -36,7 +38,7 @@ def progress(total: int) -> Iterator[Tell]:
         TimeRemainingColumn,
     )
 
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     bar = Progress(
         BarColumn(),
         MofNCompleteColumn(),
@@ -98,7 +100,7 @@ class Rates:
             name = f"{mm:g}" if mm == deg or deg == 0.0 else f"{mm:g}, {deg:g}"
             table.add_column(f"level {name}" if (mm, deg) == levels[0] else name, justify="right", no_wrap=True)
         for line, cells in lines.items():
-            words = [f"{line[i]:g}" if isinstance(line[i], float) else str(line[i]) for i in varying]
+            words = [f"{line[i]:g}" if isinstance(line[i], float) else clean(str(line[i])) for i in varying]
             table.add_row(*words, *(_fraction(cells.get(level)) for level in levels))
         left = len(self._lines) - len(lines)
         if left:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.figure import level_label
 from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.recognised import KINDS
@@ -96,13 +96,12 @@ def recognition_lines(found: Sequence[Recognition]) -> list[str]:
 
 def write_recognitions(found: Sequence[Recognition], path: Path) -> None:
     """One line per place."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for r in found:
-            rates = (r.complete / r.demonstrations, *wilson(r.complete, r.demonstrations))
-            counts = (r.right, r.missed, r.false, r.precision, r.recall)
-            writer.writerow([*r.place, r.demonstrations, r.complete, *rates, *counts])
+    lines = []
+    for r in found:
+        rates = (r.complete / r.demonstrations, *wilson(r.complete, r.demonstrations))
+        counts = (r.right, r.missed, r.false, r.precision, r.recall)
+        lines.append((*r.place, r.demonstrations, r.complete, *rates, *counts))
+    write_csv(path, COLUMNS, lines)
 
 
 def _counted(place: Place, rows: Sequence[Mapping[str, Any]]) -> Recognition:

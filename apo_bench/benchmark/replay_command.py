@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import Any
 
 from apo_bench.benchmark.spec import RANGE, USUAL
-from apo_bench.errors import InputError
 
 USUALLY = {"grasp": "friction", "arm": "six_axis", "timestep_s": 0.001}
 """What a row that does not say means."""
@@ -28,6 +27,7 @@ def replay_command(row: Mapping[str, Any], files: Files | None = None) -> str:
 def without_seed(row: Mapping[str, Any], files: Files | None = None) -> str:
     """The same without the seed: what the trials of a cell have in common."""
     given = str((files or {}).get(row["scenario"], row["scenario"]))
+    given = f"./{given}" if given.startswith("-") else given
     usual = {"eye": RANGE if row["noise"] == RANGE else "noise", "fidelity": "full", **USUALLY}
     return shlex.join(["apo-bench", "replay", given, *_options({**usual, **row}, given)])
 
@@ -74,10 +74,8 @@ def milli(seconds: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _own_clearance(given: str) -> float | None:
-    """What `replay` takes if nothing is said; None if the scenario cannot be read here."""
-    from apo_bench.scenario_file import load_scenario
+    """What `replay` takes if nothing is said; None of scenarios that do not come with the package: no file that a run
+    names is read for it."""
+    from apo_bench.scenario_file import load_scenario, scenario_names
 
-    try:
-        return float(load_scenario(given).clearance_mm)
-    except (InputError, OSError):
-        return None
+    return float(load_scenario(given).clearance_mm) if given in scenario_names() else None

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from apo_bench.benchmark.confusion import Confusion, confusions
 from apo_bench.benchmark.confusion_table import write_confusions
-from apo_bench.benchmark.failure_pictures import failure_pictures, sample
+from apo_bench.benchmark.csv_file import write_csv
+from apo_bench.benchmark.failure_pictures import FailurePicture, failure_pictures, sample
 from apo_bench.benchmark.figure import draw, rows_of
 from apo_bench.benchmark.figure_tightness import draw_tightness, varies
 from apo_bench.benchmark.method import knows_truth
+from apo_bench.benchmark.own_code import left_out
 from apo_bench.benchmark.page.figures import figures_of, methods_of, write_figures
 from apo_bench.benchmark.page.gaps import gaps, write_gaps
 from apo_bench.benchmark.page.halves import write_areas, write_halves
-from apo_bench.benchmark.page.ran import read_run, scenario_files
+from apo_bench.benchmark.page.ran import scenario_files
 from apo_bench.benchmark.page.report_page import Found, report_page
 from apo_bench.benchmark.page.settings import members, settings
 from apo_bench.benchmark.page.times import read_timing, times, write_times
@@ -25,12 +26,16 @@ from apo_bench.benchmark.parquet import parquet_beside, write_columns
 from apo_bench.benchmark.rate_text import failures
 from apo_bench.benchmark.recognised_picture import draw_recognitions
 from apo_bench.benchmark.recognised_table import recognitions, write_recognitions
+from apo_bench.benchmark.replay_command import Files
+from apo_bench.benchmark.run_file import read_run
 from apo_bench.benchmark.salt import Salt, check_one, one_salt, read_salt
 from apo_bench.benchmark.slim import COLUMNS as KEPT
 from apo_bench.benchmark.slim import slim_rows
 from apo_bench.benchmark.statistics import Cell
 from apo_bench.benchmark.summary import Summary, summary
+from apo_bench.benchmark.verdicts import by_verdict, verdict_of
 from apo_bench.errors import InputError
+from apo_bench.writing import check_folders, check_target, to_write
 
 COLUMNS = (
     *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method"),
@@ -46,7 +51,7 @@ OURS = (
     *("prediction.svg", "timing.svg"),
 )
 """Files that not every report has."""
-PAGE, TABLES, FIGURES = "report.html", "tables", "figures"
+PAGE, TABLES, FIGURES, ROWS = "report.html", "tables", "figures", "rows.parquet"
 
 
 class Report(NamedTuple):
@@ -73,14 +78,20 @@ class Report(NamedTuple):
     """Failures that were drawn."""
     no_pictures: tuple[str, ...]
     """Why others were not."""
+    verdict: str
+    """What is counted as success: that, or `as_demonstrated` of older rows."""
 
 
-def report(folder: str | Path, pictures: int = 0, salt_file: str | Path | None = None) -> Report:
+def report(
+    folder: str | Path, pictures: int = 0, salt_file: str | Path | None = None, *, trust_code: bool = False
+) -> Report:
     """Write the page, tables and figures beside the rows of a sweep.
 
     Args:
         pictures: So many failures are drawn at most; most are run again for it, which takes as long as it took.
         salt_file: Of trials that were drawn with a salt; without it none of them is run again.
+        trust_code: Run also trials that name code that does not come with the package. Without it nothing that a file
+            of the folder names is imported.
 
     Raises:
         InputError: No rows there, another salt, or the folder cannot be written.
@@ -92,21 +103,35 @@ def report(folder: str | Path, pictures: int = 0, salt_file: str | Path | None =
     salt = None if salt_file is None else read_salt(salt_file)
     if salt is not None:
         check_one(f"'{folder}'", salt.hash, one_salt(rows))
-    found = summary(rows)
+    verdict = verdict_of(rows, folder)
+    counted = by_verdict(rows, verdict)
+    found = summary(counted)
     if not found.cells:
         raise InputError(
             f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
         )
     try:
+        check_target(folder / PAGE)
+        check_folders(folder / name for name in (TABLES, FIGURES))
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
-        return _written(folder, rows, found, pictures, salt)
+        made = _written(folder, counted, verdict, found, pictures, salt, trust_code)
+        _rows(rows, folder / TABLES / ROWS)
+        return made
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures: int, salt: Salt | None) -> Report:
+def _written(
+    folder: Path,
+    rows: Sequence[Mapping[str, Any]],
+    verdict: str,
+    found: Summary,
+    pictures: int,
+    salt: Salt | None,
+    trust_code: bool,
+) -> Report:
     run, timing = read_run(folder), read_timing(folder)
     files, told, wrong = scenario_files(run), recognitions(rows), confusions(rows)
     gap, took = gaps(rows), times(timing)
@@ -119,11 +144,12 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
     if took:
         write_times(took, tables.setdefault("times", folder / TABLES / "times.csv"))
     made = [path for table in tables.values() for path in (table, parquet_beside(table))]
-    made.append(_rows(rows, folder / TABLES / "rows.parquet"))
+    made.append(folder / TABLES / ROWS)
     svg = write_figures(figures, methods_of(found.cells), folder / FIGURES)
-    taken, missed = failure_pictures(sample(rows, pictures), folder, files, salt) if pictures else ([], [])
+    taken, missed = _pictures(rows, folder, files, pictures, salt, trust_code)
     page = Found(
         name=folder.resolve().name,
+        verdict=verdict,
         rows=rows,
         summary=found,
         grouped=grouped,
@@ -139,7 +165,8 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
         drawn=drawn,
         tables=[str(path.relative_to(folder)) for path in (*made, *drawn.values(), *svg)],
     )
-    (folder / PAGE).write_text(report_page(page), encoding="utf-8", errors="replace")
+    with to_write(folder / PAGE, "w") as file:
+        file.write(report_page(page))
     recognised = (tables["recognised"], drawn["recognised"]) if told else None
     return Report(
         page=folder / PAGE,
@@ -155,7 +182,19 @@ def _written(folder: Path, rows: list[dict[str, Any]], found: Summary, pictures:
         confusions=wrong,
         pictures=len(taken),
         no_pictures=tuple(missed),
+        verdict=verdict,
     )
+
+
+def _pictures(
+    rows: Sequence[Mapping[str, Any]], folder: Path, files: Files, most: int, salt: Salt | None, trust_code: bool
+) -> tuple[list[FailurePicture], list[str]]:
+    if not most:
+        return [], []
+    chosen = sample(rows, most, trust_code=trust_code)
+    taken, missed = failure_pictures(chosen, folder, files, salt, trust_code=trust_code)
+    without = "" if trust_code else left_out(rows)
+    return taken, [*missed, *([without] if without else [])]
 
 
 def _remove_older(folder: Path) -> None:
@@ -194,10 +233,7 @@ def _tables(folder: Path, found: Summary, told: Sequence[Any]) -> dict[str, Path
 
 
 def _write_cells(cells: Sequence[Cell], path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows(_line(cell) for cell in cells)
+    write_csv(path, COLUMNS, (_line(cell) for cell in cells))
 
 
 def _line(c: Cell) -> tuple[object, ...]:
@@ -208,11 +244,10 @@ def _line(c: Cell) -> tuple[object, ...]:
     return (*where, *strict, *executed, *other, failures(c, 99))
 
 
-def _rows(rows: Sequence[Mapping[str, Any]], path: Path) -> Path:
+def _rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """The rows themselves, what was predicted in columns of its own."""
     plain = [name for name in KEPT if name != "predicted"]
     columns = [[row.get(name) for row in rows] for name in plain]
     said = ("fails", "operation", "code")
     foretold = [[None if (p := row.get("predicted")) is None else p[key] for row in rows] for key in said]
     write_columns([*plain, *(f"predicted_{key}" for key in said)], [*columns, *foretold], path)
-    return path

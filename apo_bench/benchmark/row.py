@@ -12,7 +12,16 @@ from apo_bench.benchmark.stages import Ending
 from apo_bench.scenario import Scenario
 
 Row = dict[str, Any]
-"""One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1."""
+"""One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1. What each
+field may be stands in `fields.ROW_FIELDS`."""
+LONGEST_SENTENCE = 1000
+LARGEST = 1e15
+"""Of a number that physics or a solver gave; beyond, sums and pictures of it say nothing."""
+
+
+def finite(x: float | None) -> float | None:
+    """A number that a row can hold, else null."""
+    return float(x) if x is not None and abs(x) <= LARGEST else None
 
 
 def head(spec: TrialSpec, scenario: Scenario, hashed: str) -> Row:
@@ -53,7 +62,7 @@ def result(end: Ending, *, success: bool | None) -> Row:
         "failure_stage": end.stage if end.failed else None,
         "failure_code": end.code if end.failed else None,
         "failure_operation": None if end.operation is None else end.operation + 1,
-        "sentence": end.sentence,
+        "sentence": end.sentence[:LONGEST_SENTENCE],
         "as_demonstrated_code": None,
         "conditions": None,
         "worst_gap_mm": None,

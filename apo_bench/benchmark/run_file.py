@@ -9,11 +9,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from apo_bench.benchmark.checked import run_of
 from apo_bench.benchmark.salt import Salt
 from apo_bench.benchmark.terms import Terms
 from apo_bench.errors import InputError
+from apo_bench.reading import read_bytes
+from apo_bench.writing import to_write
 
 RUN = "apo-bench/run/3"
+LARGEST_BYTES = 16_000_000
 
 
 def run_record(
@@ -50,21 +54,32 @@ def run_record(
 def write_run(folder: Path, run: Mapping[str, Any]) -> None:
     """Replace the file at once: it is the old one or the new one, never half of it."""
     beside = folder / "run.json.new"
-    with beside.open("w", encoding="utf-8") as file:
-        file.write(json.dumps(run, indent=2) + "\n")
+    with to_write(beside) as file:
+        file.write(json.dumps(run, indent=2).encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())
     os.replace(beside, folder / "run.json")
 
 
+def read_run(folder: Path) -> dict[str, Any]:
+    """What `run.json` says; nothing if it is not there.
+
+    Raises:
+        InputError: It cannot be read, or is something else; one sentence with file and field.
+    """
+    path = folder / "run.json"
+    return run_of(read_bytes(path, "run file", LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
+
+
 def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     """Raise an `InputError` that says what differs, unless a folder is of the same sweep; it may have fewer trials."""
-    path = folder / "run.json"
     try:
-        before = json.loads(path.read_text(encoding="utf-8"))
-        schema = before["schema"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"'{folder}' has trials but no readable run.json; choose another folder.") from error
+        before = read_run(folder)
+    except InputError as error:
+        raise InputError(f"'{folder}' has trials but no readable run.json ({error}); choose another folder.") from error
+    schema = before.get("schema")
+    if schema is None:
+        raise InputError(f"'{folder}' has trials but no readable run.json; choose another folder.")
     if schema != RUN:
         raise InputError(f"'{folder}' has a run.json of schema '{schema}', '{RUN}' is needed; choose another folder.")
     now = json.loads(json.dumps(run))

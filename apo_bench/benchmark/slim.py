@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.journal import each_row
-from apo_bench.benchmark.spec import RANGE
-from apo_bench.errors import InputError
 
 NUMBERS: Mapping[str, str] = {
     "gap_before_mm": "gap as seen [mm]",
@@ -42,11 +39,6 @@ TESTED = (
 )
 COLUMNS = (*SAID, *TESTED, *NUMBERS)
 """What is kept of a row; the rest (thresholds, conditions, final poses, attempts) is read again where it is needed."""
-NEEDED = ("demonstration", "success", "as_demonstrated", "loose_success", "failure_stage", "failure_code")
-"""What every row says, besides its key."""
-USUAL = {"fidelity": "full", "arm": "six_axis", "timestep_s": 0.001}
-"""What a row that does not say means."""
-
 Row = dict[str, Any]
 
 
@@ -57,35 +49,16 @@ def slim_rows(folder: str | Path) -> list[Row]:
         InputError: No such folder, no trials in it, or a line that is not a whole row.
     """
     foretold: dict[Any, Any] = {}
-    return [_slim(row, foretold, folder) for row in each_row(folder)]
+    return [_slim(row, foretold) for row in each_row(folder)]
 
 
-def _slim(row: Mapping[str, Any], foretold: dict[Any, Any], folder: str | Path) -> Row:
-    for name in NEEDED:
-        if name not in row:
-            raise _wrong(row, folder, f"without '{name}'")
-    for name in ("success", "as_demonstrated", "loose_success"):
-        if row[name] is not None and type(row[name]) is not bool:
-            raise _wrong(row, folder, f"whose '{name}' is neither true, false nor null ({row[name]!r})")
-    for name in NUMBERS:
-        x = row.get(name)
-        if x is not None and (type(x) not in (int, float) or not math.isfinite(x)):
-            raise _wrong(row, folder, f"whose '{name}' is no number ({x!r})")
-    kept = {name: row.get(name) for name in COLUMNS}
+def _slim(row: Mapping[str, Any], foretold: dict[Any, Any]) -> Row:
+    kept = {name: row[name] for name in COLUMNS}
     for name, value in kept.items():
         if type(value) is str:
             kept[name] = sys.intern(value)
-    kept["eye"] = kept["eye"] or (RANGE if kept["noise"] == RANGE else "noise")
     said = kept["predicted"]
     if said is not None:
         what = (said["fails"], said["operation"], said["code"])
         kept["predicted"] = foretold.setdefault(what, dict(zip(("fails", "operation", "code"), what, strict=True)))
-    return {**USUAL, **{name: value for name, value in kept.items() if value is not None or name not in USUAL}}
-
-
-def _wrong(row: Mapping[str, Any], folder: str | Path, what: str) -> InputError:
-    which = f"{row['scenario']}, {row['method']}, seed {row['seed']}"
-    return InputError(
-        f"'{folder}' holds a row {what} ({which}), so it is not as `apo-bench sweep` wrote it; remove the row or the "
-        "folder."
-    )
+    return kept

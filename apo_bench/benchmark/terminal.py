@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from apo_bench.benchmark import verdicts
 from apo_bench.benchmark.confusion import confusions
 from apo_bench.benchmark.confusion_table import summary
 from apo_bench.benchmark.figure import level_label
@@ -16,6 +17,7 @@ from apo_bench.benchmark.method import knows_relations, knows_truth
 from apo_bench.benchmark.rate_text import failures, interval, percent
 from apo_bench.benchmark.spec import RANGE
 from apo_bench.benchmark.statistics import Cell
+from apo_bench.plain_text import clean
 from apo_bench.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ def print_scenarios(scenarios: Sequence[Scenario]) -> None:
     """Name, operations, title and place in the paper of each."""
     table = Table("scenario", "operations", "title", "paper", box=None, pad_edge=False)
     for s in scenarios:
-        table.add_row(s.name, str(len(s.assembly)), s.title, s.paper)
+        _add(table, s.name, str(len(s.assembly)), s.title, s.paper)
     _console().print(table)
 
 
@@ -38,7 +40,7 @@ def print_row(row: Mapping[str, Any]) -> None:
     """One trial, from what was asked to how it ended."""
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, value in _lines(row):
-        table.add_row(name, value)
+        _add(table, name, value)
     _console().print(table)
 
 
@@ -59,7 +61,7 @@ def print_cells(cells: Sequence[Cell]) -> None:
         met = {"noise": not knows_truth(c.method), "relations": knows_relations(c.method)}
         axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
         rates = (percent(c.rate), interval(c), str(c.trials), percent(c.demonstrated_rate), percent(c.loose_rate))
-        table.add_row(c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))
+        _add(table, c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))
     _console().print(table)
     excluded = sum(c.excluded for c in cells)
     if excluded:
@@ -68,7 +70,13 @@ def print_cells(cells: Sequence[Cell]) -> None:
 
 def print_report(made: Report) -> None:
     """Where everything was written, and in one line how often plans foretold what happened."""
-    say = _console().print
+    console = _console()
+
+    def say(text: str) -> None:
+        console.print(clean(text))
+
+    if made.verdict != verdicts.SUCCESS:
+        say(verdicts.words(made.verdict))
     say(summary(made.confusions[-1]))
     if made.no_pictures:
         say(f"{made.pictures} failures were drawn; of others: {'; '.join(made.no_pictures)}")
@@ -89,17 +97,23 @@ def print_comparison(found: Comparison) -> None:
     for i, name in enumerate(said.head):
         table.add_column(name, justify="left" if i < said.words else "right")
     for row in said.rows:
-        table.add_row(*("–" if x is None else str(x) for x in row))
-    _console().print(in_words(found))
+        _add(table, *("–" if x is None else str(x) for x in row))
+    _console().print(clean(in_words(found)))
     _console().print(table)
     names = [d.what for d in found.differences]
     more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
-    _console().print(f"Not the same: {', '.join(names[:MOST_NAMES])}{more}" if names else "Made with the same.")
+    differ = clean(f"Not the same: {', '.join(names[:MOST_NAMES])}{more}")
+    _console().print(differ if names else "Made with the same.")
 
 
 def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:
     """In one line, how often plans foretold what happened."""
     _console().print(summary(confusions(rows)[-1]))
+
+
+def _add(table: Table, *cells: str) -> None:
+    """A row of texts, whatever they hold."""
+    table.add_row(*map(clean, cells))
 
 
 def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:

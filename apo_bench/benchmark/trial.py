@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -15,7 +14,7 @@ from apo_bench.benchmark.method import knows_relations, knows_truth, parsed
 from apo_bench.benchmark.planning import Planned, plan
 from apo_bench.benchmark.recognised import KINDS as RECOGNISED
 from apo_bench.benchmark.recognised import counted, understood
-from apo_bench.benchmark.row import Row, head, result
+from apo_bench.benchmark.row import Row, finite, head, result
 from apo_bench.benchmark.spec import RANGE, TrialSpec
 from apo_bench.benchmark.stages import (
     Shown,
@@ -190,15 +189,15 @@ def _physics(tried: Tried, plan: Plan, truth: Array | None) -> Row:
         "as_demonstrated_code": verdict.demonstrated.code,
         "loose_success": verdict.loose_success,
         "conditions": dict(found.conditions),
-        "worst_gap_mm": _finite(found.gap_mm),
-        "worst_angle_deg": _finite(found.angle_deg),
-        "least_overlap": _finite(found.overlap),
-        "penetration_mm": _finite(found.penetration_mm),
-        "pushed_mm": _finite(found.pushed_mm),
+        "worst_gap_mm": finite(found.gap_mm),
+        "worst_angle_deg": finite(found.angle_deg),
+        "least_overlap": finite(found.overlap),
+        "penetration_mm": finite(found.penetration_mm),
+        "pushed_mm": finite(found.pushed_mm),
         "reached": _poses(result.reached.final),
-        "pose_error_fixed_mm": _finite(fixed),
-        "pose_error_free_mm": _finite(free),
-        "peak_force_n": _finite(result.peak_force_n),
+        "pose_error_fixed_mm": finite(fixed),
+        "pose_error_free_mm": finite(free),
+        "peak_force_n": finite(result.peak_force_n),
         "sim_seconds": result.sim_seconds,
     }
 
@@ -212,9 +211,4 @@ def _poses(final: Snapshot | None) -> Mapping[str, list[float]] | None:
 
 
 def _mm(metres: float) -> float | None:
-    return _finite(metres * 1e3)
-
-
-def _finite(x: float | None) -> float | None:
-    """A number that JSON can hold, else null."""
-    return float(x) if x is not None and math.isfinite(x) else None
+    return finite(metres * 1e3)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, final
 
+from apo_bench.benchmark.checked import unwritable
 from apo_bench.benchmark.fingerprint import content_hash, spec_hash
 from apo_bench.benchmark.grid import KEY, Unit
 from apo_bench.benchmark.method import parsed
@@ -31,7 +32,6 @@ Timing = dict[str, Any]
 Emit = Callable[[Row, Timing], None]
 """Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
 ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
-LONGEST_SENTENCE = 1000
 
 
 @final
@@ -118,6 +118,8 @@ class Worker:
 def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
     """The row of a trial, also of one whose corrector misbehaved.
 
+    What code of somebody's own returned may be what no row can hold; that is its failure too.
+
     Args:
         more: As `run_trial` takes it.
 
@@ -125,11 +127,14 @@ def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: An
         InputError: The request cannot be honoured.
     """
     try:
-        return run_trial(spec, scene, shown=shown, content=content, **more)
+        row = run_trial(spec, scene, shown=shown, content=content, **more)
+        wrong = unwritable(row) if ":" in spec.method else ""
+        said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
     except Lost as error:
         return lost(spec, content, error.code)
     except Misbehaved as error:
-        return misbehaved(spec, content, shown.demonstration.code, str(error))
+        wrong = said = str(error)
+    return misbehaved(spec, content, shown.demonstration.code, said) if wrong else row
 
 
 def lost(spec: TrialSpec, content: str, code: str) -> Row:
@@ -159,7 +164,7 @@ def misbehaved(spec: TrialSpec, content: str, demonstration: str, said: str) -> 
     Args:
         said: What it did; addresses of objects, which differ from run to run, are left out.
     """
-    said = ADDRESS.sub("0x...", said.encode(errors="replace").decode())[:LONGEST_SENTENCE]
+    said = ADDRESS.sub("0x...", said.encode(errors="replace").decode())
     return _failed(spec, content, demonstration, Ending("correct", "raised", None, said))
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.benchmark import compare_text as text
 from apo_bench.benchmark.compare import Comparison
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.page.document import Section, document
 from apo_bench.benchmark.page.markup import Html, Table, joined, prose, tag
 from apo_bench.benchmark.parquet import parquet_beside
 from apo_bench.errors import InputError
+from apo_bench.writing import check_folders, to_write
 
 AGREEMENT = (
     "The same trials in both: how often the strict verdict is the same, with Wilson's interval, and how often stage "
@@ -49,9 +50,11 @@ def write_comparison(found: Comparison, folder: Path) -> Written:
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        check_folders([folder])
         paths = [_write(table, folder / f"{name}.csv") for name, table in tables.items()]
         page = folder / "compare.html"
-        page.write_text(comparison_page(found, tables), encoding="utf-8", errors="replace")
+        with to_write(page, "w") as file:
+            file.write(comparison_page(found, tables))
     except OSError as error:
         raise InputError(f"--out {folder} cannot be written ({error.strerror}); choose another place.") from error
     return Written(page, tuple(paths))
@@ -83,10 +86,7 @@ def _changed(found: Comparison, table: Table) -> Html:
 
 
 def _write(table: Table, path: Path) -> Path:
-    with path.open("w", newline="", encoding="utf-8", errors="replace") as file:
-        writer = csv.writer(file)
-        writer.writerow(_names(table.head))
-        writer.writerows(table.rows)
+    write_csv(path, _names(table.head), table.rows)
     parquet_beside(path)
     return path
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.figure import Style, level_label
 from apo_bench.benchmark.method import knows_relations
 from apo_bench.benchmark.page.chart import HEIGHT, Axes, Entry, Panel, Point, panel
@@ -77,10 +77,7 @@ def gap_table(found: Sequence[Gap]) -> Table:
 
 def write_gaps(found: Sequence[Gap], path: Path) -> None:
     """One line per cell."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows((*g.place, g.trials, *g.seen, *g.planned) for g in found)
+    write_csv(path, COLUMNS, ((*g.place, g.trials, *g.seen, *g.planned) for g in found))
 
 
 def gap_panels(grouped: Mapping[Setting, Sequence[Gap]], looks: Mapping[str, tuple[int, Style]]) -> list[Panel]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
 from apo_bench.benchmark.area import Area, AreaDifference
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.curve import Setting
 from apo_bench.benchmark.half_level import HalfLevel
 from apo_bench.benchmark.page.markup import Table
@@ -50,24 +50,22 @@ def difference_table(found: Sequence[AreaDifference]) -> Table:
 
 def write_halves(found: Sequence[HalfLevel], path: Path) -> None:
     """One line per method and setting; a limit beyond the levels tried is empty."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(HALF)
-        for h in found:
-            limits = (h.level, h.low, h.high, h.surely_over, h.surely_under)
-            writer.writerow((*h.setting, h.smallest, h.largest, h.trials, *limits))
+    lines = []
+    for h in found:
+        limits = (h.level, h.low, h.high, h.surely_over, h.surely_under)
+        lines.append((*h.setting, h.smallest, h.largest, h.trials, *limits))
+    write_csv(path, HALF, lines)
 
 
 def write_areas(areas: Sequence[Area], differences: Sequence[AreaDifference], path: Path) -> None:
     """Areas, whose reference is empty, and their differences to those of a reference."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(AREA)
-        for a in areas:
-            writer.writerow((*a.setting, None, min(a.levels), max(a.levels), a.seeds, a.area, *a.interval))
-        for d in differences:
-            between = (min(d.levels), max(d.levels), d.seeds, d.difference, *d.interval)
-            writer.writerow((*d.setting, d.reference, *between))
+    lines: list[tuple[object, ...]] = [
+        (*a.setting, None, min(a.levels), max(a.levels), a.seeds, a.area, *a.interval) for a in areas
+    ]
+    for d in differences:
+        between = (min(d.levels), max(d.levels), d.seeds, d.difference, *d.interval)
+        lines.append((*d.setting, d.reference, *between))
+    write_csv(path, AREA, lines)
 
 
 def _where(s: Setting) -> tuple[str, str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from apo_bench.benchmark.page.markup import Html, Table, joined, tag
@@ -13,19 +12,9 @@ LONG = 400
 """Longer values are cut; they stand in the file."""
 
 
-def read_run(folder: Path) -> dict[str, Any]:
-    """What `run.json` says; nothing if it is not there or is something else."""
-    try:
-        said = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return said if isinstance(said, dict) else {}
-
-
 def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
     """Scenarios that were given as files: name -> path."""
-    files = run.get("files")
-    return {str(k): str(v) for k, v in files.items()} if isinstance(files, dict) else {}
+    return dict(run.get("files") or {})
 
 
 def ran(run: Mapping[str, Any], rows: Mapping[str, Any]) -> Html:

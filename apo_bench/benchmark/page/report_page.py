@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
+from apo_bench.benchmark import verdicts
 from apo_bench.benchmark.calibration import WORDS as CALIBRATION
 from apo_bench.benchmark.calibration import calibration_table, calibrations
 from apo_bench.benchmark.confusion import Confusion
@@ -46,6 +47,8 @@ class Found:
 
     name: str
     """Of the folder."""
+    verdict: str
+    """What is counted as success."""
     rows: Sequence[Row]
     summary: Summary
     grouped: Mapping[Setting, Sequence[Cell]]
@@ -132,7 +135,8 @@ def _lead(found: Found) -> Html:
         + level_meaning(rows)
     )
     boxes = tag("dl", *(tag("div", tag("dt", name), tag("dd", value)) for name, value in tiles), class_="tiles")
-    return joined([prose(words, "lead"), boxes])
+    older = verdicts.words(found.verdict)
+    return joined([*([tag("p", tag("strong", older), class_="lead")] if older else []), prose(words, "lead"), boxes])
 
 
 def _success(found: Found, numbers: Mapping[Any, int]) -> Html:

@@ -10,6 +10,7 @@ from apo_bench.benchmark.page.chart import WIDTH, Entry, Panel
 from apo_bench.benchmark.page.files import page_file
 from apo_bench.benchmark.page.markup import Html, joined, tag
 from apo_bench.benchmark.page.paint import palette
+from apo_bench.writing import to_write
 
 ACROSS = 3
 LETTERS = 62
@@ -41,7 +42,8 @@ def write_sheet(title: str, panels: Sequence[Panel], methods: Sequence[str], key
     ground = tag("rect", width=width, height=y, fill="#ffffff")
     inside = (tag("style", Html(style)), ground, *body)
     made = tag("svg", *inside, xmlns="http://www.w3.org/2000/svg", viewBox=f"0 0 {width} {y}", width=width, height=y)
-    path.write_text(made + "\n", encoding="utf-8")
+    with to_write(path, "w") as file:
+        file.write(made + "\n")
 
 
 def _key(key: Sequence[Entry], width: int) -> tuple[Html, int]:

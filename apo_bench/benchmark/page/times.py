@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
 
+from apo_bench.benchmark.checked import timing_of
+from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.page.chart import WIDTH, Panel
 from apo_bench.benchmark.page.markup import Html, Table, html
 from apo_bench.benchmark.statistics import rank
+from apo_bench.reading import each_line
 
 PARTS = ("compile_s", "demonstrate_s", "trial_s")
 LEFT, RIGHT, STEP = 118, 16, 20
@@ -50,13 +52,16 @@ class Work:
 
 
 def read_timing(folder: Path) -> list[dict[str, Any]]:
-    """The lines that can be read; nothing hangs on the others, or on the file."""
+    """The lines of trials that were timed; none if there is no such file.
+
+    Raises:
+        InputError: The file cannot be read, or a line is none; one sentence with file, line and field.
+    """
     path = folder / "timing.jsonl"
-    try:
-        lines = path.read_bytes().splitlines()
-    except OSError:
+    if not os.path.lexists(path):
         return []
-    return [line for line in map(_line, lines) if line is not None]
+    lines = [timing_of(line, f"{path}, line {number}") for number, line in each_line(path, "table of timings")]
+    return [line for line in lines if line["trial_s"] is not None]
 
 
 def times(lines: Iterable[Mapping[str, Any]]) -> tuple[Times, ...]:
@@ -73,7 +78,7 @@ def work(lines: Iterable[Mapping[str, Any]]) -> tuple[Work, ...]:
     groups: dict[tuple[str, str], list[float]] = {}
     for line in lines:
         busy = sum(float(line.get(part) or 0.0) for part in PARTS)
-        groups.setdefault((str(line.get("host", "")), str(line.get("worker", ""))), []).append(busy)
+        groups.setdefault((_known(line.get("host")), _known(line.get("worker"))), []).append(busy)
     return tuple(Work(*key, len(groups[key]), sum(groups[key])) for key in sorted(groups))
 
 
@@ -97,10 +102,7 @@ def work_table(found: Sequence[Work]) -> Table:
 
 def write_times(found: Sequence[Times], path: Path) -> None:
     """One line per scenario and method."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows((t.scenario, t.method, t.trials, t.low, t.median, t.high, t.total) for t in found)
+    write_csv(path, COLUMNS, ((t.scenario, t.method, t.trials, t.low, t.median, t.high, t.total) for t in found))
 
 
 def time_panels(found: Sequence[Times]) -> list[Panel]:
@@ -148,10 +150,5 @@ def _times(scenario: str, method: str, seconds: Sequence[float]) -> Times:
     return Times(scenario, method, len(seconds), low, median, high, float(sum(seconds)))
 
 
-def _line(text: bytes) -> dict[str, Any] | None:
-    try:
-        line = json.loads(text)
-        float(line["trial_s"])
-        return line if {"scenario", "method"} <= set(line) else None
-    except (ValueError, KeyError, TypeError):
-        return None
+def _known(x: object) -> str:
+    return "" if x is None else str(x)

@@ -1,0 +1,16 @@
+"""Text from anywhere, for a terminal: it is shown and not obeyed."""
+
+from __future__ import annotations
+
+import re
+
+OBEYED = "\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+CONTROL = re.compile(f"[{OBEYED}]")
+"""What a terminal obeys instead of showing it, and what turns the direction of text."""
+UNSHOWN = re.compile(f"[{OBEYED}\ud800-\udfff]")
+"""The same, and halves of letters, which names of files that are not UTF-8 hold."""
+
+
+def clean(text: str) -> str:
+    """One line in which control characters stand as `\\x1b`."""
+    return UNSHOWN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)

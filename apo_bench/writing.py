@@ -1,0 +1,76 @@
+"""Files are written here: ordinary ones only, and never through a link."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+from typing import IO, Any
+
+from apo_bench.errors import InputError
+
+KINDS = (
+    (stat.S_ISLNK, "a symbolic link"),
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISREG, "a file"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def to_write(path: Path, mode: str = "wb", buffering: int = -1) -> IO[Any]:
+    """Open an ordinary file to write it; `mode` and `buffering` as `open` takes them, text is UTF-8.
+
+    Raises:
+        InputError: A link or anything else that is no ordinary file stands there.
+        OSError: It cannot be opened.
+    """
+    check_target(path)
+    text = {} if "b" in mode else {"encoding": "utf-8", "errors": "replace", "newline": ""}
+    return open(path, mode, buffering, opener=_unlinked, **text)  # type: ignore[call-overload]
+
+
+def check_target(path: Path) -> None:
+    """Raise an `InputError` if something else than an ordinary file stands where one is to be written."""
+    found = _mode(path)
+    if found is not None and not stat.S_ISREG(found):
+        raise InputError(f"{path} is {_kind(found)}, and only an ordinary file is written over; remove it.")
+
+
+def check_folders(folders: Iterable[Path]) -> None:
+    """Raise an `InputError` if something else than a folder stands where one is to be, or if in one of them there is
+    anything but folders and ordinary files."""
+    for folder in folders:
+        found = _mode(folder)
+        if found is None:
+            continue
+        if not stat.S_ISDIR(found):
+            raise InputError(f"{folder} is {_kind(found)}, where a folder is needed; remove it.")
+        for path in sorted(folder.iterdir()):
+            inside = _mode(path)
+            if inside is not None and not stat.S_ISDIR(inside):
+                check_target(path)
+
+
+def _unlinked(path: str, flags: int) -> int:
+    return os.open(path, flags | _flag("O_NOFOLLOW") | _flag("O_NONBLOCK"), 0o666)
+
+
+def _mode(path: Path) -> int | None:
+    """Of what stands there, links not followed; None if nothing does."""
+    try:
+        return os.lstat(path).st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def _kind(mode: int) -> str:
+    return next((name for found, name in KINDS if found(mode)), "something else")
+
+
+def _flag(name: str) -> int:
+    """Zero where the system has no such flag."""
+    return int(getattr(os, name, 0))
