@@ -5,10 +5,13 @@ from __future__ import annotations
 import gc
 import json
 import os
+import signal
 import socket
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -42,7 +45,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="what a process leave
 TOWER = scenes.stick_in_tower()
 SEEN = scenes.seen(TOWER, TOWER.goals @ pose.exp(np.full(6, 1e-3)))
 HOSTILE = """
-import gc, json, os, signal, subprocess, sys, threading, time
+import gc, json, os, signal, subprocess, sys, tempfile, time
 import numpy as np
 from apo_bench import judge
 from apo_bench.correction.contact import contact, contact_drop
@@ -146,6 +149,10 @@ def helpers(seen):
         time.sleep(600)
     return seen.goals
 
+def fills(seen):
+    with tempfile.TemporaryFile() as file:
+        file.truncate(1 << 31)
+
 def nonsense(seen):
     return "goals"
 
@@ -216,6 +223,7 @@ ENDS = {
     "leaves": (None, r"raised SystemExit\(0\)"),
     "unspeakable": (None, r"raised Mute\(\)"),
     "exhausts": (None, "MemoryError"),
+    "fills": (None, "File too large"),
     "nonsense": (None, "returned a str"),
     "wide": (None, "a position of 1e\\+09 m"),
     "odd": (None, "raised ValueError"),
@@ -266,6 +274,32 @@ def test_what_it_leaves_behind_is_ended(found: OwnCorrectors) -> None:
     assert not sleeping
     found.close()
     assert not [pid for pid in descendants(os.getpid()) if "hostile" in _text(Path(f"/proc/{pid}/cmdline"))]
+
+
+@LINUX
+def test_a_fork_ends_with_the_process_of_its_module(folder: Path) -> None:
+    """Whoever kills that one alone, as a cluster does with the children of its workers."""
+    with OwnCorrectors(limit_s=60.0) as correctors:
+        hanging = correctors.find("hostile:hangs")
+        process = correctors._servers["hostile"]._process
+        assert process is not None
+        asking = threading.Thread(target=lambda: suppressed(correct, SEEN, hanging))
+        asking.start()
+        end = time.monotonic() + 60.0
+        while not (forks := descendants(process.pid)) and time.monotonic() < end:
+            time.sleep(0.01)
+        os.kill(process.pid, signal.SIGKILL)
+        asking.join(60.0)
+        assert not asking.is_alive()
+        while (left := [pid for pid in forks if _text(Path(f"/proc/{pid}/cmdline"))]) and time.monotonic() < end:
+            time.sleep(0.01)
+        assert len(forks) == 1
+        assert not left
+
+
+def suppressed(function: Any, *given: Any) -> None:
+    with suppress(Misbehaved):
+        function(*given)
 
 
 def _text(path: Path) -> str:

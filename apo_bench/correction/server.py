@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import select
 import signal
 import socket
@@ -28,6 +29,8 @@ NOTICE = struct.Struct("!Ii")
 TURN_S = 0.02
 DEATH_SIGNAL, SUBREAPER = 1, 36
 """Of `prctl`, on Linux."""
+LARGEST_FILE = 1 << 30
+"""Bytes; also of a file that standard error goes to, so that endless output does not fill the disk."""
 LIKELIEST = "1000"
 """Where memory runs out, this goes first."""
 USUAL = "scipy.special"
@@ -49,6 +52,9 @@ def main(control: int, module: str, fork: bool) -> None:
     _prctl(SUBREAPER, 1)
     with suppress(OSError), open("/proc/self/oom_score_adj", "w") as file:
         file.write(LIKELIEST)
+    for what, most in ((resource.RLIMIT_FSIZE, LARGEST_FILE), (resource.RLIMIT_CORE, 0)):
+        with suppress(OSError, ValueError):
+            resource.setrlimit(what, (most, most))
     import_module(USUAL)
     _prctl(DEATH_SIGNAL, signal.SIGKILL)
     with suppress(BaseException):
@@ -91,6 +97,7 @@ def _serve(asking: socket.socket, fork: bool) -> None:
             child = os.fork() if fork else 0
             if child == 0:
                 if fork:
+                    _prctl(DEATH_SIGNAL, signal.SIGKILL)
                     asking.close()
                 _do(given[0])
             os.close(given[0])
