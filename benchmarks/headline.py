@@ -132,7 +132,7 @@ def page(cells: Sequence[Cell], pairs: Sequence[Paired], ran: Mapping[str, Any],
         "[table.csv](../benchmarks/results/headline/table.csv), rows (without the poses reached) in `rows.jsonl.xz` "
         "beside it.",
         "",
-        "Strict success with a friction grasp and 0.25 mm clearance per side, Wilson's 95 % intervals. A level of L is "
+        "Success with a friction grasp and 0.25 mm clearance per side, Wilson's 95 % intervals. A level of L is "
         "a standard deviation of L mm and L degrees per axis; carelessness 0 is a human who puts parts where they "
         "belong, 1 one who adjusts them later, as in the paper. The same seeds for every method.",
         "",
@@ -236,7 +236,7 @@ def agreed(full: Path, contact: Path) -> list[str]:
         "## Fidelity",
         "",
         "The same trials at fidelity `full`, in which every step of every motion is simulated: how many have the same "
-        "strict verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first. Trials of "
+        "verdict, and how many the same verdict, stage and code; Wilson's 95 % interval of the first. Trials of "
         "one seed share their random numbers; the last column counts the seeds with the same verdict in all trials.",
         "",
         "| scenario | trials | same verdict | interval | same ending | right at `full` alone | at `contact` alone "

@@ -185,7 +185,7 @@ def rows() -> list[dict[str, Any]]:
     errors = {"contact": 1.0, "paper": 1.5, "none": 2.0}
     noise = np.random.default_rng(3).normal(0, 0.1, (10, 3))
     return [
-        row(m, seed, seed in right[m], planned_error_free_mm=errors[m] + noise[seed, i])
+        row(m, seed, seed in right[m], planned_error_fixed_mm=0.1, planned_error_free_mm=errors[m] + noise[seed, i])
         for i, m in enumerate(right)
         for seed in range(10)
     ]

@@ -49,7 +49,7 @@ class Agreement:
 
     scenario: str
     same: Rate
-    """Trials whose strict verdict is the same; those whose demonstration was right in neither are left out."""
+    """Trials whose verdict is the same; those whose demonstration was right in neither are left out."""
     same_ending: Rate
     """Trials whose verdict, stage and code are the same."""
     same_everywhere: Rate

@@ -18,8 +18,9 @@ HEADER = (
     *("right operation", "not executed", "excluded"),
 )
 WORDS = (
-    "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides (strict). An operation "
-    "is right where the robot stopped at the one that was predicted. A method that gave no plan has nothing executed."
+    "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides: *fitted* is made as "
+    "demonstrated. An operation is right where the robot stopped at the one that was predicted. A method that gave no "
+    "plan has nothing executed."
 )
 
 

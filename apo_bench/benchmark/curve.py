@@ -42,7 +42,7 @@ class Curve:
     """(k,), rising, in mm (and the same number of degrees where poses are drawn)."""
     seeds: tuple[int, ...]
     success: Array
-    """(n, k): 1 right, 0 wrong (strict), NaN where there is no result."""
+    """(n, k): 1 right, 0 wrong, NaN where there is no result."""
 
     def at(self, levels: Array) -> Array:
         """(n, ...) the columns of some of the levels."""

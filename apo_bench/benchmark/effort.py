@@ -19,7 +19,7 @@ WORDS = (
 @final
 @dataclass(frozen=True)
 class Effort:
-    """Over every level and carelessness of a sweep, of the trials that were right in the strict sense."""
+    """Over every level and carelessness of a sweep, of the trials that were a success."""
 
     scenario: str
     method: str

@@ -96,7 +96,7 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
                 continue
             axis.set_title(row.title(f), fontsize=10)
             _panel(axis, [c for c in cells if row.holds(c)], f)
-        across[0].set_ylabel("strict success")
+        across[0].set_ylabel("success")
     figure.supxlabel(level_axis(row.noise for row in rows), fontsize=10)
     legend(figure, axes, width)
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)

@@ -41,7 +41,7 @@ def draw_tightness(cells: Sequence[Cell], path: Path) -> None:
                 continue
             axes[i][j].set_title(row.title(f), fontsize=10)
             _panel(axes[i][j], [c for c in seen if c.careless == f and row.holds(c)])
-        axes[i][0].set_ylabel("strict success")
+        axes[i][0].set_ylabel("success")
     figure.supxlabel("tightness: clearance per side over level [mm per mm]", fontsize=10)
     legend(figure, axes, len(columns))
     figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)

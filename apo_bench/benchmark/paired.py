@@ -34,7 +34,7 @@ class Paired:
     pairs: int
     """Seeds of which both have a result."""
     only_method: int
-    """Seeds at which the method alone was right (strict)."""
+    """Seeds at which the method alone was right."""
     only_reference: int
     both: int
     """Seeds at which both were right."""

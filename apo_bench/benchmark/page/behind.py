@@ -15,6 +15,7 @@ from apo_bench.benchmark.slim import NUMBERS
 from apo_bench.benchmark.statistics import Cell, by_place
 
 FAILED, RIGHT, LOOSE, EXCLUDED = "failed", "right", "loosely right", "excluded"
+OTHERWISE = "right, not as demonstrated"
 DIGITS = 4
 """Significant digits of the numbers behind a cell."""
 
@@ -81,7 +82,7 @@ def verdict(row: Mapping[str, Any]) -> str:
     if row["success"] is None:
         return EXCLUDED
     if row["success"]:
-        return RIGHT
+        return RIGHT if row["as_demonstrated"] else OTHERWISE
     return LOOSE if row["loose_success"] else FAILED
 
 

@@ -15,7 +15,7 @@ from apo_bench.errors import InputError
 from apo_bench.writing import check_folders, to_write
 
 AGREEMENT = (
-    "The same trials in both: how often the strict verdict is the same, with Wilson's interval, and how often stage "
+    "The same trials in both: how often success is the same, with Wilson's interval, and how often stage "
     "and code of a failure are as well. Trials of one seed share their random numbers, so those "
     "intervals are too narrow where disagreements come in bunches; *same in all* counts the seeds with which every "
     "trial has the same verdict in both, and these are independent. *Right in the first alone* are trials "

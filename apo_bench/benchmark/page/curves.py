@@ -44,7 +44,7 @@ def _success(setting: Setting, cells: Sequence[Cell], looks: Looks) -> Panel:
         levels=levels,
         labels=[level_words(level, setting.noise) for level in levels],
         below=level_unit(setting.noise),
-        beside="strict success",
+        beside="success",
         low=0.0,
         high=1.0,
         ticks=SHARES,

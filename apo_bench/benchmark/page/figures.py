@@ -48,9 +48,7 @@ def figures_of(
     ceiling = any(cell.method == "oracle" for cell in found.cells)
     keen = {m: look for m, look in looks.items() if m != "none"}
     made = {
-        "success_over_level": Figure(
-            "Strict success over level", success_panels(grouped, looks), entries(looks, ceiling)
-        ),
+        "success_over_level": Figure("Success over level", success_panels(grouped, looks), entries(looks, ceiling)),
         "failure_stages": Figure("Where trials failed", stack_panels(grouped), stage_entries(found.cells)),
         "gap_before_and_after": Figure(
             "Gap of the contacts as seen and as planned",

@@ -70,6 +70,8 @@ def _button(cell: Cell, setting: Setting, numbers: Mapping[Place, int], opened: 
     opened.add(number)
     tip = f"{setting.title()}; {said}; 95 %: {interval(cell)}; excluded {cell.excluded}"
     small = [tag("small", interval(cell)), tag("small", f"n {cell.trials}")]
+    if cell.demonstrated != cell.successes:
+        small.append(tag("small", f"as demonstrated: {percent(cell.demonstrated_rate)}"))
     if cell.not_executed:
         done = cell.executed
         small.append(

@@ -93,7 +93,7 @@
     const first = cell === 0 ? 0 : found.ends[cell - 1];
     const all = [];
     for (let i = first; i < found.ends[cell]; i += 1) all.push(i);
-    const failures = all.filter((i) => !["right", "excluded"].includes(trial(found, i).verdict));
+    const failures = all.filter((i) => !["right", "right, not as demonstrated", "excluded"].includes(trial(found, i).verdict));
     panel.replaceChildren(made("h4", button.dataset.title));
     const tools = made("div", null, { className: "tools" });
     const only = made("input", null, { type: "checkbox" });

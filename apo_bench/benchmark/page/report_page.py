@@ -130,10 +130,7 @@ def _lead(found: Found) -> Html:
         ("demonstrations left out", f"{excluded:,} of {shown:,}"),
         ("fidelity", fidelity),
     )
-    words = (
-        "How often the replay of an observed assembly fits, by strict judgement, with and without correction. "
-        + level_meaning(rows)
-    )
+    words = "How often the replay of an observed assembly fits, with and without correction. " + level_meaning(rows)
     boxes = tag("dl", *(tag("div", tag("dt", name), tag("dd", value)) for name, value in tiles), class_="tiles")
     older = verdicts.words(found.verdict)
     return joined([*([tag("p", tag("strong", older), class_="lead")] if older else []), prose(words, "lead"), boxes])
@@ -141,7 +138,9 @@ def _lead(found: Found) -> Html:
 
 def _success(found: Found, numbers: Mapping[Any, int]) -> Html:
     words = (
-        "Strict success with Wilson's 95 % interval and the number of trials. A cell opens the trials behind it, each "
+        "Success, that the finished assembly is right, with Wilson's 95 % interval and the number of trials; below it, "
+        "where it is not the same, how many were also made as demonstrated: each contact when and where it was shown. "
+        "A cell opens the trials behind it, each "
         "with the command that runs it again. `oracle` replays the drawn layout, without noise or carelessness; "
         "`none` replays what was seen; neither is told what touches what. A method that refuses or does not converge "
         "counts as failed; success among the trials that were carried out stands below where it differs. "
