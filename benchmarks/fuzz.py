@@ -13,6 +13,7 @@ traceback, in 10 s of processor time and 1 GB of memory, and say one sentence at
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
 import platform
@@ -116,6 +117,7 @@ def prepared(work: Path) -> Mapping[str, Kind]:
                         raise RuntimeError(f"{arguments} ended with exit code {code}")
         finally:
             sys.stdout = stdout
+    gc.freeze()
     return made
 
 
@@ -267,6 +269,9 @@ def lines(found: Sequence[Ended]) -> list[str]:
     table.append(
         f"slowest: {slowest.cpu_s:.1f} s (case {slowest.case}); largest: {largest.mb:.0f} MB (case {largest.case})"
     )
+    for kind in sorted({case.kind for case in found}):
+        spent = [case.cpu_s for case in found if case.kind == kind]
+        table.append(f"{kind:24}{sum(spent) / len(spent):20.2f} s of processor time in the mean")
     wrong = [case for case in found if case.ending not in FINE]
     return table + [
         f"case {case.case}, {case.kind}, {case.level}: {case.ending}: {' '.join(case.arguments)}\n{case.said}"
