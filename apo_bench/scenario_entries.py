@@ -23,6 +23,8 @@ from apo_bench.strict_json import Node
 
 MOST_PARTS, MOST_OPERATIONS, MOST_CONTACTS, MOST_SHIFTS = 50, 100, 50, 20
 """In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
+ARM = "arm"
+"""What the robot is called in a scene."""
 RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
 LEVEL = 1e-6
@@ -68,6 +70,8 @@ def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
 def _part(node: Node, name: str, folder: Path, solids: dict[Path, Solid]) -> Part:
     if not NAME.fullmatch(name):
         refuse(node, f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores")
+    if name == ARM:
+        refuse(node, f"a part cannot be called '{ARM}', as the robot is; give it another name")
     keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
     fixed = "fixed" in keys and keys["fixed"].flag()
     follows = "follows_site" in keys and keys["follows_site"].flag()

@@ -12,6 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import InputError, unknown
+from apo_bench.plain_text import UNSHOWN
 from apo_bench.resources import folder
 from apo_bench.scenario import Carelessness, Preference, Scenario, Site
 from apo_bench.scenario_attach import with_lines
@@ -43,7 +44,12 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     if isinstance(given, Scenario):
         return given
     path = _path(given)
-    scenario, stated = _scenario(read_toml(path, "scenario file"), path)
+    document = read_toml(path, "scenario file")
+    if UNSHOWN.search(path.stem):
+        raise InputError(
+            f"{path}: the file's name, which the scenario gets, holds control characters; rename the file."
+        )
+    scenario, stated = _scenario(document, path)
     check_scenario(scenario, str(path))
     return with_lines(scenario, stated, str(path))
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.plain_text import UNSHOWN
 from apo_bench.reading import read_text
 
 DEEPEST = 32
@@ -96,6 +97,8 @@ class Node:
     def text(self) -> str:
         if not isinstance(self.value, str):
             self.fail("a text in quotes is needed")
+        if UNSHOWN.search(self.value.replace("\n", " ").replace("\t", " ")):
+            self.fail("a text without control characters is needed")
         return self.value
 
     def flag(self) -> bool:

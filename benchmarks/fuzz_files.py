@@ -53,36 +53,36 @@ def kinds(work: Path) -> Mapping[str, Kind]:
             {"s.toml": mine, "rod.xml": part},
             ["rod.xml"],
             (*[["scenarios", "s.toml"]] * 3, ["scene", "s.toml", "--out", "scene.xml"]),
-            16,
+            18,
         ),
-        "scenario": Kind({"s.toml": scenario}, ["s.toml"], (*show, ["scene", "s.toml", "--out", "scene.xml"]), 14),
-        "scenario with groups": Kind({"s.toml": pockets}, ["s.toml"], show, 6),
-        "sweep": Kind({"w.toml": _SWEEP, "taken": b""}, ["w.toml"], (["sweep", "w.toml", "--out", "taken"],), 10),
-        "noise": Kind({"n.toml": noise}, ["n.toml"], (["noise", "card", "n.toml"],), 10),
+        "scenario": Kind({"s.toml": scenario}, ["s.toml"], (*show, ["scene", "s.toml", "--out", "scene.xml"]), 16),
+        "scenario with groups": Kind({"s.toml": pockets}, ["s.toml"], show, 8),
+        "sweep": Kind({"w.toml": _SWEEP, "taken": b""}, ["w.toml"], (["sweep", "w.toml", "--out", "taken"],), 12),
+        "noise": Kind({"n.toml": noise}, ["n.toml"], (["noise", "card", "n.toml"],), 4),
         "observation, JSON": Kind(
-            {"o.json": _json(files.observation_form(seen, SCENARIO))}, ["o.json"], [[*c, "o.json"] for c in of_file], 12
+            {"o.json": _json(files.observation_form(seen, SCENARIO))}, ["o.json"], [[*c, "o.json"] for c in of_file], 10
         ),
-        "observation, CSV": Kind({"o.csv": _observed(seen)}, ["o.csv"], [[*c, "o.csv"] for c in of_file], 12),
+        "observation, CSV": Kind({"o.csv": _observed(seen)}, ["o.csv"], [[*c, "o.csv"] for c in of_file], 10),
         "plan": Kind(
             {"p.json": _json(files.plan_form(Plan(seen.assembly, seen.start, seen.goals), SCENARIO))},
             ["p.json"],
             (["read-plan", "p.json"],),
-            8,
+            10,
         ),
         "estimates and truth": Kind(
             {"e.csv": estimates, "t.csv": truth, "g.json": scene},
             ["e.csv", "t.csv", "g.json"],
             [["noise", "fit", "--estimates", "e.csv", "--truth", name, *more] for name, more in _TRUTHS],
-            6,
+            8,
         ),
         "residuals": Kind(
-            {"r.csv": _residuals(work, estimates, truth)}, ["r.csv"], (["noise", "card", "empirical:r.csv"],), 8
+            {"r.csv": _residuals(work, estimates, truth)}, ["r.csv"], (["noise", "card", "empirical:r.csv"],), 4
         ),
         "run folder": Kind(
             {f"{name}/{file}": raw for name in ("a", "b") for file, raw in run.items()},
             [f"a/{file}" for file in run],
             (["report", "a", "--pictures", "0"], *[["compare", "a", "b", "--out", "c"]] * 3),
-            8,
+            10,
         ),
     }
     return made

@@ -61,6 +61,8 @@ BROKEN = {
     "goal_flag": (GOAL3, "goal = { at_mm = [0, 0, true] }", ["operation 3, goal, at_mm", "3 finite numbers"]),
     "turn_far": ("[180, 0, 0] }\ncontacts", "[1e5, 0, 0] }\ncontacts", ["operation 2, goal, turn_deg", "360"]),
     "unknown_part_file": ('file = "stick"', 'file = "stik"', ["parts, stick, file", "did you mean 'stick'"]),
+    "named_arm": ("[parts.stick]", "[parts.arm]", ["parts, arm", "as the robot is"]),
+    "title_obeyed": ("A stick into", "A \\u001b[2Jstick into", ["title", "a text without control characters"]),
     "many_parts": (
         "[site]\n",
         "".join(f'[parts.p{k}]\nfile = "block"\nfixed = true\n' for k in range(50)) + "[site]\n",
@@ -487,3 +489,10 @@ def test_a_part_may_be_moved_often_if_each_move_is_of_use(tmp_path: Path):
     once = text.replace(AWAY_TWICE, AWAY)
     path.write_text(once.replace(STICK_IN, stop + STICK_IN))
     assert [operation.main for operation in load_scenario(path).assembly.operations].count("cube") == 3
+
+
+@pytest.mark.parametrize("name", ["a\x01b.toml", "\udcff.toml", "a\x1b[2Jb.toml"])
+def test_a_file_whose_name_a_scene_cannot_have_is_refused(name: str, tmp_path: Path):
+    path = tmp_path / name
+    path.write_text(TOWER, encoding="utf-8")
+    assert "holds control characters; rename the file" in refused(path)
