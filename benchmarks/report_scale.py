@@ -56,6 +56,7 @@ def row(rng: np.random.Generator, seed: int, **where: Any) -> dict[str, Any]:
     success = bool(rng.random() < 0.9 / (1.0 + where["level"] * METHODS[::-1].index(where["method"]) / 4))
     stage, code = (None, None) if success else ENDINGS[int(rng.integers(len(ENDINGS)))]
     drawn = {name: float(x) for name, x in zip(NUMBERS, rng.lognormal(0.0, 2.0, len(NUMBERS)), strict=True)}
+    drawn |= {"p_value": float(rng.random()), "extra_operations": int(rng.integers(9))}
     poses = {part: rng.normal(0.0, 100.0, 7).tolist() for part in ("castle1", "castle2", "stick", "table")}
     return {
         "schema": ROW,
@@ -71,6 +72,7 @@ def row(rng: np.random.Generator, seed: int, **where: Any) -> dict[str, Any]:
         "timestep_s": 0.001,
         "demonstration": "ok",
         "success": success,
+        "as_demonstrated": success,
         "loose_success": success,
         "failure_stage": stage,
         "failure_code": code,
