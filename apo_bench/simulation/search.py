@@ -16,12 +16,12 @@ from apo_bench.simulation.transfer import Grip, Transfer
 
 YAWS_DEG, YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
 """Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
-BACK_M, BACK = 0.0005, 0.005
-"""Drawn back so far, a part touches nothing ahead while it is brought to where a spiral begins, so fast [m/s]."""
+BACK_M, BACK, BRING = 0.0005, 0.005, 0.03
+"""Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
 DEEP_M = 0.001
 """What goes so much deeper than where it was stopped has found the hole."""
 SEARCHES = 3
-"""A motion is searched for so many times at most, in one transfer up to twice as often: 15 s at most for each."""
+"""A motion is searched for so many times at most, in one transfer up to twice as often."""
 PIECE_M, NOTHING_M = 0.01, 1e-6
 """Giving way, the tip goes on in pieces of this length; less than the second is nothing."""
 
@@ -99,7 +99,7 @@ def ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
 def _bring(robot: Robot, T: Array, way: Array) -> None:
     """Back first, so that nothing is touched on the way."""
     robot.follow(smooth(robot.T, moved(robot.T, way, -BACK_M), BACK))
-    robot.follow(smooth(robot.T, T, BACK))
+    robot.follow(smooth(robot.T, T, BRING))
 
 
 def _turned(yaw_deg: float, about: Array) -> Array:
