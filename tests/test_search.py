@@ -27,8 +27,12 @@ def scene(name):
 
 
 @cache
+def shown(name):
+    return show(scene(name), 0.0, 1)
+
+
 def layout(name):
-    return show(scene(name), 0.0, 1).layout
+    return shown(name).layout
 
 
 def aside(name, mm):
@@ -73,7 +77,7 @@ def test_what_is_farther_off_than_the_spiral_is_not_found():
 
 def row(method, level, branches=None):
     spec = TrialSpec("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
-    return run_trial(spec, scene("stick_in_tower"), branches=branches)
+    return run_trial(spec, scene("stick_in_tower"), shown=shown("stick_in_tower"), branches=branches)
 
 
 def test_where_no_hole_is_missed_nothing_changes():
