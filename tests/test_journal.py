@@ -74,6 +74,18 @@ def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path
         assert len(journal.finished) == 4
 
 
+def test_rows_are_put_back_where_the_current_folder_is_gone_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with Journal(Path("run"), run()) as journal:
+        journal.append(row(0), {})
+        shutil.rmtree(tmp_path / "here")
+        assert [one["seed"] for one in journal.rows()] == [0]
+    assert (tmp_path / "here" / "run" / "trials.jsonl").read_bytes() == line(0)
+
+
 def test_rows_that_are_cut_off_meanwhile_are_said_to_be_lost(tmp_path: Path) -> None:
     with Journal(tmp_path, run()) as journal:
         journal.append(row(0), {})

@@ -39,10 +39,11 @@ class Journal:
             InputError: The folder cannot be written, is being written, or holds trials of another sweep.
         """
         self.folder = folder
-        self._place, self._run = folder.absolute(), run
+        self._run = run
         self.finished: dict[Key, str] = {}
         """The trials that have a row, and its `spec_hash`."""
         try:
+            self._place = folder.absolute()
             folder.mkdir(parents=True, exist_ok=True)
             self._trials: IO[bytes] = to_write(folder / "trials.jsonl", "a+b", 0)
             try:
@@ -95,7 +96,7 @@ class Journal:
     def rows(self) -> list[dict[str, Any]]:
         """All rows of the folder."""
         self._keep()
-        return read_rows(self.folder)
+        return read_rows(self._place)
 
     def _keep(self) -> None:
         """Put the files back where they were if somebody has removed them.
