@@ -6,10 +6,11 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from typing import Any
 
 import pytest
 
-from benchmarks import switches
+from benchmarks import processors, switches
 from benchmarks.switches import EXPECTED, Kernels, Switch
 
 OWN = Kernels(("SkylakeX", "SkylakeX"), ("X86_V3", "X86_V4"), ("znver4", "+avx2"))
@@ -72,3 +73,28 @@ def test_a_process_says_when_it_has_not_the_kernels_that_it_was_started_for(monk
     assert "not" in str(switches.missing())
     monkeypatch.delenv(EXPECTED)
     assert switches.missing() is None
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({}, []),
+        ({"as_demonstrated": False, "failure_stage": "judge"}, [("stick_in_tower", "paper", 1)]),
+        ({"success": False}, [("stick_in_tower", "paper", 1)]),
+    ],
+)
+def test_a_verdict_that_differs_is_told_whatever_the_bits(change: dict[str, Any], told: list[processors.Trial]) -> None:
+    asked = processors.trials(["stick_in_tower"], ["paper", "none"], 2)
+    assert asked == [("stick_in_tower", m, seed) for m in ("none", "paper") for seed in (0, 1)]
+    plain = [{"as_demonstrated": m == "paper", "success": m == "paper", "failure_stage": None} for _, m, _ in asked]
+    first = {"bits": {"stick_in_tower": "0"}, "rows": plain}
+    found = processors.compared(Switch("", {}, OWN), asked, {**first, "rows": [*plain[:3], plain[3] | change]}, first)
+    assert found["demonstrations with other bits"] == ["stick_in_tower"]
+    assert [(d["scenario"], d["method"], d["seed"]) for d in found["verdicts that differ"]] == told
+
+
+def test_what_was_kept_of_the_repeated_verdicts_names_its_kernels() -> None:
+    kept = json.loads(processors.RESULT.read_text(encoding="utf-8"))
+    assert kept["runs"][0]["switch"] == "none"
+    assert len({(tuple(run["openblas"]), tuple(run["numpy"])) for run in kept["runs"]}) == len(kept["runs"]) > 1
+    assert len({run["trials"] for run in kept["runs"]}) == 1
