@@ -1,12 +1,12 @@
 """What strangers' files do to the command line: valid files of every kind, made wrong, thousands of times.
 
-    python -m benchmarks.fuzz [--cases 10000] [--seed 0] [--workers 1] [--write] [--case N]
+    python -m benchmarks.fuzz [--cases 10000] [--seed 0] [--workers 1] [--write [FILE]] [--case N]
 
 Every case draws a kind of file, changes one file of it in one to four places (bytes, tokens or structure, see
 `fuzz_mutate.py`) or puts something in its place that is no file, and runs one command that reads it:
 `apo_bench.cli.main`, in a fork of this process, in a folder of its own. It must end with exit code 0, 1 or 2, without a
 traceback, in 10 s of processor time and 1 GB of memory, and say one sentence at most that a terminal only shows.
-`--case N` runs one case again and shows it; `--write` writes the counts to `results/fuzz.json`. Case i is drawn from
+`--case N` runs one case again and shows it; `--write` writes the counts, to `results/fuzz.json`. Case i is drawn from
 `default_rng([seed, i])`.
 """
 
@@ -66,7 +66,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--case", type=int)
-    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--write", type=Path, nargs="?", const=RESULT)
     asked = parser.parse_args()
     if asked.case is not None:
         with tempfile.TemporaryDirectory() as work:
@@ -77,7 +77,7 @@ def main() -> int:
     for line in lines(found):
         print(line)
     if asked.write:
-        RESULT.write_text(json.dumps(summary(found, asked.seed, time.perf_counter() - began), indent=1) + "\n")
+        asked.write.write_text(json.dumps(summary(found, asked.seed, time.perf_counter() - began), indent=1) + "\n")
     return int(any(case.ending not in FINE for case in found))
 
 
@@ -92,7 +92,7 @@ def fuzz(cases: int, seed: int, workers: int = 1) -> list[Ended]:
             if child := os.fork():
                 children.append(child)
                 continue
-            with sheet.open("w") as out:
+            with sheet.open("w", buffering=1) as out:
                 for case in range(w, cases, workers):
                     out.write(json.dumps(run_case(made, seed, case, work)) + "\n")
             os._exit(0)
