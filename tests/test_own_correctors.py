@@ -23,7 +23,7 @@ from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.terms import Terms
 from apo_bench.benchmark.trial import run_trial
 from apo_bench.benchmark.worker import Worker
-from apo_bench.correction import own
+from apo_bench.correction import own_process
 from apo_bench.correction.correct import Misbehaved, correct
 from apo_bench.correction.forms import (
     correction_message,
@@ -315,7 +315,7 @@ def _text(path: Path) -> str:
 
 
 def test_a_request_without_fork_has_a_process_of_its_own(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(own, "can_fork", lambda: False)
+    monkeypatch.setattr(own_process, "can_fork", lambda: False)
     with OwnCorrectors() as correctors:
         for _ in range(2):
             with pytest.raises(Misbehaved, match="kept 1;"):

@@ -1,7 +1,7 @@
 """The process in which a corrector of one's own lives: it imports the module once, and each request has a fork of that.
 
-Started by `own` as a new interpreter that knows nothing but the name of the module. A request comes as one end of a
-socket of its own; this process never reads it, so that no fork finds what another was asked. Standard output is
+Started by `own_process` as a new interpreter that knows nothing but the name of the module. A request comes as one end
+of a socket of its own; this process never reads it, so that no fork finds what another was asked. Standard output is
 standard error here, and whatever a fork leaves behind is ended.
 """
 
