@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -146,6 +146,7 @@ def test_among_is_some_of_the_equations(seed: int) -> None:
 def test_words_are_relative_poses(seed: int) -> None:
     scene = random_scene(seed)
     _, small = both(scene)
+    assume(len(small))
     history = placed(scene.assembly, scene.start, scene.goals)
     for (contact, made, _), word in zip(scene.assembly.relations(), small.words(scene.goals), strict=True):
         a, b = (history[made][end.part] for end in contact)
