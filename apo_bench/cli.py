@@ -34,7 +34,7 @@ from apo_bench.arguments import check_writable
 from apo_bench.cli_replay import NO_RESULT, ArmOption, Clearance, GraspOption, ScenarioArgument, Timestep
 from apo_bench.cli_sweep import Interrupted
 from apo_bench.errors import InputError
-from apo_bench.plain_text import clean
+from apo_bench.plain_text import brief, clean
 
 app = typer.Typer(
     add_completion=False,
@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _complain(sentence: str, code: int) -> int:
     with suppress(OSError):
-        typer.echo(f"apo-bench: {clean(sentence)}", err=True)
+        typer.echo(f"apo-bench: {brief(clean(sentence))}", err=True)
     return code
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 MOST = 20
 """A longer list of names helps nobody."""
+LONGEST = 200
+"""So much of a name that is not known is said again."""
 
 
 class InputError(ValueError):
@@ -21,7 +23,7 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     hint = f"; did you mean '{near[0]}'?" if near else "."
     shown = names if len(names) <= MOST else get_close_matches(given, names, n=MOST, cutoff=0.3)
     more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
-    return f"unknown {kind} '{given}'{hint} Known: {', '.join(shown) or 'none'}{more}."
+    return f"unknown {kind} '{given[:LONGEST]}'{hint} Known: {', '.join(shown) or 'none'}{more}."
 
 
 def failed(what: str, error: Exception) -> InputError:

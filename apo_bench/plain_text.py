@@ -10,7 +10,14 @@ CONTROL = re.compile(f"[{OBEYED}]")
 UNSHOWN = re.compile(f"[{OBEYED}\ud800-\udfff]")
 """The same, and halves of letters, which names of files that are not UTF-8 hold."""
 
+LONGEST = 1500
+
 
 def clean(text: str) -> str:
     """One line in which control characters stand as `\\x1b`."""
     return UNSHOWN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def brief(text: str) -> str:
+    """Without the middle of what is too long to be read."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"

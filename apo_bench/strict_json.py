@@ -40,7 +40,7 @@ class Node:
         raise InputError(f"{place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
 
     def child(self, value: Any, key: str) -> Node:
-        return Node(value, self.file, f"{self.key}, {key}" if self.key else key)
+        return Node(value, self.file, f"{self.key}, {key[:60]}" if self.key else key[:60])
 
     def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, Node]:
         """The members of an object: every required key, no unknown one."""

@@ -36,7 +36,7 @@ import numpy as np
 from apo_bench import __version__, cli
 from apo_bench.errors import InputError
 from benchmarks.fuzz_files import Kind, kinds
-from benchmarks.fuzz_mutate import mutated
+from benchmarks.fuzz_mutate import RAN, mutated
 
 RESULT = Path(__file__).parent / "results" / "fuzz.json"
 LONGEST_S, LARGEST_MB, PATIENCE_S = 10, 1000, 60
@@ -196,6 +196,8 @@ def _forked(place: Path, arguments: Sequence[str]) -> tuple[str, float, float, s
             else:
                 time.sleep(0.002)
         said, printed = ((file.seek(0), file.read(1_000_000).decode(errors="replace"))[1] for file in (err, out))
+    if arguments[0] not in ("report", "compare"):
+        said = said.replace(f"{RAN}\n", "")
     cpu_s, mb = used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
     return _ending(status, cpu_s, mb, until == np.inf, printed, said), round(cpu_s, 2), round(mb), said[-3000:]
 
@@ -207,6 +209,8 @@ def _ending(status: int, cpu_s: float, mb: float, waited: bool, printed: str, sa
         return f"signal {os.WTERMSIG(status)}"
     if "Traceback (most recent call last)" in said or "recursion depth" in said:
         return "traceback"
+    if RAN in said:
+        return RAN
     if mb > LARGEST_MB:
         return f"more than {LARGEST_MB} MB"
     if (code := os.WEXITSTATUS(status)) not in (0, 1, 2):

@@ -14,7 +14,7 @@ import pytest
 
 from apo_bench.resources import folder
 from benchmarks import fuzz
-from benchmarks.fuzz_mutate import STRUCTURES, mutated
+from benchmarks.fuzz_mutate import RAN, STRUCTURES, mutated, named
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="cases run in forks of one process")
 
@@ -48,6 +48,7 @@ def test_a_hundred_cases_end_in_one_sentence_or_a_result(tmp_path: Path) -> None
         ("x = bytearray(1_200_000_000)", "more than 1000 MB"),
         ("x = bytearray(20_000_000_000)", "traceback"),
         ("print('fine')", "exit code 0"),
+        ("from benchmarks.fuzz_mutate import named\nnamed()", "exit code 0"),
     ],
 )
 def test_what_it_looks_for_is_seen(code: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,6 +58,11 @@ def test_what_it_looks_for_is_seen(code: str, ending: str, tmp_path: Path, monke
 
     monkeypatch.setattr(fuzz.cli, "main", run)
     assert fuzz._forked(tmp_path, ["scenarios"])[0] == ending
+
+
+def test_a_report_that_runs_what_a_file_names_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz.cli, "main", lambda _: named() or 0)
+    assert fuzz._forked(tmp_path, ["report", "a"])[0] == RAN
 
 
 def test_one_that_never_ends_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
