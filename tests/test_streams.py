@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from apo_bench.cli import main
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is a device of Linux")
 RUN = f"{sys.executable} -m apo_bench.cli"
 FULL, BROKEN, CLOSED = "No space left on device", "Broken pipe", "standard output is closed"
@@ -38,3 +40,11 @@ def test_letters_that_the_terminal_does_not_have(tmp_path: Path) -> None:
     done = subprocess.run(["bash", "-c", command], capture_output=True, check=False, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.count(b"\n") == 1
+
+
+def test_what_is_too_long_to_be_read_is_said_without_its_middle(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenarios", "x" * 100_000 + ".toml"]) == 2
+    said = capsys.readouterr().err
+    assert len(said) < 2000
+    assert said.startswith("apo-bench: xxx")
+    assert said.endswith("check the path.\n")
