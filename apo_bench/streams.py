@@ -53,8 +53,9 @@ def give_up(error: OSError) -> str:
     if error.filename is not None:
         return f"{error.filename}: {error.strerror}."
     with suppress(OSError, ValueError, AttributeError):
-        sys.stdout.flush()
-        return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
+        if not isinstance(error, BrokenPipeError):
+            sys.stdout.flush()
+            return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
     with suppress(OSError, ValueError):
         _lead_nowhere(1)
     sys.stdout = sys.__stdout__

@@ -40,7 +40,7 @@ class Row:
         """Finite, in the unit that the size of the column's own unit is counted in."""
         _, text, unit = self.cells[meaning]
         try:
-            x = math.nan if "_" in text else float(text) * unit
+            x = float(text) * unit if text.isascii() and "_" not in text else math.nan
         except ValueError:
             x = math.nan
         if not abs(x) <= largest:

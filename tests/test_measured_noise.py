@@ -243,7 +243,7 @@ def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> Non
     assert_allclose(camera.T_world_camera, Camera().T_world_camera)
 
 
-@pytest.mark.parametrize("freedom", ["inf", "1e301", f"1{400 * '0'}", "1000"])
+@pytest.mark.parametrize("freedom", ["inf", "1e301", f"1{300 * '0'}", "1000"])
 def test_many_degrees_of_freedom_are_a_gaussian(freedom: str, tmp_path: Path) -> None:
     path = tmp_path / "noise.toml"
     path.write_text(GOOD.replace("along_degrees_of_freedom = 0.89326", f"along_degrees_of_freedom = {freedom}", 1))
@@ -268,7 +268,7 @@ GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
         ("along_scale_mm = 13.59\n", "", "the key 'along_scale_mm' is missing"),
         ("along_degrees_of_freedom = 0.89326", "along_degrees_of_freedom = 0.1", "from 0.5 on, or inf, is needed"),
         ("limit_mm = 50", "limit_mm = inf", "limit_mm: a number from 0.001 to 1000 is needed"),
-        ("limit_mm = 50", f"limit_mm = 1{400 * '0'}", "limit_mm: a number from 0.001 to 1000 is needed"),
+        ("limit_mm = 50", f"limit_mm = 1{400 * '0'}", "limit_mm: whole numbers go to 1e308, a larger one was given"),
         ("[turn]", "[turns]", "unknown key 'turns'; did you mean 'turn'"),
         ("[turn]", "[turn", "this is not TOML: .*line"),
     ],

@@ -216,7 +216,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
         raise Carried
 
     monkeypatch.setattr(trial, "attempt", attempt)
-    spec = TrialSpec("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, seed=5)
+    spec = TrialSpec("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
     with pytest.raises(Carried):
         trial.run_trial(spec, scene, shown=shown, content="any")
     expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import Never, final
 
+import numpy as np
+
 from apo_bench.benchmark.method import checked_method
 from apo_bench.benchmark.salt import Salt
 from apo_bench.errors import InputError, unknown
@@ -84,10 +86,9 @@ def check_level(level: float, what: str = "level", eye: str = "noise") -> None:
 
 def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[float, float]:
     """A level in mm and in degrees: one number stands for both, a pair for each; of a ray it is one, in mm."""
-    try:
-        given = tuple(map(float, level if isinstance(level, Iterable) and not isinstance(level, str) else [level]))
-    except (TypeError, ValueError):
-        given = ()
+    several = tuple(level) if isinstance(level, Iterable) and not isinstance(level, str) else (level,)
+    numbers = all(isinstance(x, Real) and not isinstance(x, bool | np.bool_) for x in several)
+    given = tuple(map(float, several)) if numbers else ()
     if eye == RANGE and len(given) != 1:
         raise InputError(f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.")
     if len(given) not in (1, 2):
