@@ -21,7 +21,10 @@ from apo_bench.benchmark import crew_member
 from apo_bench.benchmark.crew import MOST_FALSE_STARTS, spread
 from apo_bench.benchmark.fingerprint import content_hash
 from apo_bench.benchmark.grid import SweepSpec, Unit, load_all, units
-from apo_bench.benchmark.replay_command import replay_command
+from apo_bench.benchmark.page.ran import limits_of
+from apo_bench.benchmark.replay_command import USUAL_LIMITS, Limits, replay_command
+from apo_bench.benchmark.report import report
+from apo_bench.benchmark.run_file import read_run
 from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.stopping import Stopped, listening
 from apo_bench.benchmark.sweep import sweep
@@ -31,6 +34,7 @@ from apo_bench.cli import main
 from apo_bench.errors import InputError
 from apo_bench.scenario_file import load_scenario
 from apo_bench.simulation.arm import find_arm
+from tests import pages
 
 CODE = """
 import ctypes, os, shutil, subprocess, sys, time
@@ -136,10 +140,12 @@ def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: 
     assert {t["worker"] for t in timing} <= {0, 1, 2, 3}
 
 
-def test_an_interrupt_of_the_correctors_own_is_a_death(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_of_the_correctors_own_is_an_error_that_it_raised(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     rows = sweep(grid("interrupts", "raises"), tmp_path / "run", workers=1)
     assert endings(rows) == {
-        ("block_on_block", "interrupts"): ("worker", "worker_died"),
+        ("block_on_block", "interrupts"): ("correct", "raised"),
         ("block_on_block", "raises"): ("correct", "raised"),
     }
     assert "Traceback" not in capfd.readouterr().err
@@ -155,9 +161,9 @@ def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> N
         assert row == {**lost(spec, "", "time_limit"), **same}
 
 
-def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Limits = USUAL_LIMITS) -> dict[str, Any]:
     """The row that the command of a row prints."""
-    assert main([*shlex.split(replay_command(row))[1:], "--json"]) == 0
+    assert main([*shlex.split(replay_command(row, None, limits))[1:], "--json"]) == 0
     return dict(json.loads(capsys.readouterr().out))
 
 
@@ -169,6 +175,19 @@ def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
     for row in rows:
         assert ("--trial-limit 600" in replay_command(row)) is (row["failure_stage"] == "worker")
         assert replayed(row, capsys) == json.loads(json.dumps(row))
+
+
+@pytest.mark.parametrize(("workers", "limits"), [(1, Limits(50.0, 1.5)), (None, Limits(None, 1.5))])
+def test_what_the_limit_of_the_corrector_ended_is_the_same_row_again(
+    workers: int | None, limits: Limits, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (row,) = sweep(grid("hangs"), tmp_path / "run", workers=workers, limit_s=50.0, corrector_limit_s=1.5)
+    assert (row["failure_code"], row["sentence"]) == ("time_limit", "the corrector took longer than its limit")
+    assert limits_of(read_run(tmp_path / "run")) == limits
+    assert replayed(row, capsys, limits) == json.loads(json.dumps(row))
+    kept = pages.behind(report(tmp_path / "run").page)["words"]["command"]
+    said = ["--corrector-limit 1.5" in kept[0], "--trial-limit 50 " in f"{kept[0]} ", len(kept)]
+    assert said == [True, workers == 1, 1]
 
 
 def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

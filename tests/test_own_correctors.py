@@ -23,7 +23,7 @@ from apo_bench.benchmark.spec import TrialSpec
 from apo_bench.benchmark.terms import Terms
 from apo_bench.benchmark.trial import run_trial
 from apo_bench.benchmark.worker import Worker
-from apo_bench.correction import own_process
+from apo_bench.correction import own, own_process
 from apo_bench.correction.correct import Misbehaved, correct
 from apo_bench.correction.forms import (
     correction_message,
@@ -164,6 +164,18 @@ def wide(seen):
 def odd(seen):
     return Correction(seen.goals, "converged", "odd", (), 0.0, 0.0, "rank")
 
+def imaginary(seen):
+    return seen.goals * (1 + 0j)
+
+def imaginary_inside(seen):
+    return Correction(seen.goals * (1 + 0j), "converged", "complex", (), 0.0, 0.0, 0)
+
+def red(seen):
+    return Correction(seen.goals, "converged", "\x1b[31m red", (), 0.0, 0.0, 0)
+
+def half_a_letter(seen):
+    return Correction(seen.goals, "converged", "half \\ud800", (), 0.0, 0.0, 0)
+
 def halves(seen):
     raise ValueError("half a letter: \\ud800 and \\x1b[31m red")
 
@@ -211,7 +223,7 @@ def test_a_process_of_its_own_gives_the_bits_of_this_one(name: str, found: OwnCo
 ENDS = {
     "ends": ("worker_died", "ended its process with exit code 0"),
     "ends_three": ("worker_died", "ended its process with exit code 3"),
-    "interrupts": ("worker_died", "ended its process with exit code 1"),
+    "interrupts": (None, r"raised KeyboardInterrupt\(\)"),
     "kills": ("worker_died", "ended its process by signal 9"),
     "crashes": ("worker_died", "ended its process by signal"),
     "closes": ("worker_died", "ended its process"),
@@ -227,6 +239,10 @@ ENDS = {
     "nonsense": (None, "returned a str"),
     "wide": (None, "a position of 1e\\+09 m"),
     "odd": (None, "raised ValueError"),
+    "imaginary": (None, "returned complex numbers as goals; return real ones"),
+    "imaginary_inside": (None, "real numbers are needed, complex ones were given"),
+    "red": (None, r"returned '\\x1b\[31m red' as its sentence"),
+    "half_a_letter": (None, r"returned 'half \\ud800' as its sentence"),
     "halves": (None, r"half a letter:   and  \[31m red"),
 }
 
@@ -247,6 +263,18 @@ def test_an_endless_loop_ends_at_its_limit(folder: Path) -> None:
         correct(SEEN, correctors.find("hostile:hangs"))
     assert raised.value.code == "time_limit"
     assert time.monotonic() - began > 0.5
+
+
+def test_the_import_of_a_module_has_a_limit(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "sleeping.py").write_text("import time; time.sleep(600)")
+    monkeypatch.setattr(own, "LEAST_STARTING_S", 3.0)
+    with (
+        OwnCorrectors(limit_s=0.5) as correctors,
+        pytest.raises(InputError, match=r"took longer than 3 s while it was"),
+    ):
+        correctors.find("sleeping:any")
+    with OwnCorrectors(limit_s=4.0) as correctors, pytest.raises(InputError, match=r"took longer than 4 s while"):
+        correctors.find("sleeping:any")
 
 
 def test_nothing_is_remembered_from_one_correction_to_the_next(found: OwnCorrectors) -> None:

@@ -12,7 +12,7 @@ from apo_bench.benchmark.method import knows_truth
 from apo_bench.benchmark.page.behind import verdict, why
 from apo_bench.benchmark.page.markup import Table
 from apo_bench.benchmark.page.pairs import points
-from apo_bench.benchmark.page.ran import scenario_files, words
+from apo_bench.benchmark.page.ran import limits_of, scenario_files, words
 from apo_bench.benchmark.page.settings import at, level_of, setting_of
 from apo_bench.benchmark.rate_text import percent
 from apo_bench.benchmark.replay_command import replay_command
@@ -58,7 +58,7 @@ def changed_table(found: Comparison) -> Table:
     """The trials whose verdicts differ, with both sentences and commands."""
     head = ("scenario", "conditions", "method", "level", "seed", "first", "in words", "second", "in words",
             "command of the first", "command of the second")  # fmt: skip
-    files = [scenario_files(side.run) for side in (found.first, found.second)]
+    ran = [(scenario_files(side.run), limits_of(side.run)) for side in (found.first, found.second)]
     rows: list[tuple[object, ...]] = []
     for a, b in found.changed[:MOST]:
         place = place_of(a)
@@ -66,7 +66,7 @@ def changed_table(found: Comparison) -> Table:
         where = (place.scenario, ", ".join(setting_of(place).conditions()), place.method)
         level = level_label(*level_of(place), place.noise)
         ends = [(f"{verdict(row)} {why(row)}".strip(), row.get("sentence")) for row in (a, b)]
-        commands = [replay_command(row, files[i]) for i, row in enumerate((a, b))]
+        commands = [replay_command(row, *ran[i]) for i, row in enumerate((a, b))]
         rows.append((*where, level, a["seed"], *ends[0], *ends[1], *commands))
     return Table(head, rows, words=len(head))
 
@@ -181,7 +181,7 @@ def _changed_form(pair: tuple[Mapping[str, Any], Mapping[str, Any]], found: Comp
             "stage": row["failure_stage"],
             "code": row["failure_code"],
             "sentence": row.get("sentence"),
-            "command": replay_command(row, scenario_files(side.run)),
+            "command": replay_command(row, scenario_files(side.run), limits_of(side.run)),
         }
         for name, row, side in (("first", a, found.first), ("second", b, found.second))
     }

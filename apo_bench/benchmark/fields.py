@@ -132,6 +132,8 @@ _Inner = _Plain | _Listed | dict[Name, _Plain | _Listed]
 Said = _Plain | list[_Plain | list[_Plain] | dict[Name, _Inner]] | dict[Name, _Inner]
 """Any value of `run.json`: no deeper than one that a sweep writes."""
 Texts = dict[Name, Text]
+Limits = dict[Name, Annotated[float, Meta(gt=0.0, le=1e9)] | None]
+"""Wall times [s]; null where there was no limit."""
 RUN_FIELDS: Mapping[str, Any] = MappingProxyType(
     {
         "schema": Name,
@@ -143,6 +145,7 @@ RUN_FIELDS: Mapping[str, Any] = MappingProxyType(
         "platform": Text,
         "command": Text,
         "salt": Text,
+        "limits": Limits,
         "code": Texts,
     }
 )

@@ -4,35 +4,49 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, final
 
 from apo_bench.benchmark.spec import RANGE, USUAL
+from apo_bench.correction.own import LIMIT_S as CORRECTOR_LIMIT_S
+from apo_bench.correction.own import is_own
 
 USUALLY = {"grasp": "friction", "arm": "six_axis", "timestep_s": 0.001}
 """What a row that does not say means."""
-LIMIT_S = 600.0
-"""Usual for a trial in a process of its own; given where that process died or was ended."""
 SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
 
-def replay_command(row: Mapping[str, Any], files: Files | None = None) -> str:
+@final
+@dataclass(frozen=True)
+class Limits:
+    """Of a sweep, wall time; said of a trial whose process, or that of its corrector, died or was ended."""
+
+    trial_s: float | None = 600.0
+    """None where trials had no process of their own."""
+    corrector_s: float = CORRECTOR_LIMIT_S
+
+
+USUAL_LIMITS = Limits()
+
+
+def replay_command(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
     """`apo-bench replay SCENARIO .. --seed N`, quoted for a shell; of the defaults it names the method only."""
-    return f"{without_seed(row, files)} --seed {row['seed']}"
+    return f"{without_seed(row, files, limits)} --seed {row['seed']}"
 
 
-def without_seed(row: Mapping[str, Any], files: Files | None = None) -> str:
+def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
     """The same without the seed: what the trials of a cell have in common."""
     given = str((files or {}).get(row["scenario"], row["scenario"]))
     given = f"./{given}" if given.startswith("-") else given
     usual = {"eye": RANGE if row["noise"] == RANGE else "noise", "fidelity": "full", **USUALLY}
-    return shlex.join(["apo-bench", "replay", given, *_options({**usual, **row}, given)])
+    return shlex.join(["apo-bench", "replay", given, *_options({**usual, **row}, given, limits)])
 
 
-def _options(row: Mapping[str, Any], given: str) -> list[str]:
+def _options(row: Mapping[str, Any], given: str, limits: Limits) -> list[str]:
     said: list[str] = []
 
     def say(option: str, value: object, default: object) -> None:
@@ -57,7 +71,9 @@ def _options(row: Mapping[str, Any], given: str) -> list[str]:
     say("--method", row["method"], None)
     say("--salt-file", SALT_FILE if row.get("salt") else None, None)
     if row.get("failure_stage") == "worker":
-        say("--trial-limit", LIMIT_S, None)
+        say("--trial-limit", limits.trial_s, None)
+        if is_own(row["method"]):
+            say("--corrector-limit", limits.corrector_s, CORRECTOR_LIMIT_S)
     return said
 
 

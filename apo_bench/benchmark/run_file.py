@@ -28,6 +28,7 @@ def run_record(
     files: Mapping[str, str],
     command: str,
     salt: Salt | None = None,
+    trial_limit_s: float | None = None,
 ) -> dict[str, Any]:
     """What `run.json` says.
 
@@ -36,12 +37,14 @@ def run_record(
         content: What the trials are made of besides the package -> its hash.
         code: Source file -> its hash.
         files: Scenarios that were given as files: name -> path.
+        trial_limit_s: None where trials have no process of their own.
     """
     return {
         "schema": RUN,
         "grids": list(grids),
         "files": dict(files),
         "salt": None if salt is None else salt.hash,
+        "limits": {"trial_s": trial_limit_s, "corrector_s": terms.corrector_limit_s},
         "content": dict(content),
         "versions": dict(terms.versions),
         "python": platform.python_version(),

@@ -80,7 +80,9 @@ def sweep(
     terms = Terms(content, versions(), corrector_limit_s)
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
-    run = run_record(described(grids, loaded), _content(grids, loaded, arm), code_files(), terms, files, command, salt)
+    made_of = _content(grids, loaded, arm)
+    trial_limit_s = None if here else limit_s
+    run = run_record(described(grids, loaded), made_of, code_files(), terms, files, command, salt, trial_limit_s)
     with listening() as check, Journal(Path(out), run) as journal:
         work = _left(units(grids, loaded, salt), loaded, terms, journal, check)
         with progress(sum(len(unit.trials) for unit in work)) as tell:

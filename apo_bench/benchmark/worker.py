@@ -131,13 +131,13 @@ def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: An
         wrong = unwritable(row) if ":" in spec.method else ""
         said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
     except Lost as error:
-        return lost(spec, content, error.code)
+        return lost(spec, content, error.code, "corrector")
     except Misbehaved as error:
         wrong = said = str(error)
     return misbehaved(spec, content, shown.demonstration.code, said) if wrong else row
 
 
-def lost(spec: TrialSpec, content: str, code: str) -> Row:
+def lost(spec: TrialSpec, content: str, code: str, what: str = "trial") -> Row:
     """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
 
     Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
@@ -145,8 +145,9 @@ def lost(spec: TrialSpec, content: str, code: str) -> Row:
     Args:
         content: From the terms of the sweep: `terms.content[spec.scenario]`.
         code: `worker_died` or `time_limit`.
+        what: Whose process died or whose limit it was: `trial` or `corrector`.
     """
-    return _failed(spec, content, None, Ending("worker", code, None, sentence(code)))
+    return _failed(spec, content, None, Ending("worker", code, None, sentence(code, what=what)))
 
 
 def in_time(row: Row, timing: Timing, limit_s: float) -> Row:

@@ -14,7 +14,7 @@ from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.measured import gap_of, measured
 from apo_bench.correction.returned import RIGID, check_near, checked
 from apo_bench.errors import InputError, failed, kind
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, NotReal, real
 from apo_bench.geometry.rigid import rigid
 from apo_bench.names import resolve
 from apo_bench.program import Correction, Observation
@@ -116,7 +116,9 @@ def _ours(corrector: Any) -> bool:
 def _bare(found: Any, n: int, name: str) -> Array:
     """Goals as an array (n, 4, 4), numbers that are not finite let through."""
     try:
-        goals = np.array(found, dtype=np.float64)
+        goals = real(found)
+    except NotReal as error:
+        raise InputError(f"the corrector '{name}' returned complex numbers as goals; return real ones.") from error
     except (TypeError, ValueError):
         goals = np.zeros(0)
     if goals.shape != (n, 4, 4):

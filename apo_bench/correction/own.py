@@ -12,12 +12,14 @@ from typing import Any, final
 from apo_bench.correction.correct import Misbehaved, checked_corrector, correct
 from apo_bench.correction.forms import observation_message, read_correction
 from apo_bench.correction.message import Arrays, Form, Garbled, Message
-from apo_bench.correction.own_process import STARTING_S, Server
+from apo_bench.correction.own_process import Server
 from apo_bench.errors import InputError
 from apo_bench.program import Correction, Observation
 
 LIMIT_S = 120.0
 """What one correction may take."""
+LEAST_STARTING_S = 30.0
+"""What importing a module may take at least: a new interpreter, and libraries that are large."""
 LONGEST_S = 1e6
 LONGEST_SENTENCE = 2000
 
@@ -40,7 +42,8 @@ class OwnCorrectors:
 
     def __init__(self, limit_s: float = LIMIT_S) -> None:
         """Args:
-        limit_s: Wall time that a correction may take.
+        limit_s: Wall time that a correction may take; importing its module may take the same, or 30 s if that is
+                more.
         """
         if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_S):
             raise InputError(
@@ -64,7 +67,7 @@ class OwnCorrectors:
         if method not in self._found:
             module = method.partition(":")[0]
             if module not in self._servers:
-                self._servers[module] = Server(module)
+                self._servers[module] = Server(module, max(self._limit_s, LEAST_STARTING_S))
             found = OwnCorrector(method, self._servers[module], self._limit_s)
             self.files.update(found.check())
             self._found[method] = found
@@ -142,7 +145,7 @@ class OwnCorrector:
             InputError: It cannot be imported, or is no function.
         """
         try:
-            said, _ = self._asked("check", {}, {}, STARTING_S)
+            said, _ = self._asked("check", {}, {}, self._server.starting_s)
         except Misbehaved as error:
             raise InputError(f"{str(error).rstrip('.')} while it was imported; mend it, or use another.") from error
         if "raised" in said:

@@ -18,8 +18,6 @@ from apo_bench.correction.server import NOTICE
 from apo_bench.errors import InputError
 from apo_bench.processes import descendants, end_descendants
 
-STARTING_S = 120.0
-"""What a module may take to be imported."""
 NOTICE_S = 2.0
 """How long a fork may be gone before that is said."""
 START = (
@@ -32,8 +30,12 @@ START = (
 class Server:
     """Started when it is needed."""
 
-    def __init__(self, module: str) -> None:
+    def __init__(self, module: str, starting_s: float) -> None:
+        """Args:
+        starting_s: Wall time that importing the module may take.
+        """
         self._module = module
+        self.starting_s = starting_s
         self._process: subprocess.Popen[bytes] | None = None
         self._control: socket.socket | None = None
         self._asked = 0
@@ -111,7 +113,7 @@ class Server:
                 process_group=0,
             )
         self._asked = 0
-        self._control.settimeout(STARTING_S)
+        self._control.settimeout(self.starting_s)
         try:
             if not self._control.recv(NOTICE.size):
                 raise EOFError("it ended before it was ready")

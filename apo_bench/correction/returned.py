@@ -12,6 +12,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import FARTHEST_M, rigid
+from apo_bench.plain_text import UNSHOWN
 from apo_bench.program import Consistency, Correction, Step, Try
 from apo_bench.schedule import REMEDY, fault
 
@@ -84,8 +85,8 @@ def _check_numbers(found: Correction, n: int, name: str) -> None:
 def _check_words(found: Correction, assembly: Assembly, name: str) -> None:
     """What a person reads: a sentence, tests, relations that there are."""
     said = found.sentence
-    if not isinstance(said, str) or not said.strip() or "\n" in said:
-        raise InputError(f"the corrector '{name}' returned {said!r} as its sentence; return one line of text.")
+    if not isinstance(said, str) or not said.strip() or UNSHOWN.search(said):
+        raise InputError(f"the corrector '{name}' returned {said!r} as its sentence; return one line of plain text.")
     for field, test in (("test", found.test), ("test_after", found.test_after)):
         if test is not None and not isinstance(test, Consistency):
             raise InputError(f"the corrector '{name}' returned {test!r} as `{field}`; return a Consistency or None.")

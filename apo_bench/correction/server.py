@@ -121,8 +121,6 @@ def _said(form: Form, arrays: Arrays) -> Message:
         return correction_message(correct(read_observation(form, arrays), name))
     except InputError as error:
         return {"raised": str(error)}, {}
-    except KeyboardInterrupt:
-        os._exit(1)
     except BaseException as error:
         return {"raised": f"the corrector '{name}' raised {type(error).__name__}({_text(error)})."}, {}
 

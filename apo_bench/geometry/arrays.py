@@ -8,6 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
+class NotReal(ValueError):
+    """Complex numbers, whose imaginary parts numpy would drop."""
+
+
+def real(value: ArrayLike) -> Array:
+    """A float64 copy of `value`.
+
+    Raises:
+        NotReal: It holds complex numbers.
+        TypeError, ValueError: It holds no numbers.
+    """
+    given = np.asarray(value)
+    if np.iscomplexobj(given):
+        raise NotReal("real numbers are needed, complex ones were given")
+    return np.array(given, dtype=np.float64)
+
+
 def frozen(value: ArrayLike, *shape: int | None) -> Array:
     """A read-only float64 copy of `value`.
 
@@ -15,9 +32,9 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
         shape: The shape it must have; `None` stands for any length.
 
     Raises:
-        ValueError: The shape differs, or a number is not finite.
+        ValueError: The shape differs, or a number is complex or not finite.
     """
-    array = np.array(value, dtype=np.float64)
+    array = real(value)
     if shape and (array.ndim != len(shape) or any(w not in (None, g) for w, g in zip(shape, array.shape, strict=True))):
         wanted = ", ".join("*" if s is None else str(s) for s in shape)
         raise ValueError(f"an array of shape ({wanted}) is needed, {array.shape} was given")

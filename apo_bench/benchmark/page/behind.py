@@ -10,7 +10,7 @@ from typing import Any
 
 from apo_bench.benchmark.page.markup import Html
 from apo_bench.benchmark.page.settings import at
-from apo_bench.benchmark.replay_command import Files, without_seed
+from apo_bench.benchmark.replay_command import USUAL_LIMITS, Files, Limits, without_seed
 from apo_bench.benchmark.slim import NUMBERS
 from apo_bench.benchmark.statistics import Cell, by_place
 
@@ -35,6 +35,7 @@ def behind(
     cells: Sequence[Cell],
     files: Files | None = None,
     pictured: Mapping[tuple[int, int], int] | None = None,
+    limits: Limits = USUAL_LIMITS,
 ) -> dict[str, Any]:
     """What the script needs to show the trials of any cell, as plain values.
 
@@ -57,7 +58,7 @@ def behind(
             columns["predicted"].append(words["predicted"].number(foretold(row.get("predicted"))))
             asked = _asked(row)
             if asked not in commands:
-                commands[asked] = words["command"].number(without_seed(row, files))
+                commands[asked] = words["command"].number(without_seed(row, files, limits))
             columns["command"].append(commands[asked])
             for name in NUMBERS:
                 columns[name].append(rounded(row.get(name)))

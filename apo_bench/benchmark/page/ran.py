@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from apo_bench.benchmark.page.markup import Html, Table, joined, tag
+from apo_bench.benchmark.replay_command import USUAL_LIMITS, Limits
 
 LONG = 400
 """Longer values are cut; they stand in the file."""
@@ -15,6 +16,14 @@ LONG = 400
 def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
     """Scenarios that were given as files: name -> path."""
     return dict(run.get("files") or {})
+
+
+def limits_of(run: Mapping[str, Any]) -> Limits:
+    """Those that a sweep had when it was last started; the usual ones where it does not say."""
+    said = run.get("limits") or {}
+    trial_s = said.get("trial_s", USUAL_LIMITS.trial_s)
+    corrector_s = said.get("corrector_s") or USUAL_LIMITS.corrector_s
+    return Limits(None if trial_s is None else float(trial_s), float(corrector_s))
 
 
 def ran(run: Mapping[str, Any], rows: Mapping[str, Any]) -> Html:

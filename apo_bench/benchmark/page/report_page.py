@@ -26,7 +26,7 @@ from apo_bench.benchmark.page.figures import Figure, methods_of
 from apo_bench.benchmark.page.markup import Html, joined, prose, tag
 from apo_bench.benchmark.page.matrix import matrices
 from apo_bench.benchmark.page.pairs import pair_table
-from apo_bench.benchmark.page.ran import ran
+from apo_bench.benchmark.page.ran import limits_of, ran
 from apo_bench.benchmark.page.settings import Setting, at, setting_of
 from apo_bench.benchmark.paired_table import WORDS as PAIRED
 from apo_bench.benchmark.recognised_table import WORDS as RECOGNISED
@@ -93,7 +93,7 @@ def report_page(found: Found) -> str:
         Section("timing", "Timing", _timing(found)),
         Section("run", "What was run", _ran(found)),
     ]
-    values = behind(found.rows, found.summary.cells, found.files, pictured)
+    values = behind(found.rows, found.summary.cells, found.files, pictured, limits_of(found.run))
     return document(f"Sweep {found.name}", _lead(found), sections, methods, {"behind": packed(values)})
 
 
@@ -199,7 +199,7 @@ def _pictures(found: Found) -> Html:
         where = "" if place is None else f"{setting_of(place).title()}, level {place.level:g}"
         title = tag("strong", f"{one.row['method']}: {why(one.row)}")
         told = f"{where}, seed {one.row['seed']}: {one.row.get('sentence') or ''}. ({one.words})"
-        command = replay_command(one.row, found.files)
+        command = replay_command(one.row, found.files, limits_of(found.run))
         button = tag("button", "copy", type="button", class_="copy", data_command=command)
         image = tag("img", src=f"data:image/jpeg;base64,{base64.b64encode(one.jpeg).decode()}", alt=told)
         caption = tag("figcaption", title, " ", told, tag("div", button, tag("code", command), class_="command"))
@@ -269,7 +269,7 @@ def _ran(found: Found) -> Html:
     beside = tag("ul", *(tag("li", tag("a", name, href=name)) for name in found.tables))
     words = (
         "Commands on this page are to be run where the sweep was run; they give the same rows with the same versions "
-        "(trials that a limit ended: with the `--trial-limit` of the sweep)."
+        "(trials that a limit ended: with the limits that `run.json` says, those of the last start of the sweep)."
     )
     if drawn := one_salt(rows):
         said["salt"] = drawn
