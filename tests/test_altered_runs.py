@@ -85,6 +85,16 @@ def test_altered_folders_are_read_or_refused_in_one_sentence(tmp_path: Path, mon
         ("run.json", '{"files": {"a": 3}}', "field files (an entry): text is needed, a whole number was given"),
         ("run.json", '{"files": {"a": "x\\u0007"}}', "field files: text without control characters is needed"),
         ("run.json", '{"grids": [3]}', "field grids[0]: an object is needed"),
+        ("run.json", '{"mine": {"a": {"b": {}}}}', "field mine (an entry) (an entry): "),
+        ("run.json", '{"mine": [[[3]]]}', "field mine[0][0]: "),
+        ("run.json", '{"mine": 1e999}', "field (an entry): number out of range"),
+        ("run.json", '{"mine": ["\\ud800"]}', "field mine[0]: text without half letters"),
+        ("timing.jsonl", '{"host": "\\ud800"}', "line 1, field host: text without half letters"),
+        *(
+            ("trials.jsonl", f'{{"{name}": "a\\ud800"}}', f"line 1, field {name}: text without half letters")
+            for name in ("sentence", "spec_hash", "method", "scenario")
+        ),
+        ("trials.jsonl", '{"thresholds": {"\\ud800": 1}}', "field thresholds.\\ud800: text without half letters"),
     ],
 )
 def test_the_sentence_names_file_line_and_field(name: str, text: str, said: str, tmp_path: Path) -> None:
@@ -102,6 +112,36 @@ def test_the_sentence_names_file_line_and_field(name: str, text: str, said: str,
         read(folder)
     assert str(refused.value).startswith(f"{folder / name}, ")
     assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "once", "twice", "key"),
+    [
+        ("trials.jsonl", '"seed":', '"seed": 9, "seed":', "line 1: the key 'seed'"),
+        ("trials.jsonl", '"seed":', '"see\\u0064": 9, "seed":', "line 1: the key 'seed'"),
+        ("trials.jsonl", '"seed":', '"a": "\\u003a", "seed": 9, "seed":', "line 1: the key 'seed'"),
+        ("trials.jsonl", '"thresholds": {', '"thresholds": {"a": 1, "a": 1, ', "line 1: the key 'a'"),
+        ("timing.jsonl", '"seed":', '"seed" : 9, "seed":', "line 1: the key 'seed'"),
+        ("run.json", "{", '{"mine": {"a": 1, "a": 1}, ', "the key 'a'"),
+    ],
+)
+def test_a_key_that_stands_twice_is_refused(name: str, once: str, twice: str, key: str, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for file in FILES:
+        (folder / file).write_bytes((KEPT / file).read_bytes())
+    read(folder)
+    text = (KEPT / name).read_text(encoding="utf-8")
+    assert once in text
+    (folder / name).write_text(text.replace(once, twice, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=f"{name}.*{key} stands twice in one object"):
+        read(folder)
+
+
+def test_names_of_files_that_are_not_utf_8_may_stand_in_a_run(tmp_path: Path) -> None:
+    """The library of the language writes them with half letters, and a sweep keeps its command."""
+    (tmp_path / "run.json").write_text(json.dumps({"command": "sweep b\udcf6.toml"}), encoding="utf-8")
+    assert read_run(tmp_path) == {"command": "sweep b\udcf6.toml"}
 
 
 def test_a_key_that_nobody_knows_is_left_out(tmp_path: Path) -> None:

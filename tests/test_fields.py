@@ -53,6 +53,7 @@ def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
         ({"worst_gap_mm": float("inf")}, "field worst_gap_mm: a number"),
         ({"success": 1}, "field success: true or false"),
         ({"dropped": [3]}, "field dropped[0]: text is needed"),
+        ({"dropped": ["a\ud800"]}, "field dropped[0]: text without half letters"),
         ({"p_value": 2.0}, "field p_value: a number"),
     ],
 )

@@ -14,15 +14,17 @@ from typing import Any
 import pytest
 
 from apo_bench import cli
+from apo_bench.benchmark import report as reports
 from apo_bench.benchmark.csv_file import write_csv
 from apo_bench.benchmark.failure_pictures import failure_pictures, sample
+from apo_bench.benchmark.journal import read_rows
 from apo_bench.benchmark.own_code import own_code
 from apo_bench.benchmark.parquet import parquet_beside
 from apo_bench.benchmark.progress import Rates
 from apo_bench.benchmark.replay_command import replay_command
 from apo_bench.benchmark.report import report
 from apo_bench.benchmark.statistics import tally
-from apo_bench.benchmark.terminal import print_cells
+from apo_bench.benchmark.terminal import print_cells, print_report
 from apo_bench.errors import InputError
 from apo_bench.plain_text import clean
 from tests import pages
@@ -173,6 +175,19 @@ def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.Captur
     end = result(Ending("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
     print_row(row("contact", 0, False, eye="noise") | end)
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
+    assert end["sentence"] == "\\x1b[31mraised\\nmore"
+    folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
+    assert [one["sentence"] for one in read_rows(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
+
+
+@pytest.mark.parametrize(("count", "said"), [(0, "0 failures were"), (1, "1 failure was"), (2, "2 failures were")])
+def test_pictures_that_are_missing_are_said_in_sentences(
+    count: int, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reports, "_drawn", lambda *_: {})  # figures take a second each
+    made = report(write(tmp_path / "run", [row("contact")]))
+    print_report(made._replace(pictures=count, no_pictures=("no file; check the path", "2 failed trials name code")))
+    assert f"{said} drawn. Not drawn: no file; check the path; 2 failed trials name code.\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_a_report_of_old_rows_is_of_as_demonstrated_and_says_so(kept: Path, caps
     assert "written before the verdict success was given" in pages.words(kept / "report.html")
     cells = pd.read_csv(kept / "tables" / "cells.csv")
     assert (cells["trials"] == 2).all()
-    assert (cells["successes"] == cells["demonstrated"]).all()
+    assert (cells["successes"] == cells["as_demonstrated"]).all()
     assert set(cells["successes"]) == {0, 2}
     rows = pd.read_parquet(kept / "tables" / "rows.parquet")
     assert rows["success"].isna().all()

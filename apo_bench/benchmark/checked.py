@@ -5,7 +5,6 @@ Every complaint is one sentence that names the file, the line and the field.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -16,6 +15,7 @@ import msgspec
 from apo_bench.benchmark.fields import NEVER_NULL, REQUIRED, ROW_FIELDS, RUN_FIELDS, TIMING_FIELDS, Said
 from apo_bench.benchmark.spec import RANGE, ROW
 from apo_bench.benchmark.verdicts import MEANING
+from apo_bench.benchmark.whole_json import HALF, HALF_BUT_OF_FILES, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.errors import InputError
 from apo_bench.plain_text import CONTROL, clean
 
@@ -55,7 +55,7 @@ def _struct(name: str, fields: Mapping[str, Any], required: Sequence[str], **mor
 _ROW = msgspec.json.Decoder(_struct("Row", ROW_FIELDS, REQUIRED))
 _TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, TIMED))
 _WRITTEN = _struct("Written", ROW_FIELDS, REQUIRED, forbid_unknown_fields=True)
-_RUN = msgspec.json.Decoder(dict[str, Said])
+_RUN = msgspec.json.Decoder(dict[str, Any])
 _KNOWN = _struct("Run", RUN_FIELDS, ())
 
 
@@ -70,10 +70,13 @@ def row_of(line: bytes, where: str) -> dict[str, Any]:
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
     if row["schema"] not in MEANING:
-        raise InputError(f"{where}: a row of schema '{_short(row['schema'])}' was given; '{ROW}' is needed.")
+        raise InputError(
+            f"{where}: a row of schema '{_short(row['schema'])}' was given; {', '.join(MEANING)} can be read."
+        )
     wrong = _fault(row)
     if wrong is not None:
         raise _wrong(where, *wrong)
+    row["sentence"] = row["sentence"] and clean(row["sentence"])
     usual = {"eye": RANGE if row["noise"] == RANGE else "noise", **USUAL}
     return MEANING[row["schema"]](row | {name: value for name, value in usual.items() if row[name] is None})
 
@@ -94,8 +97,10 @@ def run_of(text: bytes, file: str) -> dict[str, Any]:
         InputError: It is no such document.
     """
     try:
-        said = _parsed(_RUN, text)
+        said = _parsed(_RUN, text, file, HALF_BUT_OF_FILES)
         msgspec.convert(said, _KNOWN)
+        for name, value in said.items():
+            _check_said(value, file, name)
     except _UNREADABLE as error:
         _refuse(error, file, "this is not a document that a sweep wrote")
     for name, path in (said.get("files") or {}).items():
@@ -104,11 +109,21 @@ def run_of(text: bytes, file: str) -> dict[str, Any]:
     return {name: value for name, value in said.items() if value is not None}
 
 
+def _check_said(value: Any, file: str, name: str) -> None:
+    try:
+        msgspec.convert(value, Said)
+    except msgspec.ValidationError as error:
+        place, what = _said(error)
+        gap = " " * place.startswith("(")
+        raise _wrong(file, f"{_short(name)}{gap}{place}", what) from error
+
+
 def unwritable(row: Mapping[str, Any]) -> str:
     """Why a row may not be written, since it could not be read again; empty if it may."""
     try:
         msgspec.convert(dict(row), _WRITTEN)
-        wrong = _fault(row)
+        half = half_letter(dict(row), HALF)
+        wrong = _fault(row) if half is None else (half, WHOLE_LETTERS)
     except msgspec.ValidationError as error:
         wrong = _said(error)
     return "" if wrong is None else f"field {wrong[0]}: {wrong[1]}"
@@ -119,20 +134,15 @@ _UNREADABLE = (msgspec.DecodeError, msgspec.ValidationError, RecursionError, Val
 
 def _decoded(decoder: Any, line: bytes, where: str, none: str) -> dict[str, Any]:
     try:
-        return msgspec.structs.asdict(_parsed(decoder, line))
+        return msgspec.structs.asdict(_parsed(decoder, line, where, HALF))
     except _UNREADABLE as error:
         _refuse(error, where, none)
 
 
-def _parsed(decoder: Any, text: bytes) -> Any:
-    """Names of files that are not UTF-8 hold halves of letters, which only the library of the language reads."""
-    if b"\\ud" not in text.lower():
-        return decoder.decode(text)
-
-    def refuse(constant: str) -> Never:
-        raise ValueError(constant)
-
-    return msgspec.convert(json.loads(text, parse_constant=refuse), decoder.type)
+def _parsed(decoder: Any, text: bytes, where: str, half: re.Pattern[str]) -> Any:
+    """What is wrong with a field is said first, then what is seen only when looking closer, which few lines need."""
+    said = None if b"\\" in text else decoder.decode(text)
+    return said if said is not None and is_whole(text) else msgspec.convert(read_whole(text, where, half), decoder.type)
 
 
 def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -159,7 +169,7 @@ def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
 def _said(error: msgspec.ValidationError) -> tuple[str, str]:
     """The field, and what is needed there and what was given, in words."""
     text, _, place = str(error).partition(" - at `$")
-    field = clean(place.rstrip("`").lstrip(".")).replace("[...]", " (an entry)")[:LONGEST_QUOTE]
+    field = clean(place.rstrip("`").lstrip(".")).replace("[...]", " (an entry)").strip()[:LONGEST_QUOTE]
     missing = re.fullmatch(r"Object missing required field `(.*)`", text)
     if missing:
         return f"{field}.{missing[1]}".strip("."), "it is missing"
@@ -188,6 +198,8 @@ def _short(text: str) -> str:
 
 
 def _refuse(error: Exception, where: str, none: str) -> Never:
+    if isinstance(error, InputError):
+        raise error
     if isinstance(error, msgspec.ValidationError):
         raise _wrong(where, *_said(error)) from error
     raise InputError(f"{where}: {none}; remove it, or the folder.") from error

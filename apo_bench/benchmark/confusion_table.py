@@ -44,11 +44,12 @@ def confusion_lines(found: Sequence[Confusion]) -> list[str]:
 
 
 def summary(c: Confusion) -> str:
-    """`Predicted: 96.3 % of 134 executed trials ended as foretold; failures that were not foretold: 3, ...`"""
+    """`Predicted: 96.3 % of 134 executed trials ended as foretold (counted by as_demonstrated); failures ...`"""
     if c.agreement is None:
         return "Predicted: nothing, since no trial was executed."
+    trials = "1 executed trial" if c.executed == 1 else f"{c.executed} executed trials"
     return (
-        f"Predicted: {100 * c.agreement:.1f} % of {c.executed} executed trials ended as foretold; "
+        f"Predicted: {100 * c.agreement:.1f} % of {trials} ended as foretold (counted by as_demonstrated); "
         f"failures that were not foretold: {c.fit_failed}, warnings that were wrong: {c.fail_fitted}."
     )
 

@@ -109,7 +109,7 @@ def failure_pictures(
         try:
             made.append(_made(row, folder, files or {}, scenes, salt))
         except (InputError, RuntimeError, OSError, ValueError) as error:
-            missed.append(str(error).splitlines()[0] if str(error) else type(error).__name__)
+            missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
             if "no picture can be drawn here" in missed[-1]:
                 break
     return made, list(dict.fromkeys(missed))

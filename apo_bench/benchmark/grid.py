@@ -25,7 +25,7 @@ from apo_bench.benchmark.spec import (
     refuse_noise,
 )
 from apo_bench.errors import InputError, unknown
-from apo_bench.plain_text import CONTROL
+from apo_bench.plain_text import UNSHOWN
 from apo_bench.scenario import Scenario
 from apo_bench.scenario_file import load_scenario
 
@@ -106,8 +106,10 @@ class SweepSpec:
         for clearance in self.clearances_mm:
             check_clearance(clearance)
         for name in (*self.noises, *self.methods, *self.relations, self.arm):
-            if CONTROL.search(name):
-                raise InputError(f"the name {name!r} was given, which has control characters; use another one.")
+            if UNSHOWN.search(name):
+                raise InputError(
+                    f"the name {name!r} was given, which has control characters or half letters; use another one."
+                )
         for grasp in self.grasps:
             check_grasp(grasp)
         check_fidelity(self.fidelity, *self.grasps)
@@ -147,8 +149,8 @@ def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
     loaded = {given: load_scenario(given) for grid in grids for given in grid.scenarios}
     names = [scenario.name for scenario in loaded.values()]
     for name in names:
-        if CONTROL.search(name):
-            raise InputError(f"the scenario name {name!r} has control characters; rename its file.")
+        if UNSHOWN.search(name):
+            raise InputError(f"the scenario name {name!r} has control characters or half letters; rename its file.")
         if names.count(name) > 1:
             raise InputError(f"two scenarios called '{name}' were given; rows name them, so rename one of the files.")
     return loaded

@@ -40,7 +40,14 @@ from apo_bench.writing import check_folders, check_target, to_write
 COLUMNS = (
     *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method"),
     *("grasp", "fidelity", "trials", "successes", "rate", "low_95", "high_95", "executed", "executed_rate"),
-    *("executed_low_95", "executed_high_95", "demonstrated", "demonstrated_rate", "loose_successes", "loose_rate"),
+    *(
+        "executed_low_95",
+        "executed_high_95",
+        "as_demonstrated",
+        "as_demonstrated_rate",
+        "loose_successes",
+        "loose_rate",
+    ),
     *("excluded", "failures"),
 )
 MOST_PANELS = 16

@@ -9,6 +9,7 @@ from apo_bench.benchmark.confidence import UNKNOWN
 from apo_bench.benchmark.recognised import UNCOUNTED
 from apo_bench.benchmark.spec import ENV_ID, ROW, TrialSpec
 from apo_bench.benchmark.stages import Ending
+from apo_bench.plain_text import clean
 from apo_bench.scenario import Scenario
 
 Row = dict[str, Any]
@@ -62,7 +63,7 @@ def result(end: Ending, *, success: bool | None) -> Row:
         "failure_stage": end.stage if end.failed else None,
         "failure_code": end.code if end.failed else None,
         "failure_operation": None if end.operation is None else end.operation + 1,
-        "sentence": end.sentence[:LONGEST_SENTENCE],
+        "sentence": clean(end.sentence)[:LONGEST_SENTENCE],
         "as_demonstrated_code": None,
         "conditions": None,
         "worst_gap_mm": None,

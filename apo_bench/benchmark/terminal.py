@@ -79,12 +79,13 @@ def print_report(made: Report) -> None:
         say(verdicts.words(made.verdict))
     say(summary(made.confusions[-1]))
     if made.no_pictures:
-        say(f"{made.pictures} failures were drawn; of others: {'; '.join(made.no_pictures)}")
+        drawn = "1 failure was" if made.pictures == 1 else f"{made.pictures} failures were"
+        say(f"{drawn} drawn. Not drawn: {'; '.join(made.no_pictures)}.")
     say(f"Tables:  {made.table} and {len(made.tables) - 1} more there, the same as .parquet")
     png = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
-    drawn = [*png, *made.figures]
-    if drawn:
-        say(f"Figures: {drawn[0]} and {len(drawn) - 1} more there")
+    figures = [*png, *made.figures]
+    if figures:
+        say(f"Figures: {figures[0]} and {len(figures) - 1} more there")
     say(f"Report:  {made.page}")
 
 
