@@ -57,8 +57,7 @@ def fixtures(assembly: Assembly) -> frozenset[str]:
     only. One that ends against a movable part is none, even if that part leaves it later.
     """
     relations = assembly.relations()
-    last = {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
-    return frozenset(part for part, k in last.items() if _put_away(assembly, relations, part, k))
+    return frozenset(part for part, k in _last_moves(assembly).items() if _put_away(assembly, relations, part, k))
 
 
 def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k: int) -> bool:
@@ -95,12 +94,16 @@ def _share_of_area(found: Overlap, true: Overlap) -> float:
     return min(1.0, found.area / true.area) if true else 1.0
 
 
+def _last_moves(assembly: Assembly) -> dict[str, int]:
+    """Part -> the last operation that moves it, counted from 0."""
+    return {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
+
+
 def _displacements(
     assembly: Assembly, after: tuple[Snapshot | None, ...], final: Snapshot, away: frozenset[str]
 ) -> Iterator[tuple[str, float]]:
     """How far a corner of each part lies at most from where it was after the part's last operation, [m]."""
-    last = {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
-    for part, k in last.items():
+    for part, k in _last_moves(assembly).items():
         put = after[k]
         if put is not None and part not in away:
             corners = _corners(assembly.solids[part])
