@@ -117,7 +117,7 @@ def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"sentence": None}, "returned None as its sentence; return one line of text"),
+        ({"sentence": None}, "returned None as its sentence; return one line of plain text"),
         ({"sentence": " "}, "returned ' ' as its sentence"),
         ({"sentence": "a\nb"}, "as its sentence"),
         ({"test": 3}, "returned 3 as `test`; return a Consistency or None"),
