@@ -16,7 +16,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m numeric -n 2 --dist worksteal \
-    $$(grep -l pytest.mark.numeric tests/test_*.py)
+    $$(grep -rl pytest.mark.numeric tests --include=test_*.py)
 MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 
 export OMP_NUM_THREADS := 1
@@ -38,6 +38,7 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/pytest -q -n 2 --dist worksteal
 	$(NUMERIC)
 

@@ -25,18 +25,18 @@ __all__ = [
     "recognise",
 ]
 
-gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.env:APOReplay")
+gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
 
 _LATER = MappingProxyType(
     {
         "ContactCorrector": "apo_bench.correction.contact",
-        "Corrected": "apo_bench.corrected",
-        "correct": "apo_bench.correction.correct",
+        "Corrected": "apo_bench.envs.corrected",
+        "correct": "apo_bench.correction.correctors",
         "correct_many": "apo_bench.correction.many",
         "explain": "apo_bench.correction.explain",
-        "load_scenario": "apo_bench.scenario_file",
-        "read_observation": "apo_bench.observed",
-        "recognise": "apo_bench.recognition.recognise",
+        "load_scenario": "apo_bench.scenario.file",
+        "read_observation": "apo_bench.files.observation",
+        "recognise": "apo_bench.recognition.contacts",
     }
 )
 

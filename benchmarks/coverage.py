@@ -26,12 +26,12 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr, ndtri
 
-from apo_bench.benchmark.area import reach, weights
-from apo_bench.benchmark.bounded import surprise, threshold
-from apo_bench.benchmark.falling import profile
-from apo_bench.benchmark.half_level import sure
-from apo_bench.benchmark.paired import tango
-from apo_bench.benchmark.statistics import wilson
+from apo_bench.statistics.area import reach, weights
+from apo_bench.statistics.bounded import surprise, threshold
+from apo_bench.statistics.falling import profile
+from apo_bench.statistics.half_level import sure
+from apo_bench.statistics.paired import tango
+from apo_bench.statistics.rates import wilson
 
 LONG = ("area", "area difference", "half level", "sure bounds")
 SEEDS = (50, 100, 200)

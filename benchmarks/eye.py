@@ -17,14 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.benchmark.stages import OBSERVATION, Shown, show, stream, through
+from apo_bench.assembly.placement import placed
+from apo_bench.depth_camera.distance import joined, shape_of, struck
+from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose
 from apo_bench.geometry.clearance import physical_boxes
-from apo_bench.placement import placed
-from apo_bench.recognition.distance import joined, shape_of, struck
-from apo_bench.recognition.follow import Event
-from apo_bench.scenario_file import load_scenario, scenario_names
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.stages import OBSERVATION, Shown, show, stream, through
 
 
 def measured(scene: Scene, shown: Shown, level: float, seed: int) -> list[dict[str, object]]:

@@ -4,10 +4,10 @@
 
 Every case draws a kind of file, changes one file of it in one to four places (bytes, tokens or structure, see
 `fuzz_mutate.py`) or puts something in its place that is no file, and runs one command that reads it:
-`apo_bench.cli.main`, in a fork of this process, in a folder of its own. It must end with exit code 0, 1 or 2, without a
-traceback, in 10 s of processor time and 1 GB of memory, and say one sentence at most that a terminal only shows.
-`--case N` runs one case again and shows it; `--write` writes the counts, to `results/fuzz.json`. Case i is drawn from
-`default_rng([seed, i])`.
+`apo_bench.cli.app.main`, in a fork of this process, in a folder of its own. It must end with exit code 0, 1 or 2,
+without a traceback, in 10 s of processor time and 1 GB of memory, and say one sentence at most that a terminal only
+shows. `--case N` runs one case again and shows it; `--write` writes the counts, to `results/fuzz.json`. Case i is
+drawn from `default_rng([seed, i])`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench import __version__, cli
+from apo_bench import __version__
+from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from benchmarks.fuzz_files import Kind, kinds
 from benchmarks.fuzz_mutate import RAN, mutated
@@ -253,7 +254,7 @@ def _within(place: Path, arguments: Sequence[str]) -> int:
 
 
 def _read_plan(name: str) -> int:
-    from apo_bench.files import read_plan
+    from apo_bench.files.json_forms import read_plan
 
     try:
         read_plan(name)

@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench import cli, files
-from apo_bench.csv_observation import table
-from apo_bench.observed import as_planned
-from apo_bench.program import Plan
+from apo_bench.assembly.goals import Plan
+from apo_bench.cli import app as cli
+from apo_bench.files import json_forms as files
+from apo_bench.files.csv_form import table
+from apo_bench.files.observation import as_planned
 from apo_bench.resources import folder
-from apo_bench.scenario_file import load_scenario
+from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"
 

@@ -18,14 +18,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.compare import compare
-from apo_bench.benchmark.figure import draw
-from apo_bench.benchmark.journal import read_rows
-from apo_bench.benchmark.method import as_seen
-from apo_bench.benchmark.page.times import read_timing
-from apo_bench.benchmark.paired import Paired, paired
-from apo_bench.benchmark.report import report
-from apo_bench.benchmark.statistics import Cell, rank, tally, wilson
+from apo_bench.records.method import as_seen
+from apo_bench.records.run_folder import read_rows
+from apo_bench.report.compare import compare
+from apo_bench.report.figures.levels import draw
+from apo_bench.report.figures.times import read_timing
+from apo_bench.report.report import report
+from apo_bench.statistics.paired import Paired, paired
+from apo_bench.statistics.rates import Cell, rank, tally, wilson
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"

@@ -56,7 +56,7 @@ def main(kills: int, seed: int) -> int:
 
 
 def command(out: Path, workers: int) -> list[str]:
-    sweep = [sys.executable, "-m", "apo_bench.cli", "sweep", *GRID, *METHODS]
+    sweep = [sys.executable, "-m", "apo_bench.cli.app", "sweep", *GRID, *METHODS]
     return [*sweep, "--workers", str(workers), "--out", str(out)]
 
 

@@ -23,7 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from benchmarks.switches import Switch, missing, run, switches, under
-from tests.test_success_rate import CASES, RECORD, SEEDS, bits, trial
+from tests.trial.test_success_rate import CASES, RECORD, SEEDS, bits, trial
 
 RESULT = Path(__file__).parent / "results" / "processors.json"
 TOLD = ("as_demonstrated", "success", "failure_stage", "failure_code", "sentence")

@@ -20,13 +20,13 @@ from typing import Any
 
 import mujoco
 
-from apo_bench.benchmark.planning import plan
-from apo_bench.benchmark.stages import see, show
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.arm import Kinematics
-from apo_bench.simulation.replay import replay
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.scene.arm import Kinematics
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.planning import plan
+from apo_bench.trial.stages import see, show
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "profile.json"

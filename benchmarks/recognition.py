@@ -23,14 +23,15 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from apo_bench.assembly import Assembly
-from apo_bench.benchmark.recognised import KINDS, counted, recognised
-from apo_bench.benchmark.recognised_picture import draw_recognitions
-from apo_bench.benchmark.recognised_table import ALL, Recognition, recognition_lines, recognitions, write_recognitions
-from apo_bench.benchmark.stages import see, show
+from apo_bench.assembly.topology import Assembly
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.scenario_file import load_scenario, scenario_names
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.records.relations import RECOGNISED
+from apo_bench.report.figures.recognised import draw_recognitions
+from apo_bench.report.tables.recognised import ALL, Recognition, recognition_lines, recognitions, write_recognitions
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.recognised import counted, recognised
+from apo_bench.trial.stages import see, show
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LOW = 0.5
@@ -49,7 +50,7 @@ def rows_of(scenario: str, seed: int, wide: int, twice: int) -> list[dict[str, A
     """One row for each carelessness, level and way of recognising, as far as a sweep's row says it."""
     made, here = [], scene(scenario)
     levels = LEVELS if seed < wide else tuple(level for level in LEVELS if level <= LOW)
-    kinds = KINDS[: 1 + (seed < wide) + (seed < twice)]
+    kinds = RECOGNISED[: 1 + (seed < wide) + (seed < twice)]
     for careless in (0.0, 1.0) if here.scenario.careless is not None and seed < wide else (0.0,):
         shown = show(here, careless, seed)
         for level, kind in product(levels, kinds) if shown.demonstration.code == "ok" else ():
@@ -106,7 +107,9 @@ def place(row: dict[str, Any]) -> tuple[str, float, float]:
 def table(found: tuple[Recognition, ...]) -> list[str]:
     """All scenarios over the levels, then each scenario with thresholds from the noise."""
     overall = [r for r in found if r.place.scenario == ALL]
-    each = [r for r in found if r.place.scenario != ALL and r.place.relations == KINDS[0] and r.place.careless == 0.0]
+    each = [
+        r for r in found if r.place.scenario != ALL and r.place.relations == RECOGNISED[0] and r.place.careless == 0.0
+    ]
     return [*recognition_lines(overall), "", *matrix(each)]
 
 

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.benchmark.report import report
-from apo_bench.benchmark.slim import NUMBERS
-from apo_bench.benchmark.spec import ROW
+from apo_bench.records.settings import ROW
+from apo_bench.records.slim import NUMBERS
+from apo_bench.report.report import report
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 NOISES = ("isotropic", "anisotropic", "per-part", "camera", "outliers")

@@ -22,11 +22,11 @@ import mujoco
 import numpy as np
 
 import apo_bench  # noqa: F401
-from apo_bench.benchmark.stages import show
-from apo_bench.program import Plan
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.replay import replay
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.assembly.goals import Plan
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.stages import show
 
 ROUNDS = 5
 

@@ -8,15 +8,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.benchmark.calibration import WORDS as CALIBRATION
-from apo_bench.benchmark.calibration import calibration_lines, calibrations
-from apo_bench.benchmark.confusion import confusions
-from apo_bench.benchmark.confusion_table import WORDS as CONFUSION
-from apo_bench.benchmark.confusion_table import confusion_lines
-from apo_bench.benchmark.journal import read_rows
-from apo_bench.benchmark.paired import paired
-from apo_bench.benchmark.statistics import Cell, tally
-from apo_bench.benchmark.verdicts import by_verdict, verdict_of
+from apo_bench.records.run_folder import read_rows
+from apo_bench.records.verdicts import by_verdict, verdict_of
+from apo_bench.report.tables.calibration import WORDS as CALIBRATION
+from apo_bench.report.tables.calibration import calibration_lines
+from apo_bench.report.tables.confusion import WORDS as CONFUSION
+from apo_bench.report.tables.confusion import confusion_lines
+from apo_bench.statistics.calibration import calibrations
+from apo_bench.statistics.confusion import confusions
+from apo_bench.statistics.paired import paired
+from apo_bench.statistics.rates import Cell, tally
 
 ROOT = Path(__file__).parents[1]
 ROWS = ROOT / "benchmarks" / "results" / "rows.jsonl.gz"

@@ -18,10 +18,10 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from apo_bench.benchmark.spec import TrialSpec
-from apo_bench.benchmark.trial import run_trial
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.records.settings import TrialSpec
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.trial import run_trial
 
 SCENARIOS, LEVELS = ("stick_in_tower", "stick_on_castles"), (0.05, 0.1, 0.2)
 STEPS = (0.001, 0.0005)

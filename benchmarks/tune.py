@@ -23,17 +23,17 @@ from pathlib import Path
 from statistics import mean
 from typing import Any, NamedTuple
 
-from apo_bench.benchmark.stages import Shown, attempt, see, show
-from apo_bench.correction.correct import correct
-from apo_bench.correction.least_squares import least_squares
-from apo_bench.correction.penalty import penalty
-from apo_bench.correction.snap import snap
+from apo_bench.assembly.goals import Plan
+from apo_bench.correction.baselines.least_squares import least_squares
+from apo_bench.correction.baselines.penalty import penalty
+from apo_bench.correction.baselines.snap import snap
+from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.pose_error import goal_errors
-from apo_bench.program import Plan
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.scene import Scene, build_scene
-from apo_bench.simulation.settle import settle
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.settling import settle
+from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.stages import Shown, attempt, see, show
 
 SCENARIOS, LEVELS, CARELESS, FIRST_SEED = ("stick_in_tower", "vanished_fixture"), (1.0, 2.0), 1.0, 100_000
 GRIDS: Mapping[str, tuple[Callable[..., Any], Mapping[str, tuple[float, ...]]]] = {

@@ -18,10 +18,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.benchmark.failure_pictures import failure_pictures
-from apo_bench.benchmark.journal import read_rows
-from apo_bench.benchmark.replay_command import replay_command
-from apo_bench.benchmark.statistics import rank
+from apo_bench.records.replay_command import replay_command
+from apo_bench.records.run_folder import read_rows
+from apo_bench.show.failure_pictures import failure_pictures
+from apo_bench.statistics.rates import rank
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"

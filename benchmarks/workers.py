@@ -14,13 +14,13 @@ import statistics
 import time
 from pathlib import Path
 
-from apo_bench.benchmark.crew import spread
-from apo_bench.benchmark.fingerprint import content_hash
-from apo_bench.benchmark.grid import SweepSpec, load_all, units
-from apo_bench.benchmark.row import Row
-from apo_bench.benchmark.terms import Terms, versions
-from apo_bench.benchmark.worker import Timing
-from apo_bench.simulation.arm import find_arm
+from apo_bench.records.row import Row
+from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.grid import SweepSpec, load_all, units
+from apo_bench.sweeps.local.pool import spread
+from apo_bench.sweeps.worker import Timing
+from apo_bench.trial.fingerprint import content_hash
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 RESULT = Path(__file__).parent / "results" / "workers.json"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.benchmark.card import cards
-from apo_bench.benchmark.graph_picture import draw_graph
-from apo_bench.benchmark.graph_text import graph_title
-from apo_bench.graph import relation_graph
-from apo_bench.scenario_file import load_scenario, scenario_names
+from apo_bench.assembly.graph import relation_graph
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.show.card import cards
+from apo_bench.show.graph.picture import draw_graph
+from apo_bench.show.graph.text import graph_title
 
 HERE = Path(__file__).parent
 PICTURE = "pictures/graph_{}.png"

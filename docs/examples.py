@@ -17,14 +17,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from apo_bench.benchmark.planning import plan
-from apo_bench.benchmark.stages import attempt, see, show
+from apo_bench.assembly.goals import Plan, ReplayResult
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.program import Plan, ReplayResult
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.render import Camera, picture_with_arm, view
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.render import Camera, picture_with_arm, view
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.planning import plan
+from apo_bench.trial.stages import attempt, see, show
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 5

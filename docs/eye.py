@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.benchmark.eye_one import see_once
-from apo_bench.benchmark.eye_picture import draw_eye
+from apo_bench.show.eye_one import see_once
+from apo_bench.show.eye_picture import draw_eye
 
 HERE = Path(__file__).parent
 SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}

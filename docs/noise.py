@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.benchmark.noise_card import SCENARIO, demonstrated, described, draw, listed, measured
-from apo_bench.benchmark.noise_picture import draw_histogram
-from apo_bench.correction.correct import correct
+from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observe import observe
+from apo_bench.observation.observing import observe
+from apo_bench.show.noise_card import SCENARIO, demonstrated, described, draw, listed, measured
+from apo_bench.show.noise_picture import draw_histogram
 
 HERE = Path(__file__).parent
 PICTURE = "pictures/noise_{}.png"
@@ -36,9 +36,9 @@ turns. Levels only scale the same draws, so one seed gives comparable errors at 
 below see everything exactly as it was shown. What is stated also holds the mean square of the human's carelessness,
 where the scenario has any, and at least 0.05 mm and 0.05 deg.
 
-`tests/test_noise_laws.py` and, for what is measured, `tests/test_measured_noise.py` hold all of them to the same laws:
-over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice of the world
-frame; what was not seen is never carried out; what was seen reaches the robot bit for bit.
+`tests/observation/test_laws.py` and, for what is measured, `tests/observation/test_measured_noise.py` hold all of them
+to the same laws: over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice
+of the world frame; what was not seen is never carried out; what was seen reaches the robot bit for bit.
 
 Pictures show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part,
 and as a line the Gaussian with the covariance that was stated; densities are logarithmic, and the outermost bins hold

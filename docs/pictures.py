@@ -10,14 +10,14 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 
-from apo_bench.benchmark.believed_picture import belief, draw_beliefs
-from apo_bench.benchmark.stages import attempt, see, show
-from apo_bench.correction.correct import correct
+from apo_bench.assembly.goals import Plan
+from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.program import Plan
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.render import Film, view
-from apo_bench.simulation.scene import build_scene
+from apo_bench.scenario.file import load_scenario
+from apo_bench.show.believed_picture import belief, draw_beliefs
+from apo_bench.simulation.scene.render import Film, view
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.stages import attempt, see, show
 
 HERE = Path(__file__).parent / "pictures"
 SEED, LEVEL = 7, 2.0

@@ -14,10 +14,10 @@ sys.path.insert(0, str(ROOT))
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.judge_finished import fixtures
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.render import Camera, picture, view
-from apo_bench.simulation.scene import build_scene
+from apo_bench.judging.finished import fixtures
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.render import Camera, picture, view
+from apo_bench.simulation.scene.scene import build_scene
 from tests import audited_states as audited
 from tests import test_judge as first
 from tests.end_states import reached, verdict

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.scenario_file import load_scenario
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene, build_scene
 from benchmarks.switches import missing
 
 

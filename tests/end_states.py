@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from apo_bench.assembly.goals import Reached, Snapshot
+from apo_bench.assembly.placement import placed
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.judge import Verdict, judge
-from apo_bench.judgement import Judgement
-from apo_bench.placement import placed
-from apo_bench.program import Reached, Snapshot
-from apo_bench.thresholds import Thresholds
+from apo_bench.judging.judgement import Judgement
+from apo_bench.judging.verdict import Verdict, judge
+from apo_bench.records.thresholds import Thresholds
 from tests import scenes
 
 CLEARANCE_MM = 0.25

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, PartFace
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box, Face, Solid
-from apo_bench.placement import placed
-from apo_bench.program import Demonstration, Observation
 
 AXES = {"x": 0, "y": 1, "z": 2}
 

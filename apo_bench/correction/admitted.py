@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.assembly.goals import Observation
 from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import FARTHEST_M, rigid
-from apo_bench.program import Observation
 
 ASYMMETRY = 1e-9
 """Of its largest entry, how far a covariance may be from symmetric."""

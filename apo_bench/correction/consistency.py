@@ -15,12 +15,12 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly
-from apo_bench.correction.compact import Compact
-from apo_bench.correction.manifold import Nearest, nearest
+from apo_bench.assembly.goals import Consistency, Suspect
+from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import rank
+from apo_bench.correction.solvers.compact import Compact
+from apo_bench.correction.solvers.manifold import Nearest, nearest
 from apo_bench.geometry.arrays import Array
-from apo_bench.program import Consistency, Suspect
 
 LEVEL = 0.01
 """False alarms that are accepted."""

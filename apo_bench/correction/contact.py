@@ -11,14 +11,14 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction import compiled
+from apo_bench.assembly.goals import Consistency, Correction, Iterate, Observation, Suspect
 from apo_bench.correction.consistency import LEVEL
 from apo_bench.correction.ending import refused, sentence
-from apo_bench.correction.manifold import Nearest, nearest
 from apo_bench.correction.posterior import freedom, marginals, rank
 from apo_bench.correction.problem import Problem, Solver, problem
+from apo_bench.correction.solvers import compiled
+from apo_bench.correction.solvers.manifold import Nearest, nearest
 from apo_bench.errors import InputError
-from apo_bench.program import Consistency, Correction, Iterate, Observation, Suspect
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
 DROPS = 3

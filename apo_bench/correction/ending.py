@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench import outcomes
-from apo_bench.correction.equations import gap
-from apo_bench.correction.newton import Solution
-from apo_bench.program import Correction, Observation
+from apo_bench.assembly.equations import gap
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.solvers.newton import Solution
+from apo_bench.records import outcomes
 
 
 def status(found: Solution, left_m: float, gap_m: float) -> str:

@@ -16,18 +16,18 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import ODL, Assembly, Operation
+from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import ODL, Assembly, Operation
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.holding import Hold, by_relation, holds
-from apo_bench.correction.manifold import nearest
 from apo_bench.correction.posterior import LARGE, Freedom, freedom
 from apo_bench.correction.problem import problem
+from apo_bench.correction.solvers.manifold import nearest
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
-from apo_bench.placement import placed
-from apo_bench.program import Observation, Poses
 
 ZERO = 1e-7
 """Of an orthonormal basis, components below are rounding."""

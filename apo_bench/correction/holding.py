@@ -14,9 +14,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import ODL, Assembly, inverted, simplified
-from apo_bench.correction.compact import Compact
+from apo_bench.assembly.topology import ODL, Assembly, inverted, simplified
 from apo_bench.correction.posterior import CUT_OFF
+from apo_bench.correction.solvers.compact import Compact
 from apo_bench.geometry.arrays import Array
 
 

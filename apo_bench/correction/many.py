@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly.equations import Equations, equations, lies_on
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
-from apo_bench.correction.compact import Compact, compact, moments
 from apo_bench.correction.contact import ContactCorrector, contact
-from apo_bench.correction.equations import Equations, equations, lies_on
-from apo_bench.correction.manifold import Nearest
-from apo_bench.correction.walls import asked
-from apo_bench.correction.whitened import scales
+from apo_bench.correction.solvers.compact import Compact, compact, moments
+from apo_bench.correction.solvers.manifold import Nearest
+from apo_bench.correction.solvers.walls import asked
+from apo_bench.correction.solvers.whitened import scales
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.program import Correction, Observation
 
 CHUNK = 64
 """Observations that are solved together: more would leave the cache of the processor."""

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpstrf
 
-from apo_bench.correction import sparse
-from apo_bench.correction.compact import compact
-from apo_bench.correction.equations import equations
-from apo_bench.correction.manifold import Nearest
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.solvers import sparse
+from apo_bench.correction.solvers.compact import compact
+from apo_bench.correction.solvers.manifold import Nearest
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
-from apo_bench.program import Correction, Observation
 
 LARGE = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""

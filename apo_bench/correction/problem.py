@@ -9,14 +9,14 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.compact import Compact, compact
+from apo_bench.assembly.equations import Equations, equations, largest
+from apo_bench.assembly.goals import Consistency, Observation, Suspect
 from apo_bench.correction.consistency import LEVEL, SOFT_M, measured, narrowed, p_value, slack, suspects
-from apo_bench.correction.equations import Equations, equations, largest
-from apo_bench.correction.manifold import Nearest, nearest
-from apo_bench.correction.walls import Walls, asked, between, left_open, touching
-from apo_bench.correction.whitened import scales
+from apo_bench.correction.solvers.compact import Compact, compact
+from apo_bench.correction.solvers.manifold import Nearest, nearest
+from apo_bench.correction.solvers.walls import Walls, asked, between, left_open, touching
+from apo_bench.correction.solvers.whitened import scales
 from apo_bench.geometry.arrays import Array
-from apo_bench.program import Consistency, Observation, Suspect
 
 Solver = Callable[[Compact, Array, Array], Nearest]
 """(equations, goals seen, L) -> nearest goals; `manifold.nearest` and what does the same."""

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, failed, unknown
 from apo_bench.names import resolve
-from apo_bench.observation.level import Level
-from apo_bench.program import Demonstration, Observation
+from apo_bench.observation.models.level import Level
 
 __all__ = ["NOISES", "Level", "Noise", "make_noise"]
 
@@ -23,16 +23,16 @@ Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 
 NOISES = MappingProxyType(
     {
-        "isotropic": "apo_bench.observation.isotropic:Isotropic",
-        "anisotropic": "apo_bench.observation.anisotropic:Anisotropic",
-        "per-part": "apo_bench.observation.per_part:PerPart",
-        "camera": "apo_bench.observation.sighted:Sighted",
-        "heavy-tailed": "apo_bench.observation.heavy_tailed:HeavyTailed",
-        "outliers": "apo_bench.observation.outliers:Outliers",
-        "bias": "apo_bench.observation.bias:Bias",
-        "bias-view": "apo_bench.observation.bias_view:BiasView",
-        "correlated": "apo_bench.observation.correlated:Correlated",
-        "symmetric": "apo_bench.observation.symmetric:Symmetric",
+        "isotropic": "apo_bench.observation.models.isotropic:Isotropic",
+        "anisotropic": "apo_bench.observation.models.anisotropic:Anisotropic",
+        "per-part": "apo_bench.observation.models.per_part:PerPart",
+        "camera": "apo_bench.observation.models.sighted:Sighted",
+        "heavy-tailed": "apo_bench.observation.models.heavy_tailed:HeavyTailed",
+        "outliers": "apo_bench.observation.models.outliers:Outliers",
+        "bias": "apo_bench.observation.models.bias:Bias",
+        "bias-view": "apo_bench.observation.models.bias_view:BiasView",
+        "correlated": "apo_bench.observation.models.correlated:Correlated",
+        "symmetric": "apo_bench.observation.models.symmetric:Symmetric",
     }
 )
 
@@ -77,7 +77,7 @@ def _made(model: Any, name: str, level: Level) -> Noise:
         _check(model, 1, f"the noise model '{name}' is a class that cannot be made with one argument, the level")
         model = model(level)
     if _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3)):
-        from apo_bench.observation.plain import declared
+        from apo_bench.observation.models.plain import declared
 
         return declared(model, name)
     _check(model, 3, f"the noise model '{name}' cannot be called with (assembly, shown, rng)")

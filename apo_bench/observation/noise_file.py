@@ -6,15 +6,16 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from apo_bench.observation.camera import Camera
-from apo_bench.observation.empirical import PREFIX, Empirical, empirical_noise
-from apo_bench.observation.fitted import LEAST_FREEDOM, SMALLEST, Fitted, Measured
-from apo_bench.observation.level import Level
-from apo_bench.observation.tails import Split, Tail
+from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.empirical import Empirical, empirical_noise
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Fitted, Measured
+from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.tails import Split, Tail
+from apo_bench.records.short_names import RESIDUALS
 from apo_bench.resources import folder
-from apo_bench.scenario_keys import read_pose
-from apo_bench.strict_json import Node
-from apo_bench.strict_toml import read_toml
+from apo_bench.scenario.keys import read_pose
 
 SCHEMA = "apo-bench/noise/1"
 FARTHEST_MM = 1e5
@@ -32,8 +33,8 @@ def noise_path(name: str) -> Path | None:
 
     A path that ends in .toml, a name that comes with the package, or `empirical:` and the path of a file of residuals.
     """
-    if name.startswith(PREFIX):
-        return Path(name.removeprefix(PREFIX))
+    if name.startswith(RESIDUALS):
+        return Path(name.removeprefix(RESIDUALS))
     if name.endswith(".toml"):
         return Path(name)
     return presets().get(name)
@@ -48,7 +49,7 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
     path = noise_path(name)
     if path is None:
         return None
-    if name.startswith(PREFIX):
+    if name.startswith(RESIDUALS):
         return empirical_noise(path, level)
     measured, camera = read_noise(path)
     return Fitted(measured, level, camera)

@@ -12,63 +12,32 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Gap, Operation, PartFace
+from apo_bench.assembly.facing import height, opposed
+from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.graph import relation_graph
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Face
-from apo_bench.graph import relation_graph
 from apo_bench.names import resolve
-from apo_bench.placement import placed
-from apo_bench.program import Observation, Poses
-from apo_bench.recognition.facing import height, opposed
+from apo_bench.records.relations import GIVEN, SHIFT_MM, relations_name
+from apo_bench.records.short_names import RELATIONS
 
 Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
 
-GIVEN = "given"
-"""The contacts come with the demonstration, and are right."""
-WRONG = MappingProxyType(
-    {
-        "missed": "apo_bench.observation.relations:missed",
-        "false": "apo_bench.observation.relations:false",
-        "shifted": "apo_bench.observation.relations:Shifted",
-    }
-)
-KINDS = (GIVEN, *WRONG)
-SHIFT_MM, LARGEST_SHIFT_MM = 2.0, 50.0
 OPPOSED_RAD = math.radians(10.0)
 """Faces look at each other if one normal is this near to the opposite of the other."""
 TOUCHING_M, NEAR_M = 0.5e-3, 15e-3
 """Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
 COVERED_M2 = 25e-6
 """Faces that cover less of each other do not meet, (5 mm)^2."""
-
-
-def relations_name(given: str) -> str:
-    """How rows spell it: `shifted` stands for 2 mm, `shifted:3.0` is `shifted:3`.
-
-    Raises:
-        InputError: A size that is not allowed.
-    """
-    kind, _, size = given.partition(":")
-    if kind != "shifted":
-        return given
-    try:
-        size_mm = float(size or SHIFT_MM)
-    except ValueError:
-        size_mm = math.nan
-    if not 0.0 < size_mm <= LARGEST_SHIFT_MM:
-        raise InputError(
-            f"the relations '{given}' were given; a size above 0 and up to {LARGEST_SHIFT_MM:g} mm is allowed: "
-            "shifted:3."
-        )
-    return f"shifted:{size_mm:g}"
 
 
 def make_relations(given: Any) -> Relations | None:
@@ -87,8 +56,7 @@ def make_relations(given: Any) -> Relations | None:
         return None
     if name.startswith("shifted:"):
         return Shifted(float(name.partition(":")[2]) * 1e-3)
-    known = dict.fromkeys(KINDS, "") | WRONG
-    return _callable(resolve(name, known, "kind of relations"), name)
+    return _callable(resolve(name, RELATIONS, "kind of relations"), name)
 
 
 def told(seen: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator) -> Observation:

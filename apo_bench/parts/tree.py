@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from apo_bench.errors import InputError
+from apo_bench.io.reading import read_text
 from apo_bench.parts.allowed import ALLOWED, MOST_CLASSES, REMEDIES, Allowed
-from apo_bench.reading import read_text
 
 DEEPEST = 8
 """Levels of nesting; classes stand in classes, all else at most four levels deep."""

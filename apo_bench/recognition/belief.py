@@ -12,10 +12,10 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
+from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.program import Observation, Poses
 
 
 class Standing(NamedTuple):

@@ -9,9 +9,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from apo_bench.assembly.facing import Facing
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.recognition.facing import Facing
 
 SOFT_M, SOFT_RAD = 0.1e-3, math.radians(0.1)
 """Standard deviation of a contact that is there: parts sink in a little, and the filter is linear."""

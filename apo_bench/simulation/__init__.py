@@ -1,5 +1,5 @@
 """The only room that knows MuJoCo, mink and dm-control: scenes, hands, the arm, replay, pictures."""
 
-from apo_bench.simulation.graphics import import_mujoco
+from apo_bench.simulation.scene.graphics import import_mujoco
 
 import_mujoco()

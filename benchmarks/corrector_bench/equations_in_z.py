@@ -7,8 +7,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.correction.equations import Equations
-from apo_bench.correction.whitened import Whitened
+from apo_bench.assembly.equations import Equations
+from apo_bench.correction.solvers.whitened import Whitened
 from apo_bench.geometry.arrays import Array
 
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
-from apo_bench.correction.compact import Compact
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.correction.solvers.compact import Compact
 from apo_bench.geometry.arrays import Array
-from apo_bench.program import Correction, Observation
 from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.peers import Run, Task
 from benchmarks.corrector_bench.problems import Problem
@@ -24,29 +24,29 @@ from benchmarks.corrector_bench.problems import Problem
 
 def contact(task: Task) -> Run:
     """Plain numpy, whole."""
-    from apo_bench.correction.compact import compact
-    from apo_bench.correction.manifold import nearest
+    from apo_bench.correction.solvers.compact import compact
+    from apo_bench.correction.solvers.manifold import nearest
 
     return _whole(task, compact, nearest)
 
 
 def contact_alone(task: Task) -> Run:
     """Plain numpy, the solve alone."""
-    from apo_bench.correction.manifold import nearest
+    from apo_bench.correction.solvers.manifold import nearest
 
     return _alone(task, nearest)
 
 
 def compiled(task: Task) -> Run:
     """The optional compiled kernel, whole."""
-    from apo_bench.correction.compiled import compact, nearest
+    from apo_bench.correction.solvers.compiled import compact, nearest
 
     return _whole(task, compact, nearest)
 
 
 def compiled_alone(task: Task) -> Run:
     """The optional compiled kernel, the solve alone."""
-    from apo_bench.correction.compiled import nearest
+    from apo_bench.correction.solvers.compiled import nearest
 
     return _alone(task, nearest)
 
@@ -63,7 +63,7 @@ def _whole(task: Task, compact: Callable[..., Compact], nearest: Callable[..., A
 
 
 def _alone(task: Task, nearest: Callable[..., Any]) -> Run:
-    from apo_bench.correction.compact import compact
+    from apo_bench.correction.solvers.compact import compact
 
     system, L = compact(task.system, len(task.seen)), factors(task.covariance)
     return lambda: nearest(system, task.seen, L).goals
@@ -71,8 +71,8 @@ def _alone(task: Task, nearest: Callable[..., Any]) -> Run:
 
 def dense(task: Task) -> Run:
     """Plain numpy, whole, on dense matrices whatever the size."""
-    from apo_bench.correction.compact import compact
-    from apo_bench.correction.manifold import Nearest, nearest
+    from apo_bench.correction.solvers.compact import compact
+    from apo_bench.correction.solvers.manifold import Nearest, nearest
 
     def one_of_one(system: Compact, seen: Array, L: Array) -> Nearest:
         found = nearest(system, seen[None], L[None])
@@ -101,15 +101,15 @@ def observation(of: Problem, given: Draw, assembly: Assembly | None = None) -> O
 
 def corrected(seen: Observation, name: str = "contact") -> Correction:
     """By the corrector itself, with its test and its posterior."""
-    from apo_bench.correction.correct import correct
+    from apo_bench.correction.correctors import correct
 
     return correct(seen, name)
 
 
 def together(of: Problem, seen: Array, covariance: Array) -> Array:
     """Goals of many observations, (b, n, 4, 4), covariance (b, n, 6, 6), plain numpy, in chunks as the package does."""
-    from apo_bench.correction.manifold import nearest
     from apo_bench.correction.many import CHUNK, compact_many
+    from apo_bench.correction.solvers.manifold import nearest
 
     pattern, L = of.system(seen[0]), factors(covariance)
     found = []

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from apo_bench.correction.equations import Equations
+from apo_bench.assembly.equations import Equations
 from apo_bench.geometry.arrays import Array
 from benchmarks.corrector_bench.draws import factors
 from benchmarks.corrector_bench.equations_in_z import InZ
@@ -46,7 +46,7 @@ def peers() -> dict[str, Peer]:
 
 def newton(task: Task) -> Run:
     """Section 3.3's Newton with minimum-norm steps, as `paper` uses it."""
-    from apo_bench.correction.newton import solve
+    from apo_bench.correction.solvers.newton import solve
 
     free = range(len(task.seen))
     return lambda: solve(task.system, task.seen, free).goals

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.correction.equations import Equations
+from apo_bench.assembly.equations import Equations
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian

@@ -1,0 +1,220 @@
+"""The face contact equations of an assembly and their Jacobian (Eq. 1, 3 and 26, misprints mended).
+
+A contact says that vertices v of a face of the environment part b lie on the plane n of a face of the manipulated
+part a:  e = n D_a^-1 D_b v = 0, with n = (n_x, n_y, n_z, -d) in the frame of a and v = (x, y, z, 1) in that of b.
+Both D are the ODLs right after the operation that made the contact; contacts that were lost later stay in.
+
+A part that was never moved rests where it started. That pose is one more motion parameter, known and never free:
+the operations are preceded by one operation per part that puts it at its start.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, product, simplified
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Face
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """m scalar equations in the motion parameters of n operations; the vertices stay as they are during a solve."""
+
+    start: Array
+    """(p, 4, 4): the constant motion parameters."""
+    letters: NDArray[np.intp]
+    """(c, w): the word D_a^-1 D_b of each contact; p start poses, then n goals, then the identity as padding."""
+    inverse: NDArray[np.bool_]
+    """(c, w): which letters of the words are inverted."""
+    made: NDArray[np.intp]
+    """(c,): the operation that made each contact, counted from 0."""
+    contact: NDArray[np.intp]
+    """(m,): the contact of each equation."""
+    plane: Array
+    """(m, 4): n of Eq. 1, frame of the manipulated part."""
+    vertex: Array
+    """(m, 4): v of Eq. 1, frame of the environment part, [m]."""
+
+    def __len__(self) -> int:
+        return len(self.contact)
+
+    def variables(self, n: int) -> tuple[int, ...]:
+        """The operations, of `n`, whose motion parameters occur, the most recent first."""
+        occurring = np.unique(self.letters) - len(self.start)
+        return tuple(int(k) for k in occurring[::-1] if 0 <= k < n)
+
+    def containing(self, free: Collection[int]) -> NDArray[np.bool_]:
+        """Whether the motion parameter of one of these operations occurs in the word of each contact, (c,)."""
+        wanted = np.array(sorted(free), dtype=np.intp) + len(self.start)
+        return np.asarray(np.isin(self.letters, wanted).any(axis=1))
+
+    def among(self, contacts: NDArray[np.bool_]) -> Equations:
+        """The equations of these contacts, (c,), alone."""
+        rows, number = contacts[self.contact], np.cumsum(contacts) - 1
+        return Equations(
+            start=self.start,
+            letters=self.letters[contacts],
+            inverse=self.inverse[contacts],
+            made=self.made[contacts],
+            contact=number[self.contact[rows]],
+            plane=self.plane[rows],
+            vertex=self.vertex[rows],
+        )
+
+    def gaps(self, goals: Array) -> Array:
+        """The largest |e| of each contact, (c,), [m]; NaN where a number is not finite."""
+        largest_of_each = np.zeros(len(self.letters))
+        np.maximum.at(largest_of_each, self.contact, np.abs(self.residual(goals)))
+        return largest_of_each
+
+    def residual(self, goals: Array) -> Array:
+        """e of every equation, (m,), [m]: positive where faces are apart, negative where they are inside each other."""
+        return np.einsum("mi,mi->m", self.plane, self._points(self._matrices(goals))[0])
+
+    def linearised(self, goals: Array) -> tuple[Array, Array]:
+        """e, (m,), and its derivative by the body twists of all goals, (m, 6 n), [m] per [m] and [rad] (Eq. 14).
+
+        A letter T in n .. T .. v turns n (everything up to T) = (a, .) and (everything behind T) v = p, so its rows
+        are +(a, p x a); T^-1 stays on the side of v, and its rows are -(a, p x a). A T that occurs twice adds up.
+        """
+        m, n, w = len(self), len(goals), self.letters.shape[1]
+        F = self._matrices(goals)
+        points, forms = np.array(self._points(F)), np.array(self._forms(F))
+        inverse = self.inverse[self.contact].T
+        side = np.arange(w)[:, None] + ~inverse, np.arange(m)
+        a, p = forms[side][..., :3].reshape(-1, 3), points[side][..., :3].reshape(-1, 3)
+        rows = np.concatenate([a, _cross(p, a)], axis=1).reshape(w, m, 6) * np.where(inverse, -1.0, 1.0)[..., None]
+        J, columns = np.zeros((m, n + 1, 6)), self._columns(n)[self.contact]
+        for j in range(w):
+            J[np.arange(m), columns[:, j]] += rows[j]
+        return np.einsum("mi,mi->m", self.plane, points[0]), J[:, :n].reshape(m, 6 * n)
+
+    def _columns(self, n: int) -> NDArray[np.intp]:
+        """The operation of each letter, (c, w); n for letters that are constants."""
+        k = self.letters - len(self.start)
+        return np.where((k >= 0) & (k < n), k, n)
+
+    def _matrices(self, goals: Array) -> Array:
+        """F_1 .. F_w of the word of each equation, (m, w, 4, 4)."""
+        F = np.concatenate([self.start, goals, np.eye(4)[None]])[self.letters]
+        return np.where(self.inverse[..., None, None], pose.inverse(F), F)[self.contact]
+
+    def _points(self, F: Array) -> list[Array]:
+        """F_j+1 .. F_w v for every j: the vertices on their way to the frame of the plane, [(m, 4)]."""
+        points = [self.vertex]
+        for j in reversed(range(F.shape[1])):
+            points.append(np.einsum("mij,mj->mi", F[:, j], points[-1]))
+        return points[::-1]
+
+    def _forms(self, F: Array) -> list[Array]:
+        """n F_1 .. F_j for every j: the planes on their way to the frame of the vertices, [(m, 4)]."""
+        forms = [self.plane]
+        for j in range(F.shape[1]):
+            forms.append(np.einsum("mi,mij->mj", forms[-1], F[:, j]))
+        return forms
+
+
+def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[int] | None = None) -> Equations:
+    """All equations in which a free motion parameter occurs, of contacts that stand and of contacts that were lost.
+
+    The vertices are the corners of the smaller face of a pair, laid onto the plane of the other one at `goals`: of
+    one face only, since both would raise the spurious singular values, and whole, since a lever as long as a table
+    turns a degree into centimetres and a clipped polygon changes with the noise.
+
+    Args:
+        goals: (n, 4, 4), where the vertices are taken, world frame, [m].
+        free: Operations counted from 0; None stands for every contact, in the order of `assembly.relations()`.
+    """
+    parts = tuple(assembly.solids)
+    constants = np.array([start[part] for part in parts]).reshape(-1, 4, 4)
+    chosen = _words(assembly, parts)
+    stack = np.concatenate([constants, goals])
+    flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
+    vertices = [_vertices(flats[c.manipulated], flats[c.environment], word, stack) for c, _, word in chosen]
+    contact = np.repeat(np.arange(len(chosen)), [len(v) for v in vertices]).astype(np.intp)
+    width = max((len(word) for _, _, word in chosen), default=0)
+    padded = [[*word, *[(len(stack), False)] * (width - len(word))] for _, _, word in chosen]
+    table = np.array(padded, dtype=np.intp).reshape(len(chosen), width, 2)
+    system = Equations(
+        start=constants,
+        letters=table[..., 0],
+        inverse=table[..., 1].astype(np.bool_),
+        made=np.array([made for _, made, _ in chosen], dtype=np.intp),
+        contact=contact,
+        plane=np.array([flats[c.manipulated].plane for c, _, _ in chosen]).reshape(-1, 4)[contact],
+        vertex=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in vertices)]),
+    )
+    return system if free is None else system.among(system.containing(free))
+
+
+def lies_on(assembly: Assembly, contact: Contact) -> bool:
+    """Whether the vertices are the corners of the manipulated face, so that they depend on the goals."""
+    return _smaller(_flat(assembly.face(contact.manipulated)), _flat(assembly.face(contact.environment)))
+
+
+def gap(assembly: Assembly, start: Poses, goals: Array) -> float:
+    """The largest |e| of all contacts at `goals`, [m]; 0 if there are none."""
+    return largest(equations(assembly, start, goals).residual(goals))
+
+
+def largest(e: Array) -> float:
+    """The largest |e|, 0 of none."""
+    return float(np.max(np.abs(e), initial=0.0))
+
+
+def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, int, ODL]]:
+    """Every contact ever made, the operation that made it, and D_a^-1 D_b, simplified.
+
+    Term k stands for the start of part k, then for the operations.
+    """
+    rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
+    return [
+        (contact, k - len(parts), simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part])))
+        for k, (operation, D) in enumerate(zip(rooted.operations, rooted.walk(), strict=True))
+        for contact in operation.contacts
+    ]
+
+
+class _Flat(NamedTuple):
+    """What the equations need of a face, measured once."""
+
+    corners: Array
+    plane: Array
+    area: float
+
+
+def _flat(face: Face) -> _Flat:
+    """Corners (k, 3), face equation of Eq. 1 (4,), area inside the outline (Newell's formula)."""
+    corners = face.outline
+    twice = _cross(corners, np.concatenate([corners[1:], corners[:1]])).sum(axis=0)
+    size = math.sqrt(twice @ twice)
+    n = twice / size
+    return _Flat(corners, np.append(n, -(corners @ n).sum() / len(corners)), size / 2)
+
+
+def _vertices(manipulated: _Flat, environment: _Flat, word: ODL, stack: Array) -> Array:
+    """The contact vertices of a pair of faces, (k, 3), frame of the environment part, [m]."""
+    if not _smaller(manipulated, environment):
+        return environment.corners
+    corners = pose.apply(pose.inverse(product(word, stack)), manipulated.corners)
+    n = environment.plane
+    return corners - np.outer(corners @ n[:3] + n[3], n[:3])
+
+
+def _smaller(manipulated: _Flat, environment: _Flat) -> bool:
+    return environment.area > manipulated.area * (1 + 1e-9)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products, (m, 3): as `np.cross`, quicker on few rows."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]

@@ -1,0 +1,165 @@
+"""The relation graph of Sections 3.1, 3.2.2 and 3.3: parts at their placements, and the contacts between them (Fig. 7).
+
+A part that is moved again, also when it is carried, becomes a new node. An arc that stands joins the nodes its parts
+have now; one that disappeared joins those they had when it was made, and keeps them in the graph.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+from apo_bench.assembly.equations import equations, largest
+from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, inverted, simplified, spelled
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+
+Residuals = Sequence[float | None]
+"""The largest |e| of every arc, [m]; None where an operation was not seen."""
+
+
+@final
+@dataclass(frozen=True)
+class Node:
+    """A part at one of its placements."""
+
+    part: str
+    placed: int | None
+    """The operation that put it there, counted from 0; None for a part that was never moved."""
+    odl: ODL
+    """What its pose is a product of; empty for a part that was never moved."""
+
+    def __str__(self) -> str:
+        """`cube2 (6): T6 T5^-1 T2`; a part that was never moved has the T0 of the paper's work table."""
+        if self.placed is None:
+            return f"{self.part}: T0"
+        return f"{self.part} ({self.placed + 1}): {spelled(self.odl)}"
+
+
+@final
+@dataclass(frozen=True)
+class Arc:
+    """All contacts that one operation made between two parts."""
+
+    name: str
+    """R1, R2, ... in the order in which they were made."""
+    manipulated: Node
+    environment: Node
+    contacts: tuple[Contact, ...]
+    made: int
+    """The operation that made them, counted from 0."""
+    lost: int | None
+    """The operation at which they disappeared, or None while they stand."""
+    asked: tuple[Gap, ...] = ()
+    """How far apart the faces of each contact are asked to be; empty stands for `centred` throughout."""
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.manipulated.part} -> {self.environment.part}"
+
+    @property
+    def pairs(self) -> tuple[str, ...]:
+        """The faces that touch, manipulated first: `nz-top`; with what is asked of them, if that is not `centred`."""
+        asked = self.asked or (Gap(),) * len(self.contacts)
+        return tuple(
+            f"{contact.manipulated.face}-{contact.environment.face}{'' if gap == Gap() else f' ({gap})'}"
+            for contact, gap in zip(self.contacts, asked, strict=True)
+        )
+
+    @property
+    def operations(self) -> frozenset[int]:
+        """The operations whose motion parameters occur in the equations D_a^-1 D_b of this arc (Eq. 26)."""
+        word = simplified((*inverted(self.manipulated.odl), *self.environment.odl))
+        return frozenset(term.operation for term in word)
+
+
+@final
+@dataclass(frozen=True)
+class Graph:
+    """The relation graph after some operations."""
+
+    step: int
+    """How many operations are done."""
+    nodes: tuple[Node, ...]
+    """Parts that were never moved first, then as they were placed, main parts before those they carried."""
+    arcs: tuple[Arc, ...]
+
+    def stands(self, node: Node) -> bool:
+        """Whether the part is still where this node puts it."""
+        return not any(other.part == node.part and _time(other) > _time(node) for other in self.nodes)
+
+
+def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
+    """The graph after `step` operations (None: all of them).
+
+    Nodes are the fixed parts, the parts that were moved, and what arcs hang on.
+
+    Raises:
+        InputError: There is no such step.
+    """
+    done = _known(assembly, len(assembly) if step is None else step)
+    history = _history(done)
+    arcs = _arcs(done, history)
+    present = [node for node in history[-1].values() if node.placed is not None or node.part in done.fixed]
+    joined = [node for arc in arcs for node in (arc.manipulated, arc.environment)]
+    return Graph(len(done), tuple(sorted(dict.fromkeys([*present, *joined]), key=_order)), arcs)
+
+
+def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
+    """The largest |e| of every arc, [m], at `goals` (n, 4, 4), world frame, [m] (Section 3.3)."""
+    done, reached = assembly.first(graph.step), goals[: graph.step]
+    gaps = equations(done, start, reached).gaps(reached)
+    mine = [[r.made == arc.made and r.contact in arc.contacts for r in done.relations()] for arc in graph.arcs]
+    return tuple(largest(gaps[chosen]) for chosen in mine)
+
+
+def seen_residuals(seen: Observation, graph: Graph) -> tuple[float | None, ...]:
+    """The same at what was seen; None for an arc whose equations need an operation that was not."""
+    residuals = arc_residuals(seen.assembly, seen.start, seen.goals, graph)
+    known = [all(seen.seen[k] for k in arc.operations) for arc in graph.arcs]
+    return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))
+
+
+def _known(assembly: Assembly, step: int) -> Assembly:
+    if not 1 <= step <= len(assembly):
+        raise InputError(
+            f"step {step} was given, the demonstration has {len(assembly)} operations; give a step "
+            f"from 1 to {len(assembly)}."
+        )
+    return assembly.first(step)
+
+
+def _history(assembly: Assembly) -> list[dict[str, Node]]:
+    """The node of every part before the first operation and after each."""
+    now = {part: Node(part, None, ()) for part in assembly.solids}
+    history = [now]
+    for k, (operation, odls) in enumerate(zip(assembly.operations, assembly.odls(), strict=True)):
+        now = now | {part: Node(part, k, odls[part]) for part in operation.moves}
+        history.append(now)
+    return history
+
+
+def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]:
+    """One for each pair of parts and operation."""
+    together: dict[tuple[int, str, str], list[Relation]] = {}
+    for relation in assembly.relations():
+        manipulated, environment = relation.contact
+        together.setdefault((relation.made, manipulated.part, environment.part), []).append(relation)
+    arcs = []
+    for i, ((made, a, b), relations) in enumerate(together.items(), start=1):
+        lost = relations[0].lost
+        nodes = history[-1 if lost is None else made + 1]
+        contacts = tuple(r.contact for r in relations)
+        asked = tuple(assembly.gaps.get(contact, Gap()) for contact in contacts)
+        arcs.append(Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, asked))
+    return tuple(arcs)
+
+
+def _order(node: Node) -> tuple[int, int]:
+    """When it was placed; the main part of an operation, whose ODL is a single T, before what it carried."""
+    return _time(node), len(node.odl)
+
+
+def _time(node: Node) -> int:
+    return -1 if node.placed is None else node.placed

@@ -1,0 +1,47 @@
+"""One command: `apo-bench eye`, what the range finder makes of one demonstration."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from apo_bench.cli.arguments import check_writable
+
+NO_RESULT = 1
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(eye)
+
+
+def eye(
+    scenario: Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")],
+    level: Annotated[float, typer.Option(help="Standard deviation of one ray, mm.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Which demonstration.")] = 0,
+    careless: Annotated[float, typer.Option(help="0 is a careful human, 1 the scenario's.")] = 1.0,
+    view: Annotated[int, typer.Option(help="Which view of the range finder the picture shows, from 1.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Draw every stage of seeing into this file: .png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
+    from apo_bench.show.eye_one import checked_view, see_once
+    from apo_bench.show.eye_text import eye_form, eye_lines
+
+    if out is not None:
+        check_writable(out, "--out", (".png",))
+    shows = checked_view(view)
+    seen = see_once(scenario, level, seed, careless)
+    form = eye_form(seen, level, seed, careless)
+    typer.echo(json.dumps(form, allow_nan=False) if as_json else "\n".join(eye_lines(form)))
+    if out is not None:
+        from apo_bench.show.eye_picture import draw_eye
+
+        draw_eye(seen, out, shows)
+        if not as_json:
+            typer.echo(f"\nWrote {out}")
+    if not all(operation["found"] for operation in form["operations"]):
+        raise typer.Exit(NO_RESULT)

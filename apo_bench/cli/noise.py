@@ -1,0 +1,130 @@
+"""The commands `apo-bench noise list | card | fit`: noise models, their cards, and noise that is measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from apo_bench.cli.arguments import check_writable
+from apo_bench.errors import InputError
+
+NO_RESULT = 1
+HELP = "Noise models: list, cards, fits to measured poses."
+NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
+noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=HELP)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    app.add_typer(noise, name="noise")
+
+
+@noise.callback(invoke_without_command=True)
+def _without_command(context: typer.Context) -> None:
+    """List the noise models, or read the card of one."""
+    if context.invoked_subcommand is None:
+        list_models()
+
+
+@noise.command("list")
+def list_models() -> None:
+    """List the noise models that have a name."""
+    from apo_bench.show.noise_card import listed
+
+    models = listed()
+    width = max(map(len, models))
+    for name, title in models.items():
+        typer.echo(f"{name:{width}}  {title}")
+    typer.echo("\nThe card of one: apo-bench noise card NAME")
+
+
+@noise.command()
+def card(
+    name: Annotated[str, typer.Argument(help=NAME)],
+    level: Annotated[
+        float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
+    ] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Draw the histogram into this file: .png.")] = None,
+) -> None:
+    """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
+    from apo_bench.observation.noise import Level
+    from apo_bench.records.settings import check_level
+    from apo_bench.show.noise_card import draw, noise_card
+    from apo_bench.show.noise_picture import draw_histogram
+
+    check_level(level)
+    if out is not None:
+        check_writable(out, "--out", (".png",))
+    drawn = draw(name, Level(level, level))
+    typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
+    if out is None:
+        return
+    if not len(drawn.errors):
+        typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
+        raise typer.Exit(NO_RESULT)
+    try:
+        draw_histogram(drawn, out)
+    except OSError as error:
+        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+    typer.echo(f"\nWrote {out}")
+
+
+@noise.command()
+def fit(
+    estimates: Annotated[Path, typer.Option(help="Poses of an estimator, a results file of the BOP format (.csv).")],
+    truth: Annotated[Path, typer.Option(help="Where the parts were: .csv of that format, or a scene_gt.json.")],
+    scene_id: Annotated[int | None, typer.Option(help="Only this scene; a scene_gt.json does not say its own.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the noise file for --noise: .toml.")] = None,
+    residuals: Annotated[
+        Path | None, typer.Option(help="Write the residuals for --noise empirical:FILE: .csv.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")] = None,
+    source: Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Measure a pose estimator: fit tails along and across the ray, outliers and misses, to its published results."""
+    import json
+
+    from apo_bench.files.bop import read_results
+    from apo_bench.files.bop_truth import read_truth
+    from apo_bench.observation.fitting import fit as fits
+    from apo_bench.observation.models.empirical import residuals_text
+    from apo_bench.observation.models.residuals import compare
+    from apo_bench.observation.noise_file import noise_text
+    from apo_bench.show.fit_picture import draw_fit
+    from apo_bench.show.fit_text import fit_form, fit_lines
+
+    written = [(out, "--out", ".toml"), (residuals, "--residuals", ".csv"), (picture, "--picture", ".png")]
+    for path, option, ending in written:
+        if path is not None:
+            check_writable(path, option, (ending,))
+            for given in (estimates, truth):
+                if path.exists() and given.exists() and path.samefile(given):
+                    raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+    seen = read_results(estimates)
+    found = compare(seen, read_truth(truth, seen, scene_id), scene_id)
+    measured = fits.fit(found, _printable(source or f"{estimates.name} against {truth.name}"))
+    figures = fits.compared(found, measured)
+    if as_json:
+        typer.echo(json.dumps(fit_form(found, measured, figures), allow_nan=False))
+    else:
+        typer.echo("\n".join(fit_lines(found, measured, figures)))
+    try:
+        if out is not None:
+            out.write_text(noise_text(measured), encoding="utf-8")
+        if residuals is not None:
+            residuals.write_text(residuals_text(found), encoding="utf-8")
+        if picture is not None:
+            draw_fit(found, measured, picture)
+    except OSError as error:
+        raise InputError(f"{error.filename} cannot be written ({error.strerror}); choose another place.") from error
+    for path, _, _ in written:
+        if path is not None and not as_json:
+            typer.echo(f"Wrote {path}")
+
+
+def _printable(text: str) -> str:
+    """On one line, whatever a file name may hold."""
+    return "".join(c if c.isprintable() else " " for c in text)

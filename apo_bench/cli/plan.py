@@ -1,0 +1,86 @@
+"""One command: `apo-bench plan`, operations as macros with their motion parameters; no simulator is needed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.errors import InputError
+from apo_bench.files.deviations import assumed_deviations
+from apo_bench.io.output import aside
+from apo_bench.scenario.scenario import Scenario
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(plan)
+
+
+def plan(
+    scenario: ScenarioArgument,
+    observation: Annotated[
+        Path | None, typer.Option(help="At the goals of this .json or .csv; default: the nominal ones.")
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(help="Who corrects them: none, a corrector, or package.module:name; default: contact.")
+    ] = None,
+    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
+    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.plan_lines import plan_lines
+    from apo_bench.show.plan_text import plan_form, plan_text
+
+    if observation is None:
+        if method is not None:
+            raise InputError(f"--method {method} was given without --observation; give both, or neither.")
+        if (deviation_mm, deviation_deg) != (None, None):
+            raise InputError("a standard deviation was given without --observation, whose it would be; leave it out.")
+        loaded, notes = load_scenario(scenario), list[str]()
+        asked, where = Plan(loaded.assembly, loaded.start, loaded.goals), "at the nominal goals"
+        frames = "directions and until in the frame of the assembly"
+    else:
+        method = "contact" if method is None else method
+        with aside(as_json):
+            loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
+        where = f"at the goals of {observation}, {_by(method)}"
+        frames = "directions in the frame of the assembly, until in the world"
+    lines = plan_lines(asked, loaded)
+    if as_json:
+        typer.echo(json.dumps(plan_form(lines, loaded, notes), allow_nan=False))
+        return
+    typer.echo(f"{loaded.name} {where}; {frames}: mm and degrees\n")
+    typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
+
+
+def _planned(
+    scenario: str, observation: Path, method: str, deviations: tuple[float | None, float | None]
+) -> tuple[Scenario, Plan, list[str]]:
+    """The scenario, the plan that a method makes of an observation of it, and what is to be said with it."""
+    from apo_bench.files.observation import observed
+    from apo_bench.trial.misgivings import misgivings
+    from apo_bench.trial.planning import plan as planned
+
+    stated = zip(("deviation_mm", "deviation_deg"), deviations, strict=True)
+    seen, loaded, assumed = observed(observation, scenario, **{name: x for name, x in stated if x is not None})
+    if method == "oracle":
+        raise InputError("--method oracle was given; it knows the truth, which an observation does not tell.")
+    found = planned(method, seen, None)
+    if found.plan is None:
+        why = found.refused.sentence if found.refused is not None else "no plan was made"
+        raise RuntimeError(f"{observation} gives no plan: {why.rstrip('.')}.")
+    wrong = misgivings(loaded, found.plan, found.correction)
+    notes = [assumed_deviations(*deviations)] if assumed and found.correction is not None else []
+    return loaded, found.plan, [*notes, *([wrong] if wrong else [])]
+
+
+def _by(method: str) -> str:
+    return "as seen" if method == "none" else f"corrected by {method}"

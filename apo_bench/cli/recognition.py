@@ -1,0 +1,70 @@
+"""The command `apo-bench recognise`: which face touches which, from what was seen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.files.deviations import assumed_deviations
+from apo_bench.io.output import aside
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(recognise)
+
+
+def recognise(
+    scenario: ScenarioArgument,
+    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees; default 1.")] = None,
+    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
+    noise: Annotated[str | None, typer.Option(help="A noise model; default: isotropic.")] = None,
+    eye: Annotated[str | None, typer.Option(help="noise or range; default: noise.")] = None,
+    observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,
+    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
+    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+    relations: Annotated[
+        str, typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), or recognised-twice.")
+    ] = "recognised",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Find the contacts of what was seen, and say how they differ from those of the scenario."""
+    from apo_bench.records.relations import RECOGNISED
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.recognised_text import difference_lines, evidence_table, recognition_form
+    from apo_bench.sweeps.one import looked_at
+    from apo_bench.trial.recognised import recognised
+
+    if relations not in RECOGNISED:
+        raise InputError(unknown("way of recognising", relations, RECOGNISED))
+    asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
+    deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    name = load_scenario(scenario).name
+    with aside(as_json):
+        seen, assumed = looked_at(scenario, observation, asked, deviations)
+    found = recognised(seen, relations)
+    if as_json:
+        typer.echo(json.dumps(recognition_form(name, relations, seen, found, assumed), allow_nan=False))
+        return
+    _print(evidence_table(found, seen.assembly))
+    if assumed:
+        typer.echo("\n" + assumed_deviations(deviation_mm, deviation_deg))
+    typer.echo("\n" + "\n".join(difference_lines(seen, found)))
+    if not seen.seen.all():
+        missing = ", ".join(str(k + 1) for k, was in enumerate(seen.seen) if not was)
+        typer.echo(f"not seen, so nothing is recognised there: operation {missing}")
+
+
+def _print(table: Any) -> None:
+    """As wide as it is."""
+    from rich.console import Console
+
+    console = Console(width=max(140, Console().width), highlight=False, markup=False)
+    console.print(table)

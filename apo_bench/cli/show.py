@@ -1,0 +1,95 @@
+"""The command `apo-bench show`: a picture of what is believed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.cli.arguments import check_writable
+from apo_bench.errors import InputError
+from apo_bench.files.deviations import assumed_deviations
+from apo_bench.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    from apo_bench.show.believed_picture import Belief
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command()(show)
+
+
+def show(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("believed.png"),
+    seen: Annotated[bool, typer.Option("--seen", help="Only what was seen.")] = False,
+    corrected: Annotated[bool, typer.Option("--corrected", help="Only what the method makes of it.")] = False,
+    step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
+    method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = "contact",
+    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees; default 1.")] = None,
+    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
+    noise: Annotated[str | None, typer.Option(help="A noise model; default: isotropic.")] = None,
+    eye: Annotated[str | None, typer.Option(help="noise or range; default: noise.")] = None,
+    observation: Annotated[Path | None, typer.Option(help="Show this observation file instead.")] = None,
+    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
+    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+) -> None:
+    """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.believed_picture import belief, belief_lines, draw_beliefs
+    from apo_bench.sweeps.one import looked_at
+
+    check_writable(out, "--out", (".png",))
+    loaded = load_scenario(scenario)
+    k = _step(len(loaded.assembly), step)
+    asked: dict[str, Any] = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
+    deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    looked, assumed = looked_at(scenario, observation, asked, deviations)
+    _check_seen(looked, k)
+    panels = [] if corrected and not seen else [belief("as seen", looked, looked.goals, k)]
+    if corrected or not seen:
+        panels.append(_corrected(loaded, looked, method, k))
+    draw_beliefs(loaded, k, panels, out)
+    said = belief_lines(panels)
+    if assumed and (corrected or not seen):
+        said.append(assumed_deviations(deviation_mm, deviation_deg))
+    typer.echo("\n".join([*said, f"Wrote {out}"]))
+
+
+def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> Belief:
+    from apo_bench.correction.own_code.own import correct_named
+    from apo_bench.show.believed_picture import belief
+    from apo_bench.trial.methods import with_simulated
+    from apo_bench.trial.misgivings import misgivings
+    from apo_bench.trial.planning import planned
+
+    made = correct_named(looked, with_simulated(method))
+    if not made.ok:
+        raise RuntimeError(
+            f"{method} did not correct what was seen: {made.sentence.rstrip('.')}; --seen draws what was seen."
+        )
+    warning = misgivings(scenario, planned(looked, made), made)
+    return belief(f"corrected by {method}", looked, made.goals, step, warning)
+
+
+def _check_seen(looked: Observation, step: int) -> None:
+    """Nothing is known after an operation that was not seen."""
+    missed = int(looked.seen.argmin()) + 1
+    if looked.seen.all() or missed > step:
+        return
+    before = f"--seen --step {missed - 1} shows what is known before it" if missed > 1 else "nothing is known before it"
+    raise RuntimeError(f"operation {missed} was not seen, so nothing is known after it; {before}.")
+
+
+def _step(operations: int, step: int | None) -> int:
+    if step is None:
+        return operations
+    if not 1 <= step <= operations:
+        raise InputError(f"step {step} was given; the scenario has operations 1 to {operations}.")
+    return step

@@ -1,0 +1,205 @@
+"""What a person reads on the terminal: a trial, a table of rates, the list of scenarios."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from apo_bench.io.plain_text import clean
+from apo_bench.records import verdicts
+from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.settings import RANGE
+from apo_bench.report.tables.confusion import summary
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.statistics.confusion import confusions
+from apo_bench.statistics.rate_text import failures, interval, level_label, percent
+from apo_bench.statistics.rates import Cell
+
+if TYPE_CHECKING:
+    from apo_bench.report.compare import Comparison
+    from apo_bench.report.report import Report
+
+MOST_NAMES = 8
+"""Settings that differ, named on the terminal."""
+
+
+def print_scenarios(scenarios: Sequence[Scenario]) -> None:
+    """Name, operations, title and place in the paper of each."""
+    table = Table("scenario", "operations", "title", "paper", box=None, pad_edge=False)
+    for s in scenarios:
+        _add(table, s.name, str(len(s.assembly)), s.title, s.paper)
+    _console().print(table)
+
+
+def print_row(row: Mapping[str, Any]) -> None:
+    """One trial, from what was asked to how it ended."""
+    table = Table(show_header=False, box=None, pad_edge=False)
+    for name, value in _lines(row):
+        _add(table, name, value)
+    _console().print(table)
+
+
+def print_cells(cells: Sequence[Cell]) -> None:
+    """Success rates with their intervals."""
+    table = Table(box=None, pad_edge=False)
+    unusual = [
+        n for n, usual in (("noise", "isotropic"), ("relations", "given")) if {getattr(c, n) for c in cells} - {usual}
+    ]
+    for name in ("scenario", "clearance", *unusual, "careless", "level", "method"):
+        table.add_column(name)
+    for name in ("success", "95 % interval", "n", "as demonstrated", "loose"):
+        table.add_column(name, justify="right")
+    table.add_column("failures")
+    for c in cells:
+        level = level_label(c.level, c.level_deg, c.noise)
+        where = (f"{c.careless:g}", level) if not knows_truth(c.method) else ("any", "any")
+        met = {"noise": not knows_truth(c.method), "relations": knows_relations(c.method)}
+        axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
+        rates = (percent(c.rate), interval(c), str(c.trials), percent(c.demonstrated_rate), percent(c.loose_rate))
+        _add(table, c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))
+    _console().print(table)
+    excluded = sum(c.excluded for c in cells)
+    if excluded:
+        _console().print(f"{excluded} rows are left out, since the demonstration itself was not right.")
+
+
+def print_report(made: Report) -> None:
+    """Where everything was written, and in one line how often plans foretold what happened."""
+    console = _console()
+
+    def say(text: str) -> None:
+        console.print(clean(text))
+
+    if made.verdict != verdicts.SUCCESS:
+        say(verdicts.words(made.verdict))
+    say(summary(made.confusions[-1]))
+    if made.no_pictures:
+        drawn = "1 failure was" if made.pictures == 1 else f"{made.pictures} failures were"
+        say(f"{drawn} drawn. Not drawn: {'; '.join(made.no_pictures)}.")
+    say(f"Tables:  {made.table} and {len(made.tables) - 1} more there, the same as .parquet")
+    png = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
+    figures = [*png, *made.figures]
+    if figures:
+        say(f"Figures: {figures[0]} and {len(figures) - 1} more there")
+    say(f"Report:  {made.page}")
+
+
+def print_comparison(found: Comparison) -> None:
+    """How far two sweeps agree, and what is not the same in them."""
+    from apo_bench.report.compare_text import agreement_table, in_words
+
+    table = Table(box=None, pad_edge=False)
+    said = agreement_table(found)
+    for i, name in enumerate(said.head):
+        table.add_column(name, justify="left" if i < said.words else "right")
+    for row in said.rows:
+        _add(table, *("–" if x is None else str(x) for x in row))
+    _console().print(clean(in_words(found)))
+    _console().print(table)
+    names = [d.what for d in found.differences]
+    more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
+    differ = clean(f"Not the same: {', '.join(names[:MOST_NAMES])}{more}")
+    _console().print(differ if names else "Made with the same.")
+
+
+def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:
+    """In one line, how often plans foretold what happened."""
+    _console().print(summary(confusions(rows)[-1]))
+
+
+def _add(table: Table, *cells: str) -> None:
+    """A row of texts, whatever they hold."""
+    table.add_row(*map(clean, cells))
+
+
+def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if row["level"] is None:
+        asked = "measured observation"
+    else:
+        level = level_label(row["level"], row["level_deg"], row["noise"])
+        asked = f"level {level}, careless {row['careless']:g}, seed {row['seed']}"
+        asked += ", range finder" if row["eye"] == RANGE else f", {row['noise']} noise" * (row["noise"] != "isotropic")
+        asked += f", relations {row['relations']}" * (row["relations"] != "given")
+    lines = [
+        ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
+        ("trial", asked),
+        ("method", row["method"]),
+        ("result", _result(row)),
+        ("ended", row["sentence"]),
+    ]
+    if row["gap_before_mm"] is not None:
+        gaps = f"{row['gap_before_mm']:.3f} mm as seen"
+        gaps += "" if row["gap_after_mm"] is None else f", {row['gap_after_mm']:.3f} mm as planned"
+        lines.append(("contact gap", gaps))
+    for attempt in row["tried"] or ():
+        lines.append((f"after step {attempt['step']}", _attempt(attempt)))
+    if row["freed"]:
+        lines.append(("freed", _braced(row["freed"])))
+    if row["extra_operations"]:
+        lines.append(("schedule", f"{row['extra_operations']} operations beyond doing each once"))
+    if row["predicted"] is not None:
+        lines.append(("predicted", _predicted(row["predicted"])))
+    if row["worst_gap_mm"] is not None and not row["loose_success"]:
+        lines.append(("reached", f"not every contact was made: least overlap {row['least_overlap']:.2f}"))
+    elif row["worst_gap_mm"] is not None:
+        lines.append(("reached", f"worst contact gap {row['worst_gap_mm']:.3f} mm, overlap {row['least_overlap']:.2f}"))
+    if row["pose_error_fixed_mm"] is not None:
+        errors = f"{row['pose_error_fixed_mm']:.3f} mm fixed by contacts, {row['pose_error_free_mm']:.3f} mm free"
+        lines.append(("pose error", errors))
+    if row["planned_error_fixed_mm"] is not None:
+        planned = (
+            f"{row['planned_error_fixed_mm']:.3f} mm fixed by contacts, {row['planned_error_free_mm']:.3f} mm free"
+        )
+        lines.append(("planned error", planned))
+    if row["p_value"] is not None:
+        lines.append(("test", _test(row)))
+    if row["sim_seconds"] is not None:
+        lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
+    return lines
+
+
+def _attempt(attempt: Mapping[str, Any]) -> str:
+    left = "did not come to rest" if attempt["gap_mm"] is None else f"leaves {attempt['gap_mm']:.3f} mm"
+    return f"{_braced(attempt['free'])} {left}"
+
+
+def _braced(operations: Iterable[int]) -> str:
+    """`{5,4,3}`, as the paper writes sets of operations."""
+    return "{" + ",".join(map(str, operations)) + "}"
+
+
+def _predicted(said: Mapping[str, Any]) -> str:
+    if not said["fails"]:
+        return f"it fits, {said['size_mm']:.2f} mm off at most"
+    size = "" if said["size_mm"] is None else f", {said['size_mm']:.2f} mm"
+    return f"operation {said['operation']} fails: {said['code']}{size}"
+
+
+def _test(row: Mapping[str, Any]) -> str:
+    """`chi-square 31.2 of 13, p 0.003; one of R2, R4 may be wrong; R2 was left out`."""
+    said = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_freedom']}, p {row['p_value']:.2g}"]
+    if row["suspects"]:
+        said.append(f"{'one of ' * (len(row['suspects']) > 1)}{', '.join(row['suspects'])} may be wrong")
+    if row["dropped"]:
+        said.append(f"left out: {', '.join(row['dropped'])}")
+    return "; ".join(said)
+
+
+def _result(row: Mapping[str, Any]) -> str:
+    if row["success"] is None:
+        return "none: the demonstration failed"
+    if row["success"]:
+        return "success" if row["as_demonstrated"] else f"success, not as demonstrated: {row['as_demonstrated_code']}"
+    loosely = ", loosely right" if row["loose_success"] else ""
+    where = "" if row["failure_operation"] is None else f", operation {row['failure_operation']}"
+    return f"failure at stage {row['failure_stage']}: {row['failure_code']}{where}{loosely}"
+
+
+def _console() -> Console:
+    """As wide as the terminal, and wide enough to keep lines whole where there is none."""
+    narrowest = 110 if sys.stdout.isatty() else 160
+    return Console(width=max(narrowest, Console().width), highlight=False, markup=False)

@@ -1,0 +1,131 @@
+"""A baseline: the mates of a CAD program, solved by CadQuery's assembly solver (IPOPT through CasADi).
+
+What mates can say is where parts stand at the end: every contact that still stands becomes a `PointInPlane` and an
+`Axis` constraint between two parts, begun at the poses that the seen goals leave them with; parts that no operation
+moves are `Fixed`. CadQuery minimises the sum of all squared violations, lengths in units of the size of the assembly.
+
+What they cannot say: contacts that were lost, earlier poses of a part, and how uncertain a pose is. So only an
+operation that moved a part last, as its main part, gets a new goal; all others stay as they were seen. Nor does
+anything hold the directions that the contacts leave free: CadQuery begins some degrees away from what it is given, and
+ends degrees and sometimes decimetres away from it, even where every contact held already.
+
+Needs the extra `cadquery`. CasADi and GTSAM hung now and then in one process, so this refuses to start where GTSAM is
+loaded.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.equations import gap
+from apo_bench.assembly.goals import Correction, Observation, Poses
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import PartFace, Relation
+from apo_bench.correction.baselines.measured import as_it_ends
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.records import outcomes
+
+MM = 1e3
+"""CadQuery counts in mm."""
+PATCH_MM = 1.0
+"""Side of the square that stands for a face; only its centre and its normal count."""
+
+
+class _NoSolution(Exception):
+    """CadQuery's solver gave up."""
+
+
+def cadquery(seen: Observation) -> Correction:
+    """The goals with which the parts end where CadQuery puts them.
+
+    Returns:
+        `converged` with the gap that is left in the sentence, of every contact ever made; `not_seen`; `not_converged`
+        if the solver gave up, with what was seen.
+
+    Raises:
+        InputError: CadQuery is not installed or cannot be loaded beside GTSAM.
+    """
+    module = _module()
+    try:
+        return as_it_ends(seen, lambda seen: _mated(module, seen), "the mates of the last poses were solved")
+    except _NoSolution:
+        now = gap(seen.assembly, seen.start, seen.goals)
+        return Correction(seen.goals, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
+
+
+def _module() -> Any:
+    if "gtsam" in sys.modules:
+        raise InputError(
+            "the corrector 'cadquery' was asked for where GTSAM is loaded, and the two can hang in one process; "
+            "run 'gtsam' and 'cadquery' in processes of their own."
+        )
+    try:
+        import cadquery as module
+    except ImportError as error:
+        raise InputError(
+            f"the corrector 'cadquery' needs CadQuery, which cannot be imported ({error}); "
+            "pip install 'apo_bench[cadquery]', or use another corrector."
+        ) from error
+    return module
+
+
+def _mated(cq: Any, seen: Observation) -> Array:
+    """The seen goals (n, 4, 4), those of parts that were last moved as the main part replaced."""
+    operations, goals = seen.assembly.operations, np.array(seen.goals)
+    standing = [relation for relation in seen.assembly.relations() if relation.lost is None]
+    last = {part: k for k, operation in enumerate(operations) for part in operation.moves}
+    if not any(end.part in last for relation in standing for end in relation.contact):
+        return goals
+    found = _solved(cq, seen, placed(seen.assembly, seen.start, goals)[-1], standing, set(last))
+    for part, T in found.items():
+        if operations[last[part]].main == part:
+            goals[last[part]] = T
+    return goals
+
+
+def _solved(cq: Any, seen: Observation, poses: Poses, standing: list[Relation], moved: set[str]) -> Poses:
+    """Where the parts that were moved and touch something stand after the solve."""
+    mated = {end.part: None for relation in standing for end in relation.contact}
+    assembly = cq.Assembly(name="assembly")
+    for part in mated:
+        boxes = [_box(cq, box.center * MM, box.half * MM) for box in seen.assembly.solids[part].boxes]
+        assembly.add(cq.Compound.makeCompound(boxes), name=part, loc=_location(cq, poses[part]))
+        if part not in moved:
+            assembly.constrain(part, "Fixed")
+    for contact, _, _ in standing:
+        ends = [(end.part, _patch(cq, seen, end)) for end in contact]
+        for kind, param in (("PointInPlane", 0), ("Axis", 180)):
+            assembly.constrain(*ends[0], *ends[1], kind, param)
+    assembly.solve()
+    if not assembly._solve_result["success"]:
+        raise _NoSolution
+    return {part: _pose(assembly.objects[part].loc) for part in mated if part in moved}
+
+
+def _box(cq: Any, center: Array, half: Array) -> Any:
+    return cq.Solid.makeBox(*(2 * half), cq.Vector(*(center - half)))
+
+
+def _patch(cq: Any, seen: Observation, of: PartFace) -> Any:
+    """A square at the middle of the corners of a face, looking the same way, in the frame of the part."""
+    face = seen.assembly.face(of)
+    center, n = face.outline.mean(axis=0) * MM, face.normal
+    return cq.Face.makePlane(PATCH_MM, PATCH_MM, cq.Vector(*center), cq.Vector(*n))
+
+
+def _location(cq: Any, T: Array) -> Any:
+    return cq.Location(cq.Plane(tuple(T[:3, 3] * MM), tuple(T[:3, 0]), tuple(T[:3, 2])))
+
+
+def _pose(location: Any) -> Array:
+    """Row by row, since angles and names of turns would lose digits; the rotation made orthogonal again."""
+    moved, T = location.wrapped.Transformation(), np.eye(4)
+    T[:3] = [[moved.Value(i, j) for j in range(1, 5)] for i in range(1, 4)]
+    T[:3, 3] /= MM
+    U, _, Vt = np.linalg.svd(T[:3, :3])
+    T[:3, :3] = U @ Vt
+    return T

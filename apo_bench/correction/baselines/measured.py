@@ -1,0 +1,66 @@
+"""Goals that come without a word, measured: how wide they leave the contacts, and what is said of that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+import numpy as np
+
+from apo_bench.assembly.equations import equations, gap, largest
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.ending import refused, sentence
+from apo_bench.correction.solvers.newton import CUT_OFF, LENGTH_M, least_step
+from apo_bench.correction.solvers.walls import asked, left_open
+from apo_bench.geometry.arrays import Array
+from apo_bench.records import outcomes
+
+UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
+
+
+def measured(seen: Observation, goals: Array, said: str) -> Correction:
+    """A correction of these goals, (n, 4, 4), to be executed as it is, whatever gap it leaves.
+
+    Args:
+        said: The sentence, if a contact does not hold within `seen.gap_m`.
+
+    Returns:
+        `converged`; `not_finite`, and what was seen, if a number is not finite.
+    """
+    before = gap(seen.assembly, seen.start, seen.goals)
+    if not np.isfinite(goals).all():
+        return Correction(seen.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
+    system = equations(seen.assembly, seen.start, goals)
+    e, J = system.linearised(goals)
+    _, rank = least_step(J / np.tile(UNITS, len(goals)), e, CUT_OFF)
+    freed = tuple(int(k) for k in np.flatnonzero((goals != seen.goals).any(axis=(1, 2)))[::-1])
+    after = largest(e)
+    said = sentence("converged", seen.gap_m) if after <= seen.gap_m else said
+    return Correction(goals, "converged", said, freed, before, after, rank)
+
+
+def gap_of(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> float:
+    """The largest |e| at goals (n, 4, 4) of what is asked of the contacts, [m]; of walls, how far one is overstepped.
+
+    Args:
+        dropped: Relations, or single contacts, that do not count.
+    """
+    plain = equations(seen.assembly, seen.start, seen.goals)
+    system, exact, walls = asked(plain, seen.assembly, seen.play_m)
+    return left_open(system, exact, walls, goals, seen.assembly.without(dropped))
+
+
+def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:
+    """What a method that promises nothing makes of an observation, with the gap that it leaves in the sentence.
+
+    Args:
+        mended: Goals (n, 4, 4) out of an observation of which every operation was seen.
+        done: What the method did, the beginning of the sentence.
+
+    Returns:
+        As `measured`, or `not_seen`; what was seen where there is no contact.
+    """
+    if not seen.seen.all():
+        return refused(seen)
+    goals = mended(seen) if seen.assembly.relations() else seen.goals
+    left_m = gap(seen.assembly, seen.start, goals)
+    return measured(seen, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

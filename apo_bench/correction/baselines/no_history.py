@@ -1,0 +1,71 @@
+"""The corrector without memory (Section 3.1): the parts where they stand at the end, one pose each, no ODL."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from apo_bench.assembly.equations import equations, gap, largest
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.ending import refused, sentence, status
+from apo_bench.correction.solvers.newton import solve
+from apo_bench.geometry.arrays import Array
+
+
+def no_history(seen: Observation) -> Correction:
+    """Correct object poses by the contacts that stand at the end; operations get what their part was left with.
+
+    A part that was carried has a pose of its own, begun where the motion parameters put it. The pose of a part
+    becomes the motion parameter of the operation that moved it last, if that moved it as the main part. All other
+    motion parameters stay as they were seen.
+
+    Returns:
+        The status says whether the standing contacts hold at the object poses; the gaps are those of every contact
+        ever made. `freed` are the operations that got a new motion parameter.
+    """
+    if not seen.seen.all():
+        return refused(seen)
+    last = {part: k for k, operation in enumerate(seen.assembly.operations) for part in operation.moves}
+    poses = _poses(seen, tuple(last))
+    end = _end(seen.assembly, tuple(last))
+    system = equations(end, seen.start, poses)
+    free = candidates(end, ~(system.gaps(poses) <= seen.gap_m))
+    found = solve(system.among(system.containing(free)), poses, free)
+    ended = status(found, largest(system.gaps(found.goals)), seen.gap_m)
+    freed = _main(seen.assembly, last, free)
+    goals = np.array(seen.goals)
+    goals[list(freed)] = found.goals[list(freed.values())]
+    return Correction(
+        goals=goals,
+        status=ended,
+        sentence=sentence(ended, seen.gap_m, "every contact that stands at the end"),
+        freed=tuple(freed),
+        gap_before_m=gap(seen.assembly, seen.start, seen.goals),
+        gap_after_m=gap(seen.assembly, seen.start, goals),
+        rank=found.rank,
+        trace=found.trace,
+    )
+
+
+def _poses(seen: Observation, parts: tuple[str, ...]) -> Array:
+    """Where the motion parameters leave these parts, (parts, 4, 4), world frame, [m]."""
+    final = placed(seen.assembly, seen.start, seen.goals)[-1] if parts else {}
+    return np.array([final[part] for part in parts]).reshape(-1, 4, 4)
+
+
+def _end(assembly: Assembly, parts: tuple[str, ...]) -> Assembly:
+    """Every moved part put where it stands by an operation of its own; the last one finds all contacts that stand."""
+    standing = tuple(relation.contact for relation in assembly.relations() if relation.lost is None)
+    operations = tuple(Operation(part, standing if part == parts[-1] else ()) for part in parts)
+    return replace(assembly, operations=operations)
+
+
+def _main(assembly: Assembly, last: Mapping[str, int], free: tuple[int, ...]) -> dict[int, int]:
+    """Operation -> number of the free part that it moved last as its main part, the most recent first."""
+    numbered = {k: i for i, (part, k) in enumerate(last.items()) if assembly.operations[k].main == part}
+    return {k: numbered[k] for k in sorted(numbered, reverse=True) if numbered[k] in free}

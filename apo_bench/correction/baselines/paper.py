@@ -1,0 +1,52 @@
+"""The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.equations import equations, largest
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.baselines.own_contacts import settled
+from apo_bench.correction.ending import refused, sentence, status
+from apo_bench.correction.solvers.newton import solve
+
+
+def paper(seen: Observation) -> Correction:
+    """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other goal by itself.
+
+    Returns:
+        `converged` if every |e| is within `seen.gap_m`; otherwise `not_seen` (nothing was changed), `inconsistent`,
+        `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the candidates; rank and
+        trace are those of their joint solution.
+    """
+    return at_once(seen, np.ones(len(seen.assembly.relations()), dtype=np.bool_))
+
+
+def at_once(seen: Observation, known: NDArray[np.bool_]) -> Correction:
+    """The same on a graph that holds the `known` contacts, (c,) in the order of `seen.assembly.relations()`.
+
+    The status says whether those hold; the gaps are those of every contact ever made.
+    """
+    if not seen.seen.all():
+        return refused(seen)
+    system = equations(seen.assembly, seen.start, seen.goals)
+    before = system.gaps(seen.goals)
+    freed = candidates(seen.assembly, known & ~(before <= seen.gap_m), known)
+    found = solve(system.among(known & system.containing(freed)), seen.goals, freed)
+    ended = status(found, largest(system.gaps(found.goals)[known]), seen.gap_m)
+    goals = found.goals
+    if ended == "converged":
+        for k in sorted(set(range(len(goals))).difference(freed)):
+            goals = settled(system, goals, k, seen.gap_m)
+    return Correction(
+        goals=goals,
+        status=ended,
+        sentence=sentence(ended, seen.gap_m, "every contact" if known.all() else "every contact that was kept"),
+        freed=freed,
+        gap_before_m=largest(before),
+        gap_after_m=largest(system.gaps(goals)),
+        rank=found.rank,
+        trace=found.trace,
+    )

@@ -1,0 +1,89 @@
+"""A baseline: contacts, penetration and prior as penalties, gone down by gradient.
+
+This is how refiners of object poses make an estimate physically plausible: PhysPose (arXiv 2503.23587) and VeREFINE
+(arXiv 1909.05730) pull objects to their supports and out of each other, SporeAgent (arXiv 2201.00239) scores both. The
+loss, in units of stated standard deviations, is
+
+    sum (e / CONTACT_M)^2 + sum (depth / CONTACT_M)^2 + sum |z_k|^2
+
+with e of every contact ever made, the depth of every two boxes of parts in contact, at the time the contact was made,
+and z_k = L_k^-1 xi_k. Adam (Kingma and Ba, arXiv 1412.6980) takes `STEPS` steps in z, whose length falls from `LENGTH`
+to nothing along a quarter of a cosine. It ends there, at rest or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.equations import Equations, equations
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.baselines.intruding import Meeting, intruding, meeting
+from apo_bench.correction.baselines.measured import as_it_ends
+from apo_bench.correction.solvers.whitened import Whitened, whitened
+from apo_bench.geometry.arrays import Array
+
+CONTACT_M = 1e-4
+"""Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`."""
+STEPS = 600
+LENGTH = 0.2
+"""Step of Adam at the beginning, in standard deviations, tuned likewise."""
+MEAN, SQUARE, TINY = 0.9, 0.999, 1e-8
+"""Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
+
+
+def penalty(seen: Observation, *, contact_m: float = CONTACT_M, length: float = LENGTH) -> Correction:
+    """The goals at which the descent ends.
+
+    Args:
+        contact_m: Gap or depth that costs as much as one standard deviation of noise, [m].
+        length: Step of Adam at the beginning, in standard deviations.
+
+    Returns:
+        `converged` with the gap that is left in the sentence, since it is meant to be executed as it is; or `not_seen`.
+
+    Raises:
+        InputError: A covariance is not positive definite.
+    """
+    return as_it_ends(seen, lambda seen: _descended(seen, contact_m, length), f"the descent ended after {STEPS} steps")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loss:
+    """What is gone down, as a function of z."""
+
+    space: Whitened
+    contacts: Equations
+    meetings: Meeting
+    contact_m: float
+
+    def __call__(self, z: Array) -> tuple[float, Array]:
+        """The loss and its gradient, (6 n,)."""
+        goals = self.space.goals(z)
+        value, gradient = float(z @ z), 2 * z
+        for system in (self.contacts, intruding(self.meetings, goals)):
+            e, J = system.linearised(goals)
+            value += float(e @ e) / self.contact_m**2
+            gradient = gradient + 2 * (e @ self.space.pulled(z, J)) / self.contact_m**2
+        return value, gradient
+
+
+def loss(seen: Observation, contact_m: float = CONTACT_M) -> Loss:
+    """The loss of an observation."""
+    system = equations(seen.assembly, seen.start, seen.goals)
+    return Loss(whitened(seen), system, meeting(seen.assembly, system), contact_m)
+
+
+def _descended(seen: Observation, contact_m: float, length: float) -> Array:
+    down = loss(seen, contact_m)
+    z = np.zeros(6 * len(seen.goals))
+    m, v = np.zeros_like(z), np.zeros_like(z)
+    for t in range(1, STEPS + 1):
+        _, g = down(z)
+        m, v = MEAN * m + (1 - MEAN) * g, SQUARE * v + (1 - SQUARE) * g**2
+        step = length * np.cos(0.5 * np.pi * t / STEPS)
+        z = z - step * (m / (1 - MEAN**t)) / (np.sqrt(v / (1 - SQUARE**t)) + TINY)
+    return down.space.goals(z)

@@ -1,0 +1,64 @@
+"""A baseline: every part snaps onto what it is put on, as parts do in an editor, and nothing is ever taken back.
+
+Operation by operation, the new goal alone is solved for the contacts that its own operation makes; earlier goals stay
+as they are. Where earlier errors leave no place at which all of them hold, their gaps are as small as can be in the
+sense of least squares.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.equations import Equations, equations
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.baselines.measured import UNITS, as_it_ends
+from apo_bench.correction.solvers.newton import CUT_OFF, REST_M
+from apo_bench.correction.solvers.whitened import Whitened, whitened
+from apo_bench.geometry.arrays import Array
+
+TURNS = 30
+
+
+def snap(seen: Observation) -> Correction:
+    """Each goal onto the contacts of its own operation, by the most likely twist, in the order of the operations.
+
+    Returns:
+        `converged` with the gap that is left in the sentence, or `not_seen`.
+
+    Raises:
+        InputError: A covariance is not positive definite.
+    """
+    return as_it_ends(seen, _snapped, "every part was put onto its newest support")
+
+
+def _snapped(seen: Observation) -> Array:
+    goals, space = np.array(seen.goals), whitened(seen)
+    system = equations(seen.assembly, seen.start, goals)
+    for k in range(len(goals)):
+        goals[k] = _put(system.among(system.made == k), goals, k, space)
+    return goals
+
+
+def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
+    """The pose of operation k, (4, 4), nearest to the seen one of those with the least sum of squared gaps.
+
+    At each turn the directions that the contacts fix get the Newton step of the paper, with its cut-off (Eq. 15), and
+    the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t covariance
+    V)^-1 (c + V^t xi).
+    """
+    one = Whitened(space.seen[k : k + 1], space.factor[k : k + 1])
+    now, z = np.array(goals), np.zeros(6)
+    for _ in range(TURNS):
+        e, J = own.linearised(now)
+        if not e.size:
+            break
+        U, w, Vt = np.linalg.svd(J[:, 6 * k : 6 * k + 6] / UNITS, full_matrices=False)
+        rank = int(np.count_nonzero(w > CUT_OFF * w[0]))
+        fixed = one.pulled(z, Vt[:rank] * UNITS)
+        wanted = fixed @ z - (U[:, :rank].T @ e) / w[:rank]
+        step = np.linalg.lstsq(fixed, wanted, rcond=None)[0] - z
+        z = z + step
+        now[k] = one.goals(z)[0]
+        if np.linalg.norm(one.factor[0] @ step * UNITS) < REST_M:
+            break
+    return now[k]

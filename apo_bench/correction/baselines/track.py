@@ -1,0 +1,131 @@
+"""Tracking (Section 4.2): correct after each observed operation, and reach back only as far as it takes.
+
+The robot has done operations 1 .. n-1 by the goals in force when it sees the n-th. If the contacts that this one makes
+do not hold, the k most recent candidates are freed, k = 1, 2, .., until they do; then the robot takes the work apart
+back to the oldest of them and builds it again. The result is a schedule of do and undo steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.equations import Equations, equations, largest
+from apo_bench.assembly.goals import Correction, Iterate, Observation, Step, Try
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.baselines.own_contacts import settled
+from apo_bench.correction.ending import refused, sentence, status
+from apo_bench.correction.solvers.newton import Solution, solve
+from apo_bench.geometry.arrays import Array
+
+Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
+"""Candidates, most recent first -> the sets of motion parameters to try, in order."""
+
+
+def paper_track(seen: Observation) -> Correction:
+    """Follow the human step by step, freeing the 1, 2, .. most recent candidates.
+
+    Returns:
+        As `paper`; `freed` is what successful trials changed, `tried` every trial, rank and trace those of the last
+        one. If no set of candidates suffices, the steps before keep their corrected goals and there is no schedule.
+    """
+    return follow(seen, nested)
+
+
+def nested(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
+    """The most recent candidate, the two most recent ones, and so on."""
+    return (chosen[:k] for k in range(1, len(chosen) + 1))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What one more operation asked for."""
+
+    goals: Array
+    """(n + 1, 4, 4): the goals now in force; those before if nothing sufficed."""
+    status: str
+    freed: tuple[int, ...] = ()
+    tried: tuple[Try, ...] = ()
+    rank: int = 0
+    trace: tuple[Iterate, ...] = ()
+
+
+def follow(seen: Observation, sets: Sets) -> Correction:
+    """Every operation in turn, trying these sets of its candidates."""
+    if not seen.seen.all():
+        return refused(seen)
+    now, schedule, targets = np.array(seen.goals), list[Step](), list[Array]()
+    steps = list[Followed]()
+    for n in range(len(now)):
+        steps.append(_next(seen, now[: n + 1], sets))
+        if steps[-1].status != "converged":
+            return _report(seen, now, steps)
+        back = reached_back(n, steps[-1].freed)
+        targets += [now[step.operation] if step.undo else steps[-1].goals[step.operation] for step in back]
+        schedule += back
+        now = np.concatenate([steps[-1].goals, now[n + 1 :]])
+    return _report(seen, now, steps, tuple(schedule), np.array(targets) if targets else None)
+
+
+def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
+    """Undo n-1 .. i, then do i .. n, for the oldest freed operation i; nothing is undone if that is n itself."""
+    i = min(freed, default=n)
+    return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
+
+
+def _next(seen: Observation, goals: Array, sets: Sets) -> Followed:
+    """The last of these goals has just been observed; the others are in force."""
+    n = len(goals) - 1
+    system = equations(seen.assembly.first(n + 1), seen.start, goals)
+    failing = ~(system.gaps(goals) <= seen.gap_m)
+    if not failing[system.made == n].any():
+        return Followed(settled(system, goals, n, seen.gap_m), "converged")
+    chosen, tried, last = candidates(seen.assembly.first(n + 1), failing), list[Try](), None
+    for free in sets(chosen):
+        last, left_m = _trial(system, goals, free, failing)
+        if not last.finite:
+            break
+        tried.append(Try(n, free, left_m))
+        if left_m <= seen.gap_m:
+            return Followed(last.goals, "converged", free, tuple(tried), last.rank, last.trace)
+    ended = "inconsistent" if last is None else status(last, np.inf, seen.gap_m)
+    return Followed(goals, ended, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
+
+
+def _trial(
+    system: Equations, goals: Array, free: tuple[int, ...], failing: NDArray[np.bool_]
+) -> tuple[Solution, float]:
+    """Solve all equations that contain a free motion parameter; what is left there and of what had failed, [m]."""
+    asked = system.containing(free)
+    found = solve(system.among(asked), goals, free)
+    return found, largest(system.gaps(found.goals)[asked | failing])
+
+
+def _report(
+    seen: Observation,
+    goals: Array,
+    steps: list[Followed],
+    schedule: tuple[Step, ...] = (),
+    targets: Array | None = None,
+) -> Correction:
+    system = equations(seen.assembly, seen.start, seen.goals)
+    ended = steps[-1].status if steps else "converged"
+    last = next((step for step in reversed(steps) if step.trace), Followed(goals, ended))
+    return Correction(
+        goals=goals,
+        status=ended,
+        sentence=sentence(ended, seen.gap_m),
+        freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
+        gap_before_m=largest(system.gaps(seen.goals)),
+        gap_after_m=largest(system.gaps(goals)),
+        rank=last.rank,
+        trace=last.trace,
+        tried=tuple(one for step in steps for one in step.tried),
+        schedule=schedule,
+        targets=targets,
+    )

@@ -1,0 +1,112 @@
+"""Correct an observation by any corrector: by name, as `module:name`, or the object itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.admitted import check_observations
+from apo_bench.correction.baselines.measured import gap_of, measured
+from apo_bench.correction.own_code.returned import RIGID, check_near, checked
+from apo_bench.errors import InputError, failed, kind
+from apo_bench.geometry.arrays import Array, NotReal, real
+from apo_bench.geometry.rigid import rigid
+from apo_bench.names import resolve
+from apo_bench.records.short_names import CORRECTORS
+
+Corrector = Callable[[Observation], Correction]
+"""Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
+
+STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
+
+
+class Misbehaved(InputError):
+    """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
+
+
+def correct(seen: Observation, corrector: Any = "contact") -> Correction:
+    """What the corrector makes of an observation.
+
+    Args:
+        corrector: A name out of `CORRECTORS`, `"package.module:name"`, or a callable `Observation -> Correction`;
+            bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
+
+    Raises:
+        InputError: There is no such corrector, or the observation makes no sense.
+        Misbehaved: The corrector raised an error, or returned something else, or a schedule that makes no sense.
+    """
+    check_observations((seen,))
+    chosen = checked_corrector(corrector)
+    name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
+    try:
+        return _admitted(chosen(seen), seen, chosen, name)
+    except InputError as error:
+        if _ours(chosen) or isinstance(error, Misbehaved):
+            raise
+        raise Misbehaved(str(error)) from error
+    except Exception as error:
+        raise Misbehaved(str(failed(f"the corrector '{name}'", error))) from error
+
+
+def checked_corrector(given: Any) -> Any:
+    """The corrector that is named, or was given.
+
+    Raises:
+        InputError: There is no such corrector, or it is no function.
+    """
+    chosen = resolve(given, CORRECTORS, "corrector")
+    if not callable(chosen) or isinstance(chosen, type):
+        name = given if isinstance(given, str) else getattr(chosen, "__name__", type(chosen).__name__)
+        raise InputError(
+            f"the corrector '{name}' is {kind(chosen)}; give a function that takes an Observation "
+            "and returns a Correction, or an object with such a __call__."
+        )
+    return chosen
+
+
+def _admitted(found: Any, seen: Observation, chosen: Any, name: str) -> Correction:
+    """What a corrector returned, as a `Correction` that makes sense."""
+    if not isinstance(found, Correction):
+        return measured(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
+    if found.status not in STATUSES:
+        raise InputError(
+            f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
+        )
+    goals = _bare(found.goals, len(seen.goals), name)
+    found = checked(found, seen.assembly, name)
+    if found.ok and not _ours(chosen):
+        before, after = gap_of(seen, seen.goals), gap_of(seen, goals)
+        found = replace(found, gap_before_m=before, gap_after_m=after)
+    return found
+
+
+def _ours(corrector: Any) -> bool:
+    """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead."""
+    while isinstance(corrector, partial):
+        corrector = corrector.func
+    module = getattr(corrector, "__module__", "")
+    return str(module).startswith("apo_bench.")
+
+
+def _bare(found: Any, n: int, name: str) -> Array:
+    """Goals as an array (n, 4, 4), numbers that are not finite let through."""
+    try:
+        goals = real(found)
+    except NotReal as error:
+        raise InputError(f"the corrector '{name}' returned complex numbers as goals; return real ones.") from error
+    except (TypeError, ValueError):
+        goals = np.zeros(0)
+    if goals.shape != (n, 4, 4):
+        given = f"an array of shape {found.shape}" if isinstance(found, np.ndarray) else kind(found)
+        raise InputError(f"the corrector '{name}' returned {given}; return a Correction or goals of shape ({n}, 4, 4).")
+    for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~rigid(goals)):
+        raise InputError(
+            f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; {RIGID}."
+        )
+    check_near(goals, name, "a goal for operation")
+    return goals

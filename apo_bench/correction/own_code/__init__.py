@@ -1,0 +1,1 @@
+"""Correctors of somebody's own, in a process that sees the observation and nothing else."""

@@ -1,0 +1,187 @@
+"""Observations and corrections as messages, and back; what comes back may have been made by anybody."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.goals import Consistency, Correction, Iterate, Observation, Step, Suspect, Try
+from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
+from apo_bench.correction.own_code.message import Arrays, Form, Garbled, Message
+from apo_bench.geometry.solid import Box, Face, Solid
+
+
+def observation_message(seen: Observation) -> Message:
+    """All that a corrector may use."""
+    assembly, parts = seen.assembly, list(seen.start)
+    form = {
+        "solids": [[part, _solid_form(solid)] for part, solid in assembly.solids.items()],
+        "operations": [
+            [op.main, [_ends(contact) for contact in op.contacts], op.carries] for op in assembly.operations
+        ],
+        "fixed": sorted(assembly.fixed),
+        "gaps": [[_ends(contact), gap] for contact, gap in assembly.gaps.items()],
+        "parts": parts,
+        "gap_m": float(seen.gap_m),
+        "play_m": float(seen.play_m),
+    }
+    start = np.array([seen.start[part] for part in parts]).reshape(-1, 4, 4)
+    return form, {"start": start, "goals": seen.goals, "covariance": seen.covariance, "seen": seen.seen}
+
+
+def read_observation(form: Form, arrays: Arrays) -> Observation:
+    """The observation of such a message."""
+    assembly = Assembly(
+        solids={part: _solid(solid) for part, solid in form["solids"]},
+        operations=tuple(
+            Operation(main, tuple(map(_contact, contacts)), tuple(carries))
+            for main, contacts, carries in form["operations"]
+        ),
+        fixed=frozenset(form["fixed"]),
+        gaps={_contact(ends): Gap(*gap) for ends, gap in form["gaps"]},
+    )
+    start = dict(zip(form["parts"], arrays["start"], strict=True))
+    kept = {name: arrays[name] for name in ("goals", "covariance", "seen")}
+    return Observation(assembly, start, **kept, gap_m=form["gap_m"], play_m=form["play_m"])
+
+
+def correction_message(made: Correction) -> Message:
+    """What a corrector returned.
+
+    Raises:
+        TypeError, ValueError: It holds what is no number, or no text, where one is needed.
+    """
+    form = {
+        "status": made.status,
+        "sentence": made.sentence,
+        "freed": [int(k) for k in _several(made.freed)],
+        "gaps": [float(made.gap_before_m), float(made.gap_after_m)],
+        "rank": int(made.rank),
+        "trace": [[float(gap), int(rank), float(step)] for gap, rank, step in made.trace],
+        "tried": [
+            [int(one.step), [int(k) for k in _several(one.free)], float(one.gap_m)] for one in _tries(made.tried)
+        ],
+        "schedule": [[int(k), bool(undo)] for k, undo in made.schedule],
+        "test": _test_form(made.test),
+        "test_after": _test_form(made.test_after),
+        "dropped": [str(name) for name in _several(made.dropped)],
+    }
+    possible = {"goals": made.goals, "targets": made.targets, "covariance": made.covariance}
+    return form, {name: array for name, array in possible.items() if array is not None}
+
+
+def read_correction(form: Form, arrays: Arrays) -> Correction:
+    """The correction of such a message.
+
+    Raises:
+        Garbled: It is none, or a number is not finite where one must be.
+    """
+    try:
+        before, after = map(_number, form["gaps"])
+        return Correction(
+            goals=arrays["goals"],
+            status=_text(form["status"]),
+            sentence=_text(form["sentence"]),
+            freed=tuple(map(_whole, form["freed"])),
+            gap_before_m=before,
+            gap_after_m=after,
+            rank=_whole(form["rank"]),
+            trace=tuple(Iterate(_number(gap), _whole(rank), _number(step)) for gap, rank, step in form["trace"]),
+            tried=tuple(Try(_whole(step), tuple(map(_whole, free)), _number(gap)) for step, free, gap in form["tried"]),
+            schedule=tuple(Step(_whole(k), undo is True) for k, undo in form["schedule"]),
+            targets=arrays.get("targets"),
+            test=_test(form["test"]),
+            test_after=_test(form["test_after"]),
+            covariance=arrays.get("covariance"),
+            dropped=tuple(map(_text, form["dropped"])),
+        )
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError) as error:
+        raise Garbled("the message is no correction") from error
+
+
+def _solid_form(solid: Solid) -> Form:
+    return {
+        "name": solid.name,
+        "faces": [
+            [key, face.name, face.outline.tolist(), [hole.tolist() for hole in face.holes], bool(face.fit)]
+            for key, face in solid.faces.items()
+        ],
+        "boxes": [[box.name, box.center.tolist(), box.half.tolist()] for box in solid.boxes],
+        "centroid": solid.centroid.tolist(),
+        "volume": float(solid.volume),
+    }
+
+
+def _solid(form: Form) -> Solid:
+    return Solid(
+        form["name"],
+        {key: Face(name, outline, tuple(holes), fit) for key, name, outline, holes, fit in form["faces"]},
+        tuple(Box(*box) for box in form["boxes"]),
+        form["centroid"],
+        form["volume"],
+    )
+
+
+def _ends(contact: Contact) -> list[list[str]]:
+    return [list(end) for end in contact]
+
+
+def _contact(ends: Sequence[Sequence[str]]) -> Contact:
+    manipulated, environment = ends
+    return Contact(*(PartFace(_text(part), _text(face)) for part, face in (manipulated, environment)))
+
+
+def _test_form(test: Consistency | None) -> list[Any] | None:
+    if test is None:
+        return None
+    suspects = [
+        [
+            *(str(one.relation), [_ends(contact) for contact in one.contacts], int(one.made)),
+            *(float(one.chi_square), int(one.freedom), float(one.p_value)),
+        ]
+        for one in test.suspects
+    ]
+    return [float(test.chi_square), int(test.freedom), float(test.p_value), float(test.level), suspects]
+
+
+def _test(form: Any) -> Consistency | None:
+    if form is None:
+        return None
+    chi_square, freedom, p_value, level, suspects = form
+    found = [
+        Suspect(
+            *(_text(relation), tuple(map(_contact, contacts)), _whole(made)),
+            *(_number(length), _whole(rank), _number(p)),
+        )
+        for relation, contacts, made, length, rank, p in suspects
+    ]
+    return Consistency(_number(chi_square), _whole(freedom), _number(p_value), _number(level), tuple(found))
+
+
+def _several(given: Any) -> Sequence[Any]:
+    """What may be one or several."""
+    return given if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
+
+
+def _tries(given: Any) -> Sequence[Try]:
+    return (given,) if isinstance(given, Try) else given
+
+
+def _whole(x: Any) -> int:
+    if type(x) is not int:
+        raise TypeError("a whole number is needed")
+    return x
+
+
+def _number(x: Any) -> float:
+    if type(x) not in (int, float):
+        raise TypeError("a number is needed")
+    return float(x)
+
+
+def _text(x: Any) -> str:
+    if type(x) is not str:
+        raise TypeError("a text is needed")
+    return x

@@ -1,0 +1,173 @@
+"""Correctors of one's own, named as `module:name`: each module in a process that is given observations, nothing else.
+
+What comes back is read as data and checked here; whatever a corrector does to its process, it has done to a fork of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, final
+
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.correctors import Misbehaved, checked_corrector, correct
+from apo_bench.correction.own_code.forms import observation_message, read_correction
+from apo_bench.correction.own_code.message import Arrays, Form, Garbled, Message
+from apo_bench.correction.own_code.process import Server
+from apo_bench.errors import InputError
+from apo_bench.records.limits import CORRECTOR_LIMIT_S
+from apo_bench.records.method import is_own
+
+LEAST_STARTING_S = 30.0
+"""What importing a module may take at least: a new interpreter, and libraries that are large."""
+LONGEST_S = 1e6
+LONGEST_SENTENCE = 2000
+
+
+@final
+class Lost(Misbehaved):
+    """A corrector ended its process, or took too long."""
+
+    def __init__(self, code: str, sentence: str) -> None:
+        """Args:
+        code: `worker_died` or `time_limit`.
+        """
+        super().__init__(sentence)
+        self.code = code
+
+
+@final
+class OwnCorrectors:
+    """Finds correctors by name; a context manager that ends their processes."""
+
+    def __init__(self, limit_s: float = CORRECTOR_LIMIT_S) -> None:
+        """Args:
+        limit_s: Wall time that a correction may take; importing its module may take the same, or 30 s if that is
+                more.
+        """
+        if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_S):
+            raise InputError(
+                f"a limit of {limit_s:g} s per correction was given; a number above 0 and up to {LONGEST_S:g} is "
+                "allowed."
+            )
+        self._limit_s = limit_s
+        self._servers: dict[str, Server] = {}
+        self._found: dict[str, OwnCorrector] = {}
+        self.files: set[str] = set()
+        """Of the modules that were imported, as they say themselves."""
+
+    def find(self, method: Any) -> Any:
+        """What to pass to `correct`: a stand-in for what is named as `module:name`, anything else as it is.
+
+        Raises:
+            InputError: It cannot be imported, or is no function.
+        """
+        if not is_own(method):
+            return method
+        if method not in self._found:
+            module = method.partition(":")[0]
+            if module not in self._servers:
+                self._servers[module] = Server(module, max(self._limit_s, LEAST_STARTING_S))
+            found = OwnCorrector(method, self._servers[module], self._limit_s)
+            self.files.update(found.check())
+            self._found[method] = found
+        return self._found[method]
+
+    def close(self) -> None:
+        """End all processes."""
+        for server in self._servers.values():
+            server.end()
+        self._servers.clear()
+        self._found.clear()
+
+    def __enter__(self) -> OwnCorrectors:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def correct_named(seen: Observation, corrector: Any) -> Correction:
+    """As `correct`, but what is named as `module:name` runs in a process of its own.
+
+    Raises:
+        InputError: As `correct`.
+    """
+    with OwnCorrectors() as own:
+        return correct(seen, own.find(corrector))
+
+
+def check_correctors(methods: Iterable[str], limit_s: float = CORRECTOR_LIMIT_S) -> set[str]:
+    """Raise an `InputError` unless all of these can be had: `oracle`, `none`, correctors by name or `module:name`.
+
+    Returns:
+        The files of the modules that those of one's own bring in.
+    """
+    with OwnCorrectors(limit_s) as own:
+        for method in methods:
+            if own.find(method) == method and method not in ("oracle", "none"):
+                checked_corrector(method)
+        return own.files
+
+
+@final
+class OwnCorrector:
+    """Stands for a function in another process: `Observation -> Correction`."""
+
+    def __init__(self, name: str, server: Server, limit_s: float) -> None:
+        self.__name__, self.__module__ = name, name.partition(":")[0]
+        self._server, self._limit_s = server, limit_s
+
+    def __call__(self, seen: Observation) -> Correction:
+        """Ask it.
+
+        Raises:
+            Misbehaved: It raised an error or returned what it must not; or, as `Lost`, it ended its process or took
+                too long.
+        """
+        said, numbers = self._asked("correct", *observation_message(seen), self._limit_s)
+        if "raised" in said:
+            raise Misbehaved(_line(said["raised"]))
+        try:
+            return read_correction(said, numbers)
+        except Garbled as error:
+            raise Misbehaved(f"the corrector '{self.__name__}' sent back what is no correction.") from error
+
+    def check(self) -> list[str]:
+        """The files of the modules that it brought in.
+
+        Raises:
+            InputError: It cannot be imported, or is no function.
+        """
+        try:
+            said, _ = self._asked("check", {}, {}, self._server.starting_s)
+        except Misbehaved as error:
+            raise InputError(f"{str(error).rstrip('.')} while it was imported; mend it, or use another.") from error
+        if "raised" in said:
+            raise InputError(_line(said["raised"]))
+        files = said.get("files")
+        return [path for path in files if isinstance(path, str)] if isinstance(files, list) else []
+
+    def _asked(self, what: str, form: Form, arrays: Arrays, limit_s: float) -> Message:
+        name = f"the corrector '{self.__name__}'"
+        try:
+            return self._server.ask({**form, "asked": what, "name": self.__name__}, arrays, limit_s)
+        except TimeoutError as error:
+            raise Lost("time_limit", f"{name} took longer than {limit_s:g} s.") from error
+        except (EOFError, OSError) as error:
+            raise Lost("worker_died", f"{name} ended its process{_how(error)}.") from error
+        except Garbled as error:
+            raise Misbehaved(f"{name} sent back what cannot be read.") from error
+
+
+def _how(error: BaseException) -> str:
+    """` with exit code 3`, ` by signal 9`, or nothing."""
+    code = error.args[0] if isinstance(error, EOFError) and error.args else None
+    if not isinstance(code, int):
+        return ""
+    return f" with exit code {code}" if code >= 0 else f" by signal {-code}"
+
+
+def _line(said: Any) -> str:
+    """One line that can be printed, whatever came."""
+    return "".join(c if c.isprintable() else " " for c in str(said)[:LONGEST_SENTENCE])

@@ -1,0 +1,152 @@
+"""The process in which a corrector of one's own lives: it imports the module once, and each request has a fork of that.
+
+Started by `own_process` as a new interpreter that knows nothing but the name of the module. A request comes as one end
+of a socket of its own; this process never reads it, so that no fork finds what another was asked. Standard output is
+standard error here, and whatever a fork leaves behind is ended.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import select
+import signal
+import socket
+import struct
+import sys
+from contextlib import suppress
+from importlib import import_module
+
+from apo_bench.correction.correctors import checked_corrector, correct
+from apo_bench.correction.own_code.forms import correction_message, read_observation
+from apo_bench.correction.own_code.message import Arrays, Form, Message, receive, send
+from apo_bench.errors import InputError
+from apo_bench.io.processes import end_descendants, flush
+
+NOTICE = struct.Struct("!Ii")
+"""To the process that asks: how many requests there were, and the exit code of the one that ended; first 0, 0."""
+TURN_S = 0.02
+DEATH_SIGNAL, SUBREAPER = 1, 36
+"""Of `prctl`, on Linux."""
+LARGEST_FILE = 1 << 30
+"""Bytes; also of a file that standard error goes to, so that endless output does not fill the disk."""
+LIKELIEST = "1000"
+"""Where memory runs out, this goes first."""
+USUAL = "scipy.special"
+"""What the solvers of the package import when they are first used: better once than in every fork."""
+IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
+"""For the process that asks, which ends this one."""
+
+
+def main(control: int, module: str, fork: bool) -> None:
+    """The life of the process.
+
+    Args:
+        control: File descriptor of a socket on which requests come.
+        module: To be imported first; what that raises is said in answer to requests.
+        fork: Whether every request has a fork; else it does one request.
+    """
+    for name in IGNORED:
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
+    _prctl(SUBREAPER, 1)
+    with suppress(OSError), open("/proc/self/oom_score_adj", "w") as file:
+        file.write(LIKELIEST)
+    for what, most in ((resource.RLIMIT_FSIZE, LARGEST_FILE), (resource.RLIMIT_CORE, 0)):
+        with suppress(OSError, ValueError):
+            resource.setrlimit(what, (most, most))
+    import_module(USUAL)
+    _prctl(DEATH_SIGNAL, signal.SIGKILL)
+    with suppress(BaseException):
+        import_module(module)
+    flush()
+    _prctl(DEATH_SIGNAL, 0)
+    with socket.socket(fileno=control) as asking:
+        _serve(asking, fork)
+    end_descendants(os.getpid())
+    os.killpg(0, signal.SIGKILL)
+
+
+def answer(request: socket.socket) -> None:
+    """Read one request, do it, say what came of it."""
+    form, arrays = receive(request)
+    own = os.getpid()
+    said, numbers = _said(form, arrays)
+    flush()
+    if os.getpid() == own:  # the corrector may have forked and come back from both
+        send(request, said, numbers)
+
+
+def _serve(asking: socket.socket, fork: bool) -> None:
+    """Do request after request, until nobody asks."""
+    number, child = 0, 0
+    with suppress(OSError):
+        asking.send(NOTICE.pack(0, 0))
+        while True:
+            ready, _, _ = select.select([asking], [], [], TURN_S if child else None)
+            for pid, status in _ended():
+                if pid == child:
+                    asking.send(NOTICE.pack(number, os.waitstatus_to_exitcode(status)))
+                    child = 0
+            if not ready:
+                continue
+            word, given, _, _ = socket.recv_fds(asking, 1, 1)
+            if not word:
+                return
+            number += 1
+            child = os.fork() if fork else 0
+            if child == 0:
+                if fork:
+                    _prctl(DEATH_SIGNAL, signal.SIGKILL)
+                    asking.close()
+                _do(given[0])
+            os.close(given[0])
+
+
+def _do(given: int) -> None:
+    """Do a request and end."""
+    with suppress(BaseException), socket.socket(fileno=given) as request:
+        answer(request)
+        os._exit(0)
+    os._exit(1)
+
+
+def _said(form: Form, arrays: Arrays) -> Message:
+    """What was asked for, or why there is none."""
+    name = form["name"]
+    try:
+        if form["asked"] == "check":
+            checked_corrector(name)
+            return {"files": _files()}, {}
+        return correction_message(correct(read_observation(form, arrays), name))
+    except InputError as error:
+        return {"raised": str(error)}, {}
+    except BaseException as error:
+        return {"raised": f"the corrector '{name}' raised {type(error).__name__}({_text(error)})."}, {}
+
+
+def _text(error: BaseException) -> str:
+    with suppress(Exception):
+        return " ".join(str(error).split())
+    return ""
+
+
+def _files() -> list[str]:
+    """Of all modules that importing the corrector brought in."""
+    found = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    return [path for path in found if isinstance(path, str)]
+
+
+def _ended() -> list[tuple[int, int]]:
+    """Children that have ended, and how."""
+    found = []
+    with suppress(ChildProcessError):
+        while (one := os.waitpid(-1, os.WNOHANG))[0]:
+            found.append(one)
+    return found
+
+
+def _prctl(what: int, value: int) -> None:
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(what, value, 0, 0, 0)

@@ -1,0 +1,199 @@
+"""The point on the contact manifold that is nearest to what was seen, in the metric of its noise.
+
+What was seen is wrong by a Gaussian body twist, T_seen = T exp(-xi), of stated covariance L L^t, so with z = L^-1 xi
+the most likely consistent goals are those with the shortest z among all that satisfy the contact equations f(z) = 0.
+They are found by projection: with f linearised at z, J z' = J z - f has the shortest solution
+z' = J^t (J J^t)^-1 (J z - f); then f is linearised again (Gauss-Newton on the constraint; Nocedal and Wright,
+"Numerical Optimization", 18).
+
+Redundant contacts make J J^t singular at the solution and almost singular before it, so no rank is decided on the way.
+`mu` is added to the diagonal instead; it falls with the square of the gap (Levenberg-Marquardt as of Yamashita and
+Fukushima, 2001, converges quadratically then, also where J loses rank), and by a factor at every turn. Rank and free
+directions are read off where the solver rests: there singular values of redundant directions are rounding.
+
+Leading axes stand for many observations of one assembly, solved at once.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.correction.solvers.compact import Compact
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import exp_and_jacobian
+
+TURNS = 60
+STEP = 1e-7
+"""The solver rests when its next step would be shorter in every component, in standard deviations."""
+SURE = 1e-5
+"""Steps shorter than this shrink by a constant factor."""
+DAMPING = 0.05
+"""mu, per mean square of the rows of J and per mean square of the gaps in that unit."""
+FALL = 0.3
+"""mu is at most `DAMPING` times this to the number of turns, so that it cannot hold a gap open."""
+FLOOR = 1e-14
+"""mu is at least this part of the mean square of the rows: rounding."""
+LARGEST_TURN = 0.25
+"""[rad]. No goal turns further in one step."""
+LARGE = 48
+"""Unknowns above which one observation is solved with sparse matrices."""
+SMALLEST = 1e-300
+
+
+class Turn(NamedTuple):
+    """One turn of the solver: the largest |e| before it, [m], and the length of its step, in standard deviations."""
+
+    gap_m: float
+    step: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Where the solver ended, for each observation."""
+
+    goals: Array
+    """(*, n, 4, 4); the seen ones, if a number was not finite on the way."""
+    z: Array
+    """(*, 6 n): the correction in standard deviations."""
+    e: Array
+    """(*, 3 c): what is left of every compact equation, [m]."""
+    Jt: Any
+    """(*, 6 n, 3 c): the derivative of e by z, transposed, [m]; of many operations, a sparse matrix of SciPy."""
+    B: Array
+    """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected goal k: J_r(xi) L, [m, rad]."""
+    at_rest: NDArray[np.bool_]
+    """(*,)."""
+    finite: NDArray[np.bool_]
+    """(*,)."""
+    trace: tuple[Turn, ...]
+    """Of the observation that took longest."""
+
+
+def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None) -> Nearest:
+    """Change all goals as little as the contacts ask for.
+
+    Args:
+        goals: (*, n, 4, 4), what was seen, world frame, [m].
+        L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad].
+        soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
+            that are demanded, and |z|^2 + |e / soft_m|^2 is least.
+    """
+    lead, n = goals.shape[:-3], system.n
+    if not lead and 6 * n > LARGE:
+        from apo_bench.correction.solvers.large import nearest_large
+
+        return nearest_large(system, goals, L, soft_m)
+    b = math.prod(lead)
+    seen = goals.reshape(b, n, 4, 4)
+    scale = np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)
+    found = _many(system, seen, scale, soft_m)
+    if lead == (b,):
+        return found
+    names = ("goals", "z", "e", "Jt", "B", "at_rest", "finite")
+    shaped = {name: getattr(found, name) for name in names}
+    return Nearest(**{name: x.reshape((*lead, *x.shape[1:])) for name, x in shaped.items()}, trace=found.trace)
+
+
+def _many(system: Compact, seen: Array, L: Array, soft_m: Array | None) -> Nearest:
+    """(b, n, 4, 4) goals; observations that rest are left alone while the others go on."""
+    b, n = len(seen), system.n
+    now = _Going(np.arange(b), system, seen, L, seen, L, np.zeros((b, 6 * n)), np.full(b, np.inf))
+    done, trace = list[tuple[NDArray[np.intp], tuple[Any, ...]]](), list[Turn]()
+    for turn in range(TURNS):
+        e, blocks = now.system.blocks(now.T, now.B)
+        Jt = now.system.gathered(blocks)
+        step, finite = project(e, Jt, now.z, soft_m, turn)
+        size = np.abs(step).max(axis=1, initial=0.0)
+        trace.append(Turn(float(np.abs(e).max(initial=0.0)), float(size.max(initial=0.0))))
+        rest = finite & settles(size, now.size)
+        over = ~finite | rest if turn + 1 < TURNS else np.ones(b, dtype=np.bool_)[now.which]
+        z = now.z + (step if rest.all() else shortened(step, now.L))
+        D, Jr = exp_and_jacobian((now.L @ z.reshape(len(z), n, 6, 1))[..., 0])
+        now = now._replace(z=z, T=now.seen @ D, B=Jr @ now.L, size=size)
+        if over.any() or not b:
+            ended = (now.T, z, Jt, now.B, rest, finite)
+            if over.all():
+                done.append((now.which, ended))
+                break
+            done.append((now.which[over], tuple(x[over] for x in ended)))
+            now = now.only(~over)
+    return _sorted(system, seen, done, tuple(trace))
+
+
+def settles(size: Array, before: Array) -> NDArray[np.bool_]:
+    """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor."""
+    return np.asarray((size < STEP) | ((size < SURE) & (size * size < STEP * before)))
+
+
+class _Going(NamedTuple):
+    """Observations that do not rest yet."""
+
+    which: NDArray[np.intp]
+    system: Compact
+    seen: Array
+    L: Array
+    T: Array
+    B: Array
+    z: Array
+    size: Array
+    """(b,), of the step before."""
+
+    def only(self, kept: NDArray[np.bool_]) -> _Going:
+        rest = (x[kept] for x in (self.seen, self.L, self.T, self.B, self.z, self.size))
+        return _Going(self.which[kept], self.system.only(kept), *rest)
+
+
+def _sorted(
+    system: Compact, seen: Array, done: list[tuple[NDArray[np.intp], tuple[Any, ...]]], trace: tuple[Turn, ...]
+) -> Nearest:
+    """What ended at different turns, in the order of the observations."""
+    if len(done) == 1:
+        T, z, Jt, B, rest, finite = done[0][1]
+    else:
+        order = np.argsort(np.concatenate([which for which, _ in done]))
+        T, z, Jt, B, rest, finite = (np.concatenate(x)[order] for x in zip(*(x for _, x in done), strict=True))
+    if not finite.all():
+        T, z = np.where(finite[:, None, None, None], T, seen), np.where(finite[:, None], z, 0.0)
+    return Nearest(T, z, system.residual(T), Jt, B, rest, finite, trace)
+
+
+def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> tuple[Array, NDArray[np.bool_]]:
+    """The step to the shortest z that satisfies the linearised equations, (b, 6 n), and whether it is finite, (b,)."""
+    b, m = e.shape
+    if m == 0:
+        return -z, np.ones(b, dtype=np.bool_)
+    J = np.swapaxes(Jt, 1, 2)
+    A = J @ Jt
+    diagonal = A.reshape(b, m * m)[:, :: m + 1]
+    size = diagonal.sum(axis=1) / m
+    demanded = e if soft_m is None else e * (soft_m == 0.0)
+    gap2 = (demanded * demanded).sum(axis=1) / m
+    finite = np.isfinite(size + gap2)
+    if not finite.all():
+        A[~finite], size[~finite] = 0.0, 1.0
+    size = np.maximum(size, SMALLEST)
+    diagonal += (damping(gap2 / size, turn) * size)[:, None]
+    if soft_m is not None:
+        diagonal += soft_m * soft_m
+    wanted = J @ z[..., None] - e[..., None]
+    return (Jt @ np.linalg.solve(A, wanted))[..., 0] - z, finite
+
+
+def damping(gap2: Array, turn: int) -> Array:
+    """mu as a part of the mean square of the rows of J; `gap2` is the mean e^2 in that unit."""
+    return np.maximum(DAMPING * np.minimum(np.minimum(gap2, 1.0), FALL**turn), FLOOR)
+
+
+def shortened(step: Array, L: Array) -> Array:
+    """The same step, shortened for an observation in which a goal would turn further than `LARGEST_TURN`."""
+    turned = (L[:, :, 3:] @ step.reshape(*L.shape[:2], 6, 1))[..., 0]
+    largest = np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0))
+    if (largest <= LARGEST_TURN).all():
+        return step
+    return step * np.minimum(1.0, LARGEST_TURN / np.maximum(largest, SMALLEST))[:, None]

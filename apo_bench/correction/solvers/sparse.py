@@ -1,0 +1,184 @@
+"""The same solver for many operations: time and memory grow with the contacts, not with their square.
+
+Two contacts meet in J J^t only where an operation occurs in both. Contacts are numbered so that those that meet are
+near each other (reverse Cuthill-McKee); if all entries then lie in a narrow band, as in a row of castles, a banded
+Cholesky decomposition solves for the multipliers. Otherwise (grids, one part that carries everything) they are solved
+for together with z, in the sparse matrix [I J^t; J -mu].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.correction.solvers.compact import Compact
+from apo_bench.geometry.arrays import Array
+
+WIDE = 240
+"""Rows of a band above which it is no longer worth it."""
+CROWDED = 2_000_000
+"""Pairs of contacts that meet, above which they are not listed."""
+RAISED = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
+"""What is added in turn to the diagonal, in parts of its mean, while rounding keeps it from being positive definite."""
+FEW = 100
+"""Contacts that one operation may meet, on average, if J J^t is to be formed for the rank."""
+EIGENVALUE = 2e-15
+"""Eigenvalues of J J^t below this part of the largest one are rounding, at a solution."""
+
+Solver = Callable[[Array, Array, Array], Array]
+"""(diagonal to add (3 c,), blocks (i, 6, 3), right side (3 c,)) -> z (6 n,)."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Incidence:
+    """Where the letters of the words are: i pairs of a contact and an operation that occurs in it."""
+
+    contact: NDArray[np.intp]
+    """(i,)."""
+    letter: NDArray[np.intp]
+    """(i,)."""
+    operation: NDArray[np.intp]
+    """(i,)."""
+    c: int
+    n: int
+
+    def times(self, blocks: Array, z: Array) -> Array:
+        """J z, (3 c,), of blocks (i, 6, 3)."""
+        each = np.einsum("iab,ia->ib", blocks, z.reshape(self.n, 6)[self.operation])
+        at = 3 * self.contact[:, None] + np.arange(3)
+        return np.asarray(np.bincount(at.ravel(), each.ravel(), 3 * self.c), dtype=np.float64)
+
+    def transposed_times(self, blocks: Array, y: Array) -> Array:
+        """J^t y, (6 n,)."""
+        each = np.einsum("iab,ib->ia", blocks, y.reshape(self.c, 3)[self.contact])
+        at = 6 * self.operation[:, None] + np.arange(6)
+        return np.asarray(np.bincount(at.ravel(), each.ravel(), 6 * self.n), dtype=np.float64)
+
+    def matrix(self, blocks: Array) -> Any:
+        """J as a sparse matrix, (3 c, 6 n)."""
+        from scipy.sparse import csr_array
+
+        rows = np.broadcast_to(3 * self.contact[:, None, None] + np.arange(3), blocks.shape)
+        columns = np.broadcast_to(6 * self.operation[:, None, None] + np.arange(6)[:, None], blocks.shape)
+        return csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * self.c, 6 * self.n))
+
+
+def incidence(system: Compact) -> Incidence:
+    """The letters of a system that are unknown."""
+    contact, letter = np.nonzero(system.columns < system.n)
+    return Incidence(contact, letter, system.columns[contact, letter], len(system), system.n)
+
+
+def solver(where: Incidence) -> Solver:
+    """The way to solve for z that suits the graph; what depends on the graph alone is done once."""
+    pairs = _pairs(where)
+    if pairs is not None:
+        first, second = pairs
+        order = _near(where, first, second)
+        a, b = order[where.contact[first]], order[where.contact[second]]
+        if 3 * int(np.abs(a - b).max(initial=0)) + 3 <= WIDE:
+            return _banded(where, first[a >= b], second[a >= b], order)
+    return _together(where)
+
+
+def rank(Jt: Any) -> int:
+    """The rank of a sparse matrix at a solution: eigenvalues of J J^t above rounding, by Sylvester's law of inertia."""
+    from scipy.sparse import block_array, eye_array
+    from scipy.sparse.linalg import splu
+
+    if not Jt.nnz:
+        return 0
+    unknowns, m = Jt.shape
+    lowest = EIGENVALUE * _largest(Jt)
+    meets = abs(Jt).sign().sum(axis=1) / 3.0
+    if (meets**2).sum() <= FEW * meets.sum():
+        K, sign = (Jt.T @ Jt - lowest * eye_array(m)).tocsc(), 1.0
+    else:
+        K, sign = block_array([[eye_array(unknowns), Jt], [Jt.T, lowest * eye_array(m)]], format="csc"), -1.0
+    factor = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return int(np.count_nonzero(sign * factor.U.diagonal() > 0.0))
+
+
+def _largest(Jt: Any) -> float:
+    """The largest eigenvalue of J J^t, roughly: twenty turns of the power method from a fixed start."""
+    y, size = np.cos(np.arange(Jt.shape[1])), 1.0
+    for _ in range(20):
+        y = Jt.T @ (Jt @ (y / np.linalg.norm(y)))
+        size = float(np.linalg.norm(y))
+    return size
+
+
+def _pairs(where: Incidence) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Every ordered pair of incidences that share an operation; None if there are too many."""
+    order = np.argsort(where.operation, kind="stable")
+    count = np.bincount(where.operation, minlength=where.n)
+    if int((count * count).sum()) > CROWDED:
+        return None
+    begin = np.cumsum(count) - count
+    many = count[where.operation[order]]
+    first = np.repeat(order, many)
+    within = np.arange(len(first)) - np.repeat(np.cumsum(many) - many, many)
+    second = order[np.repeat(begin[where.operation[order]], many) + within]
+    return first, second
+
+
+def _near(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The place of each contact in an order in which contacts that meet are near each other, (c,)."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    at = where.contact[first], where.contact[second]
+    meets = csr_array((np.ones(len(first)), at), shape=(where.c, where.c))
+    place = np.empty(where.c, dtype=np.intp)
+    place[reverse_cuthill_mckee(meets, symmetric_mode=True)] = np.arange(where.c)
+    return place
+
+
+def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp], place: NDArray[np.intp]) -> Solver:
+    """Cholesky in a band; `first` stands below or on the diagonal of `second`."""
+    from scipy.linalg import solveh_banded
+
+    m = 3 * where.c
+    row = 3 * place[where.contact[first]][:, None, None] + np.arange(3)[:, None]
+    column = 3 * place[where.contact[second]][:, None, None] + np.arange(3)
+    below = row - column
+    width = int(below.max(initial=0)) + 1
+    wanted = below >= 0
+    target = (below * m + column)[wanted]
+    placed = (3 * place[:, None] + np.arange(3)).ravel()
+    together = _together(where)
+
+    def solve(added: Array, blocks: Array, right: Array) -> Array:
+        products = np.swapaxes(blocks, 1, 2)[first] @ blocks[second]
+        band = np.bincount(target, products[wanted], width * m).reshape(width, m)
+        band[0, placed] += added
+        ordered = np.empty(m)
+        ordered[placed] = right
+        size = float(band[0].mean())
+        for more in RAISED:
+            band[0] += more * size
+            try:
+                y = solveh_banded(band, ordered, lower=True, check_finite=False)
+            except np.linalg.LinAlgError:
+                continue
+            return where.transposed_times(blocks, y[placed])
+        return together(added, blocks, right)
+
+    return solve
+
+
+def _together(where: Incidence) -> Solver:
+    from scipy.sparse import block_array, diags_array, eye_array
+    from scipy.sparse.linalg import splu
+
+    def solve(added: Array, blocks: Array, right: Array) -> Array:
+        J = where.matrix(blocks)
+        K = block_array([[eye_array(6 * where.n), J.T], [J, diags_array(-added)]], format="csc")
+        return np.asarray(splu(K).solve(np.concatenate([np.zeros(6 * where.n), right]))[: 6 * where.n])
+
+    return solve

@@ -1,0 +1,172 @@
+"""Contacts with play, as walls: each vertex may be anywhere between two distances from its plane.
+
+Equations of exact and centred contacts are solved first, which settles their rank. After that every turn solves a
+quadratic program: the shortest z among all that satisfy the linearised equations and stay between the linearised walls.
+Redundant equations would make the active-set solver cycle, so z is written as the shortest solution of the equations
+plus a combination of their free directions; only that is the unknown of the program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.equations import Equations, largest
+from apo_bench.assembly.topology import Assembly
+from apo_bench.correction.posterior import LARGE, rank
+from apo_bench.correction.solvers.compact import Compact
+from apo_bench.correction.solvers.manifold import Nearest, Turn, project, settles, shortened
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import exp_and_jacobian
+
+BLIND = 1e-7
+"""Part of the largest row below which a wall does not depend on the free directions."""
+EXACT = 1e-10
+"""How far the program may overstep a wall, in standard deviations."""
+TURNS = 200
+SETTLED = 60
+"""The turn as which the equations are damped: they hold already."""
+SLOWEST, GROWS = 1.0 / 64.0, 1.05
+"""The least part of a step that is made, and how much larger that part may be than the one before."""
+TOUCH_M = 1e-9
+"""A vertex nearer to its wall touches it."""
+HARD, SOFT = 0, 8
+"""What DAQP calls a wall, and one that may be overstepped."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """m inequalities low <= e <= high, one per vertex."""
+
+    system: Equations
+    low: Array
+    """(m,), [m]."""
+    high: Array
+    """(m,), [m]."""
+
+    def __len__(self) -> int:
+        return len(self.low)
+
+    def among(self, contacts: NDArray[np.bool_]) -> Walls:
+        """The walls of some of the contacts that have any."""
+        rows = contacts[self.system.contact]
+        return Walls(self.system.among(contacts), self.low[rows], self.high[rows])
+
+    def overstepped(self, goals: Array) -> float:
+        """By how much the worst vertex is beyond its walls at the goals, [m]; 0 if none is."""
+        e = self.system.residual(goals)
+        return float(np.maximum(self.low - e, e - self.high).max(initial=0.0))
+
+
+def left_open(
+    system: Equations, exact: NDArray[np.bool_], walls: Walls, goals: Array, kept: NDArray[np.bool_]
+) -> float:
+    """The largest |e| of the equations that are `kept`, (c,), [m]; of walls, by how much they are overstepped."""
+    return max(largest(system.gaps(goals)[kept & exact]), walls.among(kept[~exact]).overstepped(goals))
+
+
+def asked(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Walls]:
+    """What is demanded of each contact: shifted planes, (c,) whether it is an equation, and the walls of the others."""
+    low, high = assembly.intervals(play_m).T
+    exact = low == high
+    plane = np.array(system.plane)
+    plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]
+    walls = system.among(~exact)
+    return replace(system, plane=plane), exact, Walls(walls, low[~exact][walls.contact], high[~exact][walls.contact])
+
+
+def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest) -> Nearest:
+    """The nearest goals that satisfy the equations and stay between the walls.
+
+    Args:
+        seen: (n, 4, 4), world frame, [m].
+        L: (n, 6, 6), L L^t the covariance of the body twists.
+        start: The nearest goals without walls.
+
+    Returns:
+        Not at rest if there is no room between the walls.
+
+    Raises:
+        InputError: Too many operations for a dense program.
+    """
+    if 6 * system.n > LARGE:
+        raise InputError(
+            f"walls with {system.n} operations were given, up to {LARGE // 6} are allowed; "
+            'ask for "centred" contacts instead.'
+        )
+    known, before, trace, pace = rank(start.Jt), np.inf, list(start.trace), 1.0
+    z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
+    for _ in range(TURNS):
+        e, blocks = system.blocks(T, B)
+        Jt = system.gathered(blocks)
+        shortest = z + project(e[None], Jt[None], z[None], None, SETTLED)[0][0]
+        free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
+        e_wall, J_wall = walls.system.linearised(T)
+        J_wall = (J_wall.reshape(len(walls), -1, 1, 6) @ B).reshape(len(walls), -1)
+        ahead = e_wall + J_wall @ (shortest - z)
+        u, room = _program(J_wall, free, walls.low - ahead, walls.high - ahead)
+        step = shortest + free @ u - z
+        length = float(np.abs(step).max(initial=0.0))
+        trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))
+        over = bool(settles(np.array(length), np.array(before)))
+        rest = over and room
+        pace = paced(pace, step, last)
+        last = step if rest else shortened(step[None], L[None])[0]
+        z = z + (step if rest else pace * last)
+        D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
+        T, B, before = seen @ D, Jr @ L, length
+        if over:
+            break
+    return Nearest(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
+
+
+def touching(Jt: Array, walls: Walls, found: Nearest) -> int:
+    """How many directions the walls that are touched fix beyond the equations.
+
+    Args:
+        Jt: (6 n, 3 c), the transposed Jacobian of the equations.
+    """
+    e, J = walls.system.linearised(found.goals)
+    at = (e <= walls.low + TOUCH_M) | (e >= walls.high - TOUCH_M)
+    J = (J[at].reshape(int(at.sum()), len(found.B), 1, 6) @ found.B).reshape(int(at.sum()), len(found.z))
+    return rank(np.concatenate([Jt, J.T], axis=1)) - rank(Jt) if at.any() else 0
+
+
+def paced(pace: float, step: Array, last: Array) -> float:
+    """The part of a step to make: all of it, but less where walls in turn make steps go to and fro.
+
+    If making the part p of the step before left r of it, making p / (1 - r) would have left nothing (secant rule).
+    """
+    size = float(last @ last)
+    if size == 0.0:
+        return 1.0
+    wanted = pace / max(1.0 - float(step @ last) / size, 1.0 / GROWS)
+    return min(max(wanted, SLOWEST), 1.0)
+
+
+def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, bool]:
+    """The shortest u with low <= J free u <= high, and whether there is one (DAQP: Arnstrom, Bemporad, Axehill, 2022).
+
+    Far from a solution linearised walls can leave no room where the walls themselves do; then the walls are overstepped
+    by as little as can be.
+    """
+    import daqp
+
+    A = J @ free
+    size = np.sqrt((A * A).sum(axis=1))
+    seeing = size > BLIND * np.sqrt((J * J).sum(axis=1))
+    A, low, high = A[seeing] / size[seeing, None], low[seeing] / size[seeing], high[seeing] / size[seeing]
+    k = A.shape[1]
+    if not len(A) or not k:
+        return np.zeros(k), True
+    problem = np.eye(k), np.zeros(k), np.ascontiguousarray(A), high, low
+    u, _, flag, _ = daqp.solve(*problem, np.full(len(A), HARD, dtype=np.intc), primal_tol=EXACT)
+    if flag > 0:
+        return np.asarray(u), True
+    u, _, _, _ = daqp.solve(*problem, np.full(len(A), SOFT, dtype=np.intc), primal_tol=EXACT)
+    return np.asarray(u), False

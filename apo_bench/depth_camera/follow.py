@@ -1,0 +1,197 @@
+"""Follow a demonstration from range image to range image: what moved, which part it was, where it went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly
+from apo_bench.depth_camera.distance import Shape, joined, shape_of, struck
+from apo_bench.depth_camera.locate import ALIKE, Appearance, Located, Model, located, rivals
+from apo_bench.depth_camera.range_finder import RangeFinder
+from apo_bench.depth_camera.regions import Regions, regions
+from apo_bench.depth_camera.symmetry import nearest, symmetries
+from apo_bench.depth_camera.view import View
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_boxes
+
+GONE = 0.5
+"""A part has moved if so much of what was seen of it has vanished."""
+GRID = 3
+"""Every so many pixels are asked what is seen there."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Event:
+    """One operation as the range finder saw it."""
+
+    first: int
+    """Number of the image before it."""
+    last: int
+    """Number of the image after it."""
+    regions: tuple[Regions, ...]
+    """Per view."""
+    moved: frozenset[str]
+    """The parts that are gone from where they were."""
+    explained: Mapping[str, float]
+    """How much of what appeared each model explains."""
+    found: Located | None
+    """Where the main part is now; None if nothing was recognised."""
+    shape: Shape | None
+    """What was fitted, in the frame of its main part; None if it is not known what moved."""
+    operation: int | None
+    """Which operation this was, counted from 0; None if none that was expected."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What is known before looking: topology, models, where parts start, and roughly how they will be turned."""
+
+    assembly: Assembly
+    start: Poses
+    turns: Array
+    """(n, 3, 3), the planned rotation of each goal, world; how the whole is turned is learnt from the first part."""
+    play_m: float = 0.0
+    """Clearance per side: the models are the parts as they are made."""
+
+
+def follow(images: Sequence[Array], finder: RangeFinder, level_m: float, expected: Expected) -> tuple[Event, ...]:
+    """Find every operation in range images, one per quiet spell, each (views, height, width), [m]; the first is before.
+
+    An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
+    what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
+    this eye where it was. Of operations in a row that move the same parts only where the last one ended is known: a
+    pause of the hand looks the same as the end of an operation, so the others are not seen.
+    """
+    assembly, believed = expected.assembly, dict(expected.start)
+    shapes = {p: shape_of(physical_boxes(s, expected.play_m)) for p, s in assembly.solids.items()}
+    events: list[Event] = []
+    frame, k, first = np.eye(3), 0, 0
+    while first + 1 < len(images) and k < len(assembly):
+        owners = [_owners(view, shapes, believed) for view in finder.views]
+        spell = _spell(images, first, level_m, assembly, k, owners, tuple(shapes))
+        if spell is None:
+            break
+        last, which, compared, moved = spell
+        seen = Appearance(finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m)
+        group = None if which is None else _moved(assembly, shapes, believed, which)
+        shares, found = _recognised(expected, shapes, group, which, seen)
+        if which is not None and found is not None:
+            operation = assembly.operations[which]
+            T = nearest(found.T, symmetries(assembly.solids[operation.main]), frame @ expected.turns[which])
+            C = _turned(found, T)
+            if not any(event.found for event in events):
+                frame = T[:3, :3] @ expected.turns[which].T
+            found = Located(T, C, found.explained)
+            step = T @ pose.inverse(believed[operation.main])
+            believed |= {part: step @ believed[part] for part in operation.moves}
+        k = k + 1 if which is None else which + 1
+        events.append(Event(first, last, compared, moved, shares, found, group and group.shape, which))
+        first = last
+    return tuple(events)
+
+
+def _spell(
+    images: Sequence[Array],
+    first: int,
+    noise_m: float,
+    assembly: Assembly,
+    k: int,
+    owners: Sequence[NDArray[np.int64]],
+    parts: tuple[str, ...],
+) -> tuple[int, int | None, tuple[Regions, ...], frozenset[str]] | None:
+    """The spell in which the next operation was over: image, operation, what changed, what moved; None if none was.
+
+    Operation k is looked for first; one that moves something else may come instead, if k was not seen. Of operations in
+    a row that move the same parts it is the last, since the spell ends when something else moves.
+    """
+    found = None
+    for last in range(first + 1, len(images)):
+        compared = tuple(regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
+        moved = _gone(owners, parts, compared) - assembly.fixed
+        if not moved:
+            continue
+        which = next((j for j in range(k, len(assembly)) if moved == set(assembly.operations[j].moves)), None)
+        while which is not None and which + 1 < len(assembly) and moved == set(assembly.operations[which + 1].moves):
+            which += 1
+        if found is None or (found[1] is None and moved >= found[3]) or which == found[1]:
+            found = last, which, compared, moved
+        elif found[1] is not None and not moved <= found[3]:
+            break
+    return found
+
+
+def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared: Sequence[Regions]) -> frozenset[str]:
+    """The parts of whose visible surface most has vanished."""
+    seen, gone = np.zeros(len(parts)), np.zeros(len(parts))
+    for owner, region in zip(owners, compared, strict=True):
+        seen += np.bincount(owner[owner >= 0], minlength=len(parts))
+        gone += np.bincount(owner[(owner >= 0) & region.vanished[::GRID, ::GRID]], minlength=len(parts))
+    return frozenset(part for part, n, m in zip(parts, seen, gone, strict=True) if n and m >= GONE * n)
+
+
+def _owners(view: View, shapes: Mapping[str, Shape], believed: Poses) -> NDArray[np.int64]:
+    """Which part every few pixels of a view should show, by number, -1 for none."""
+    owner = np.concatenate([np.full(len(shape.center), i) for i, shape in enumerate(shapes.values())])
+    scene = joined(_posed(shape, believed[part]) for part, shape in shapes.items())
+    pixels = np.arange(view.height * view.width).reshape(view.height, view.width)[::GRID, ::GRID]
+    _, box = struck(scene, view.origin, view.rays[pixels.ravel()])
+    return np.where(box < 0, -1, owner[box]).reshape(pixels.shape)
+
+
+def _posed(shape: Shape, T: Array) -> Shape:
+    return Shape(shape.center @ T[:3, :3].T + T[:3, 3], shape.half, T[:3, :3] @ shape.turn)
+
+
+def _recognised(
+    expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, seen: Appearance
+) -> tuple[Mapping[str, float], Located | None]:
+    """How much each model explains, and where the one that moved is, if none explains more."""
+    assembly, points = expected.assembly, seen.points()
+    shares: dict[str, float] = {}
+    found = None
+    if which is not None and group is not None:
+        found = located(group, seen, points)
+        shares["+".join(assembly.operations[which].moves)] = found.explained if found else 0.0
+    models: dict[str, Model] = {}
+    known = [] if group is None else [group.shape]
+    for part, solid in assembly.solids.items():
+        if part not in assembly.fixed and not any(_alike(shapes[part], shape) for shape in known):
+            models[part] = Model(shapes[part], symmetries(solid))
+            known.append(shapes[part])
+    shares |= rivals(models, seen, points)
+    if found is not None and found.explained < max(shares.values()) - ALIKE:
+        found = None
+    return shares, found
+
+
+def _moved(assembly: Assembly, shapes: Mapping[str, Shape], believed: Poses, which: int) -> Model:
+    """What an operation moves, as one rigid thing."""
+    operation = assembly.operations[which]
+    alone = shapes[operation.main]
+    if not operation.carries:
+        return Model(alone, symmetries(assembly.solids[operation.main]))
+    back = pose.inverse(believed[operation.main])
+    together = joined(_posed(shapes[part], back @ believed[part]) for part in operation.moves)
+    return Model(together, np.eye(4)[None], main=len(alone.center))
+
+
+def _alike(a: Shape, b: Shape) -> bool:
+    return all(x.shape == y.shape and np.allclose(x, y) for x, y in zip(a, b, strict=True))
+
+
+def _turned(found: Located, T: Array) -> Array:
+    """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
+    S = pose.inverse(T) @ found.T
+    A = np.zeros((6, 6))
+    A[:3, :3] = A[3:, 3:] = S[:3, :3]
+    A[:3, 3:] = pose.hat(S[:3, 3]) @ S[:3, :3]
+    return np.asarray(A @ found.covariance @ A.T)

@@ -1,0 +1,155 @@
+"""Recognise what appeared among the models, and locate it: fit every model, keep the one that explains most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from scipy.ndimage import binary_erosion
+
+from apo_bench.depth_camera.distance import Shape, signed_distance
+from apo_bench.depth_camera.explained import explained
+from apo_bench.depth_camera.fit import Fits, Points, covariance, refined
+from apo_bench.depth_camera.regions import Mask, smoothed
+from apo_bench.depth_camera.starts import starts
+from apo_bench.depth_camera.view import View
+from apo_bench.geometry.arrays import Array
+
+COARSE, MIDDLE, FINE = 150, 500, 3000
+"""Points of a first fit from every start, of the best of these, and of the last fit."""
+BEST = 4
+"""Starts that are followed further: one fit in some ends beside the true place, so never only one."""
+WIDTH_M = 0.0015
+"""Points this far away from a surface are half doubted; three standard deviations if that is more."""
+WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
+"""A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
+WELL_SEEN.flags.writeable = False
+WIDE_M = 0.012
+"""The same at the beginning of a fit: from there the width is narrowed, so that no end of a part is left behind."""
+LEAST_EXPLAINED = 0.6
+"""A model that explains less was not recognised."""
+ALIKE = 0.03
+"""What explains this much less than the best cannot be told from it so."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A part, or several that move as one, as the range finder looks for them."""
+
+    shape: Shape
+    """In the frame of its main part."""
+    same: Array
+    """(m, 4, 4), displacements after which it looks the same; the identity first."""
+    main: int | None = None
+    """How many of the boxes, the first ones, are those of the main part, if it carries others."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """What appeared between two firings."""
+
+    views: Sequence[View]
+    images: Array
+    """(views, height, width), the later images, [m]."""
+    masks: Sequence[Mask]
+    """Per view, where something is nearer than before."""
+    noise_m: float
+    bias_m: float
+
+    def points(self) -> Points:
+        """The measured points; the outermost pixels of the regions are left out."""
+        at, rays, number = [], [], []
+        for v, (view, image, mask) in enumerate(zip(self.views, self.images, self.masks, strict=True)):
+            pixels = np.flatnonzero(binary_erosion(mask) & np.isfinite(image))
+            ray = view.rays[pixels]
+            at.append(view.origin + image.ravel()[pixels, None] * ray)
+            rays.append(ray)
+            number.append(np.full(len(pixels), v))
+        return Points(np.concatenate(at), np.concatenate(rays), np.concatenate(number))
+
+    @cached_property
+    def smooth(self) -> Array:
+        """The images with less noise, edges kept; NaN around what is missing."""
+        return np.array([smoothed(image) for image in self.images])
+
+    @property
+    def width_m(self) -> float:
+        return max(WIDTH_M, 3.0 * self.noise_m)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Located:
+    """A model where it was found."""
+
+    T: Array
+    """(4, 4), of the frame of the model, world, [m]; one of those that look the same."""
+    covariance: Array
+    """(6, 6), of the body twist by which it is wrong, [m, rad]."""
+    explained: float
+    """0 to 1."""
+
+
+def located(model: Model, seen: Appearance, points: Points) -> Located | None:
+    """Fit a model to what appeared; None if there are too few points, or they are not explained by it.
+
+    A main part with what it carries is found as one rigid thing. As a carried part may have been shifted in the hand,
+    the last fit is that of the main part alone, if enough of it can be seen.
+    """
+    if len(points) < 6:
+        return None
+    best, _ = _best(model, seen, points)
+    T, C = _fine(model.shape, seen, points.thinned(FINE), best)
+    share = _share(model, seen, T)
+    if share < LEAST_EXPLAINED:
+        return None
+    if model.main is not None:
+        main, rest = (Shape(*(a[part] for a in model.shape)) for part in (slice(model.main), slice(model.main, None)))
+        local = (points.at - T[:3, 3]) @ T[:3, :3]
+        d = np.abs(signed_distance(main, local)[0])
+        own = points.only((d < 2.0 * seen.width_m) & (d < np.abs(signed_distance(rest, local)[0])))
+        if len(own) >= 6:
+            alone = _fine(main, seen, own.thinned(FINE), T)
+            if (np.sqrt(np.diag(alone[1])) < WELL_SEEN).all():
+                T, C = alone
+    return Located(T, C, share)
+
+
+def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Mapping[str, float]:
+    """How much of what appeared each model explains where it fits best, 0 to 1."""
+    if len(points) < 6:
+        return dict.fromkeys(models, 0.0)
+    return {name: _best(model, seen, points)[1] for name, model in models.items()}
+
+
+def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
+    """The last fit, from a good start, and its covariance."""
+    T = refined(shape, points, T[None], seen.width_m, 20).T[0]
+    return T, covariance(shape, points, T, seen.width_m, seen.noise_m, seen.bias_m)
+
+
+def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
+    """The best few of the fits from all starts."""
+    begun = starts(model.shape, points.at, model.same)
+    first = refined(model.shape, points.thinned(COARSE), begun, max(WIDE_M, 3.0 * seen.width_m), 10)
+    best = first.T[np.argsort(first.cost, kind="stable")[:BEST]]
+    middle = points.thinned(MIDDLE)
+    nearer = refined(model.shape, middle, best, np.sqrt(seen.width_m * max(WIDE_M, 3.0 * seen.width_m)), 8)
+    return refined(model.shape, middle, nearer.T, seen.width_m, 8)
+
+
+def _best(model: Model, seen: Appearance, points: Points) -> tuple[Array, float]:
+    """The pose (4, 4) that explains most, and how much, judged together with how close it is."""
+    fits = _coarse(model, seen, points)
+    shares = np.array([_share(model, seen, T) for T in fits.T])
+    best = int(np.argmax(shares - fits.cost))
+    return fits.T[best], float(shares[best])
+
+
+def _share(model: Model, seen: Appearance, T: Array) -> float:
+    return explained(model.shape, T, seen.views, seen.smooth, seen.masks, seen.noise_m)

@@ -1,0 +1,59 @@
+"""The range finder as an eye: from the true range images of a demonstration to an observation of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.depth_camera.follow import Event, Expected, follow
+from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.isotropic import floored
+
+UNSEEN = np.diag(np.repeat([0.1, 1.0], 3) ** 2)
+"""The covariance that stands beside an operation that was not seen, [m, rad]."""
+UNSEEN.flags.writeable = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RangeEye:
+    """Called like a noise model, it measures poses instead of drawing them: `(assembly, shown, rng) -> Observation`.
+
+    Of what was shown only the topology, where parts started and how careless people are is looked at; goals are
+    fitted to range images. Where a part looks the same when turned, the turn nearest to the planned one is reported,
+    and nothing else is taken from the plan.
+    """
+
+    finder: RangeFinder
+    images: tuple[RangeImage, ...]
+    """Without error: before the demonstration and in every quiet spell."""
+    level_m: float
+    """Standard deviation of a ray."""
+    turns: Array
+    """(n, 3, 3), the planned rotation of each goal, world."""
+    play_m: float
+    """Clearance per side, as the models are those of the parts as they are made."""
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        events = self.events(shown, self.sensed(rng))
+        goals = np.array([shown.start[operation.main] for operation in assembly.operations])
+        covariance, seen = np.repeat(UNSEEN[None], len(assembly), axis=0), np.zeros(len(assembly), dtype=np.bool_)
+        for event in events:
+            if event.found is not None and event.operation is not None:
+                k = event.operation
+                goals[k], covariance[k], seen[k] = event.found.T, event.found.covariance, True
+        return Observation(assembly, shown.start, goals, floored(covariance + shown.careless), seen)
+
+    def sensed(self, rng: np.random.Generator) -> list[Array]:
+        """The images with the errors of the sensor, (views, height, width) each, [m]."""
+        return [self.finder.sense(image, self.level_m, rng) for image in self.images]
+
+    def events(self, shown: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
+        """What it makes of measured images, operation by operation."""
+        return follow(images, self.finder, self.level_m, Expected(shown.assembly, shown.start, self.turns, self.play_m))

@@ -1,0 +1,343 @@
+"""The door for learners: `APOReplay-v0`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Observation, Plan, Poses, Step
+from apo_bench.assembly.topology import Assembly
+from apo_bench.envs.episode import Scenes, Settings, with_options
+from apo_bench.envs.nullable import predicted_info, whole
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.records.settings import RANGE, USUAL, check_eye, check_seed, level_pair, refuse_noise
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.stages import Ending, Shown, attempt, ending, foretold, misshown, see, show, through, unseen
+
+ROOM_M = 2.0
+"""Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""
+LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
+"""No stated standard deviation is larger, [m, rad]."""
+LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
+"""How far an action can move a goal per axis, [m, rad]."""
+PICTURE = (480, 640)
+LONGEST_REPLAY_S = 1000.0
+"""Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
+MOST_TRIES = 30
+"""So many demonstrations in a row may go wrong before `reset()` gives up."""
+
+Action = NDArray[np.float64]
+Seen = dict[str, Any]
+
+
+@final
+class APOReplay(gymnasium.Env[Seen, Action]):
+    """Replay an observed assembly.
+
+    ## Description
+    A human assembles a few parts on a table; a camera sees where each part was put, with an error. A robot arm with
+    a parallel gripper repeats the assembly. One reset is one noisy demonstration, one step is one whole replay.
+
+    ## Observation Space
+    A `Dict`, one entry per operation of the assembly, in their order:
+
+    - `goals`, `Box(n, 7)`: the pose of the moved part when the operation was over, (x, y, z, qw, qx, qy, qz),
+      world frame, [m].
+    - `covariance`, `Box(n, 6, 6)`: of the body twist by which each goal may be wrong, [m, rad].
+    - `seen`, `MultiBinary(n)`: whether the operation was seen at all.
+
+    Which faces touch is certain and stays the same: `env.unwrapped.assembly`. All of it as one typed object is
+    `env.unwrapped.seen`.
+
+    ## Action Space
+    `Box(n, 6)`: a body twist (x, y, z, rx, ry, rz) per operation, [m, rad], in the frame of the moved part, within
+    0.1 m and 0.5 rad per axis. The robot is asked for `goal @ exp(twist)`; zeros replay what was seen.
+
+    ## Rewards
+    1.0 if the finished assembly is right, else 0.0.
+
+    ## Starting State
+    The layout, the human's carelessness and the observation error are drawn anew. `reset(seed=k)` is trial k of
+    sweeps and of `apo-bench replay --seed k`, whatever came before; `reset()` draws the number of a trial, which is
+    `env.unwrapped.trial` and never in `info`: whoever sees it can draw the truth. The parts stand where the
+    demonstration began.
+
+    `reset(options={...})` takes `level`, `careless` and `clearance_mm`, with the meaning of the arguments below and for
+    that episode alone; any other key is refused.
+
+    ## Episode End
+    Every step terminates. `info` then holds `is_success`, `as_demonstrated` (each contact was also made when and where
+    it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of `apo_bench.records.outcomes`),
+    `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out, `predicted`: what it said about
+    itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and nothing from which it can be drawn.
+    A replay that takes more than 1000 s of simulated time, which only a schedule of a great many steps does, begins no
+    further step: code `time_limit`. Wall time has no limit.
+    A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
+    keeps it, says so in `info["demonstration"]`, and the step fails at stage `demonstrate`.
+
+    ## Arguments
+    - `scenario`: a name (`apo-bench scenarios`), the path of a scenario file, or a `Scenario`.
+    - `level`: standard deviation of the observation per axis, in mm and degrees; or the two as a pair.
+    - `careless`: 0 is a careful human, 1 the scenario's, any number between or beyond a multiple.
+    - `noise`: a noise model by name, as `module:name`, or the object; None stands for `isotropic`.
+    - `eye`: `noise`, or `range`: poses are measured in depth images; `level` is then the noise of a ray in mm, and
+      there is no noise model.
+    - `grasp`: `friction`, or `weld` for an ideal gripper.
+    - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
+    - `arm`: by name, or an `Arm`.
+    - `timestep_s`: of the physics.
+    - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
+      display; `human` opens a window when the replay begins.
+
+    ## Copies
+    An environment can be pickled and copied (`copy.deepcopy`) at any time, and the copy goes on exactly as the original
+    would. The window of the mode `human` is not copied; a noise model of one's own must be picklable itself.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 25}  # noqa: RUF012
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario = "stick_in_tower",
+        level: float | Sequence[float] = 1.0,
+        careless: float = 1.0,
+        noise: str | Callable[..., Any] | None = None,
+        grasp: str = "friction",
+        clearance_mm: float | None = None,
+        arm: str | Arm = "six_axis",
+        timestep_s: float = 0.001,
+        eye: str = "noise",
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
+        check_eye(eye)
+        self.render_mode = render_mode
+        if eye == RANGE and noise is not None:
+            refuse_noise(noise)
+        self._eye, self._model = eye, USUAL if noise is None else noise
+        self._usual = self._now = Settings(Level(*level_pair(level, eye)), careless, clearance_mm)
+        self._noise = self._usual_noise = make_noise(self._model, self._usual.level)
+        self._scene = build_scene(
+            load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
+        )
+        self._scenes = Scenes(self._scene)
+        n = len(self.assembly)
+        far = np.tile([ROOM_M] * 3 + [1.0] * 4, (n, 1))
+        unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
+        twist = np.tile(LARGEST_TWIST, (n, 1))
+        self.observation_space = spaces.Dict(
+            {
+                "goals": spaces.Box(-far, far, dtype=np.float64),
+                "covariance": spaces.Box(-unsure, unsure, dtype=np.float64),
+                "seen": spaces.MultiBinary(n),
+            }
+        )
+        self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
+        self._trial: int | None = None
+        self._shown: Shown | None = None
+        self._seen: Observation | None = None
+        self._aim: Plan | None = None
+        self._refused: Ending | None = None
+        self._over = False
+        self._poses: Poses = self._scene.scenario.start
+        self._state: Array | None = None
+        self._window: Any = None
+
+    @property
+    def assembly(self) -> Assembly:
+        """The topology: what is certain."""
+        return self._scene.scenario.assembly
+
+    @property
+    def seen(self) -> Observation:
+        """What was seen in this episode, as one typed object.
+
+        Raises:
+            ResetNeeded: There is no episode yet.
+        """
+        if self._seen is None:
+            raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
+        return self._seen
+
+    @property
+    def trial(self) -> int:
+        """The number of the trial of this episode, for whoever watches a learner: not for the learner.
+
+        Anybody can draw the truth of a trial from its number.
+
+        Raises:
+            ResetNeeded: There is no episode yet.
+        """
+        if self._trial is None:
+            raise gymnasium.error.ResetNeeded("there is no trial yet; call reset() first.")
+        return self._trial
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """Watch another demonstration; `seed=k` is trial k.
+
+        Args:
+            options: `level`, `careless` and `clearance_mm` of this episode; what is not said is as the environment was
+                made.
+
+        Raises:
+            InputError: Another option, a value that is not allowed, or no demonstration comes out right.
+        """
+        if seed is not None:
+            check_seed(int(seed))
+        self._set(with_options(self._usual, options, self._eye))
+        super().reset(seed=seed)
+        self._over = True
+        self._trial, shown = self._watch_human(seed)
+        noise = through(self._scene, shown, self._now.level.mm) if self._eye == RANGE else self._noise
+        self._seen = see(self._scene, shown, noise, self._trial)
+        self._shown = replace(shown, watched=None)
+        self.aim(self._seen.goals)
+        self._refused, self._over = unseen(self._seen), False
+        self._poses, self._state = shown.layout.start, None
+        return self._observation(), {"demonstration": shown.demonstration.code}
+
+    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+        """Replay the goals, each moved by its twist.
+
+        Raises:
+            ResetNeeded: The episode is over, or there is none.
+            InputError: The action is not in the action space.
+        """
+        if self._shown is None or self._aim is None or self._over:
+            raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
+        twist = np.asarray(action, dtype=np.float64)
+        if not self.action_space.contains(twist):
+            raise InputError(
+                f"an action of shape {twist.shape} with numbers from {np.min(twist, initial=0):g} to "
+                f"{np.max(twist, initial=0):g} was given; shape {self.action_space.shape} within 0.1 m and 0.5 rad is "
+                "allowed, as `env.action_space` says."
+            )
+        self._over = True
+        verdicts, end, said = self._replayed(self._shown, _moved(self._aim, pose.exp(twist)))
+        info = {
+            **verdicts,
+            "stage": end.stage,
+            "code": end.code,
+            "operation": whole(None if end.operation is None else end.operation + 1),
+            "sentence": end.sentence,
+            **({} if said is None else {"predicted": predicted_info(said)}),
+        }
+        return self._observation(), float(verdicts["is_success"]), True, False, info
+
+    def aim(self, goals: Array, schedule: Sequence[Step] = (), targets: Array | None = None) -> None:
+        """Replay this on zeros, until the next reset; for wrappers.
+
+        Args:
+            goals: (n, 4, 4), where every operation puts its part in the end.
+            schedule: What to do and undo; empty stands for every operation once, in order.
+            targets: (steps, 4, 4), as in `apo_bench.assembly.goals.Plan`; None stands for `goals` throughout.
+        """
+        plan = Plan(self.assembly, self.seen.start, goals, tuple(schedule))
+        self._aim = plan if targets is None else replace(plan, targets=targets)
+        self._refused = None
+
+    def refuse(self, code: str, why: str) -> None:
+        """Do not replay at all: the next step fails at stage `correct`; for wrappers."""
+        self._refused = Ending("correct", code, None, why)
+
+    def render(self) -> Any:
+        """The scene as an array (480, 640, 3) of uint8; None in mode `human`, which shows the replay itself."""
+        if self.render_mode != "rgb_array":
+            return None
+        from apo_bench.simulation.scene.render import picture_with_arm
+
+        return picture_with_arm(self._scene, self._poses, self._state, PICTURE[1], PICTURE[0])
+
+    def close(self) -> None:
+        """Close the window, if one is open."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the window."""
+        return {**self.__dict__, "_poses": dict(self._poses), "_window": None}
+
+    def _set(self, now: Settings) -> None:
+        """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
+        same = now.level == self._usual.level
+        noise = self._usual_noise if same else make_noise(self._model, now.level)
+        self._scene = self._scenes.of(now.clearance_mm)
+        self._now, self._noise = now, noise
+
+    def _watch_human(self, seed: int | None) -> tuple[int, Shown]:
+        """Trial `seed`, or the next one whose demonstration is right."""
+        for _ in range(1 if seed is not None else MOST_TRIES):
+            trial = int(seed) if seed is not None else self._next_trial()
+            shown = show(self._scene, self._now.careless, trial, self._eye)
+            if seed is not None or shown.demonstration.code == "ok":
+                return trial, shown
+        raise InputError(
+            f"{MOST_TRIES} demonstrations of '{self._scene.scenario.name}' in a row went wrong at carelessness "
+            f"{self._now.careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend "
+            "the scenario."
+        )
+
+    def _next_trial(self) -> int:
+        return int(self.np_random.integers(2**31))
+
+    def _observation(self) -> Seen:
+        """Fresh copies of what was seen."""
+        goals = packed(self.seen.goals)
+        return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
+
+    def _replayed(self, shown: Shown, plan: Plan) -> tuple[dict[str, bool], Ending, dict[str, Any] | None]:
+        """The verdicts, where it ended, and what the plan had said."""
+        failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
+        if shown.demonstration.code != "ok":
+            return failed, misshown(shown.demonstration), None
+        if self._refused is not None:
+            return failed, self._refused, None
+        said = foretold(plan, self._scene)
+        tried = attempt(plan, self._scene, shown.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
+        if tried.result.reached.final is not None:
+            self._poses = tried.result.reached.final.poses
+        judged = tried.verdict
+        verdicts = (judged.success, judged.as_demonstrated, judged.loose_success)
+        return dict(zip(failed, verdicts, strict=True)), ending(tried), said
+
+    def _watch(self) -> Any:
+        """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""
+        if self.render_mode == "human":
+            from apo_bench.simulation.scene.render import Viewer
+
+            self.close()
+            self._window = Viewer(self._scene)
+        return self._remember if self.render_mode == "rgb_array" else self._window
+
+    def _remember(self, data: Any) -> None:
+        self._state = np.array(data.qpos)
+
+
+def packed(goals: Array) -> Array:
+    """Goals (n, 4, 4) as observations hold them, (n, 7), within the bounds of their space."""
+    far = [ROOM_M] * 3 + [1.0] * 4  # of a quaternion, rounding alone could be beyond
+    return np.clip(pose.pack(goals), np.negative(far), far)
+
+
+def _moved(plan: Plan, twists: Array) -> Plan:
+    """Every goal and every target of an operation with the displacement of that operation, (n, 4, 4), on its right."""
+    done = [step.operation for step in plan.schedule]
+    return replace(plan, goals=plan.goals @ twists, targets=plan.targets @ twists[done])

@@ -1,0 +1,82 @@
+"""The settings of one episode: what `reset(options=...)` may say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.observation.noise import Level
+from apo_bench.records.settings import check_careless, check_clearance, level_pair
+from apo_bench.simulation.scene.scene import Scene, build_scene
+
+OPTIONS = ("level", "careless", "clearance_mm")
+MOST_SCENES = 8
+"""So many compiled scenes of other clearances are kept."""
+
+
+@final
+@dataclass(frozen=True)
+class Settings:
+    """What may differ from episode to episode; checked when it is made."""
+
+    level: Level
+    careless: float
+    clearance_mm: float | None
+    """None stands for the scenario's."""
+
+    def __post_init__(self) -> None:
+        check_careless(self.careless)
+        if self.clearance_mm is not None:
+            check_clearance(self.clearance_mm)
+
+
+def with_options(usual: Settings, options: object, eye: str) -> Settings:
+    """The settings of an episode: the usual ones, but for what the options say.
+
+    Raises:
+        InputError: An option that there is not, or a value that is not allowed.
+    """
+    if options is None:
+        return usual
+    if not isinstance(options, Mapping):
+        raise InputError(f"the options {options!r} were given to reset(); a dict with {', '.join(OPTIONS)} is allowed.")
+    said: dict[str, Any] = dict(options)
+    for name in said:
+        if name not in OPTIONS:
+            raise InputError(unknown("option of reset()", str(name), OPTIONS))
+    if "level" in said:
+        said["level"] = Level(*level_pair(said["level"], eye))
+    return replace(usual, **said)
+
+
+@final
+class Scenes:
+    """A scene, and the same compiled for other clearances."""
+
+    def __init__(self, usual: Scene) -> None:
+        self._usual = usual
+        self._others: dict[float, Scene] = {}
+
+    def of(self, clearance_mm: float | None) -> Scene:
+        """The scene of a clearance; None stands for the scenario's.
+
+        Raises:
+            InputError: A part cannot have it.
+        """
+        usual = self._usual
+        clearance = float(usual.scenario.clearance_mm if clearance_mm is None else clearance_mm)
+        if clearance == usual.clearance_mm:
+            return usual
+        found = self._others.pop(clearance, None) or build_scene(
+            usual.scenario,
+            clearance_mm=clearance,
+            grasp=usual.grasp,
+            arm=usual.arm,
+            timestep_s=usual.physics.timestep_s,
+        )
+        while len(self._others) >= MOST_SCENES:
+            del self._others[next(iter(self._others))]
+        self._others[clearance] = found
+        return found

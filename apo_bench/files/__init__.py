@@ -1,0 +1,1 @@
+"""The file forms of demonstrations, observations and plans."""

@@ -1,0 +1,168 @@
+"""Pose estimates in the results format of the BOP benchmark, read line by line: mm, model to camera.
+
+The first line is `scene_id,im_id,obj_id,score,R,t,time`; R is nine numbers row by row and t three, with spaces between.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.reading import opened
+from apo_bench.io.strict_csv import check_separator
+
+COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
+WANTED = "needed are, in this order, " + ",".join(COLUMNS)
+LONGEST_LINE, MOST_ROWS = 4096, 1_000_000
+LARGEST_ID, LARGEST_MM = 2**31 - 1, 1e6
+NOT_A_ROTATION = 0.02
+"""R R^t may be so far from the identity: published truth is rounded, that of LM-O by 0.0096."""
+METRES = 20.0
+"""Parts whose median distance to the camera is less than this, in mm, were surely given in metres."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Parts in images, one row for each."""
+
+    file: str
+    where: NDArray[np.int64]
+    """(n, 3): scene, image, object."""
+    R: Array
+    """(n, 3, 3), camera from model, as written: nearly rotations."""
+    t_mm: Array
+    """(n, 3), camera from model, axes of OpenCV."""
+    place: tuple[str, ...] | NDArray[np.int64]
+    """Where each row stands in the file: the line, or the entry of a JSON document."""
+
+    def said(self, row: int) -> str:
+        """Where a row stands, for messages."""
+        place = self.place[row]
+        return f"{self.file}, {place if isinstance(place, str) else f'line {place}'}"
+
+
+def read_results(path: str | Path) -> Located:
+    """The rows of a results file; scores and times are checked and not kept.
+
+    Raises:
+        InputError: Anything that is not as described, with the line where it stands.
+    """
+    ids, numbers, lines = array("q"), array("d"), array("q")
+    for line, text in _lines(path):
+        place = f"{path}, line {line}"
+        if len(lines) == MOST_ROWS:
+            raise InputError(f"{place}: a file of at most {MOST_ROWS} rows is needed; split it by scenes.")
+        scene, image, part, pose = _row(text, place)
+        ids.extend((scene, image, part))
+        numbers.extend(pose)
+        lines.append(line)
+    if not lines:
+        raise InputError(f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
+    cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 12)
+    where = np.frombuffer(ids, dtype=np.int64).reshape(-1, 3)
+    R, t = cells[:, :9].reshape(-1, 3, 3), cells[:, 9:]
+    return checked(Located(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64)))
+
+
+def checked(rows: Located) -> Located:
+    """The same rows.
+
+    Raises:
+        InputError: One is no rotation, the unit is not mm, or a row stands twice.
+    """
+    square = np.abs(rows.R @ np.swapaxes(rows.R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = (square > NOT_A_ROTATION) | (np.linalg.det(rows.R) < 0.0)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > NOT_A_ROTATION else "it mirrors"
+        raise InputError(f"{rows.said(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
+    distance = np.linalg.norm(rows.t_mm, axis=1)
+    if np.median(distance) < METRES:
+        raise InputError(
+            f"{rows.said(0)}, t: millimetres are needed, and the median distance to the camera is "
+            f"{np.median(distance):.3g}; if these are metres, multiply by 1000."
+        )
+    _refuse_twice(rows)
+    return rows
+
+
+def _refuse_twice(rows: Located) -> None:
+    """Refuse the first row that is an earlier one once more, number by number."""
+    cells = np.concatenate([rows.where.astype(np.float64), rows.t_mm, rows.R.reshape(-1, 9)], axis=1)
+    order = np.lexsort(cells.T[::-1])
+    same = np.flatnonzero((cells[order[1:]] == cells[order[:-1]]).all(axis=1))
+    if same.size:
+        i = same[np.argmin(order[same + 1])]
+        first, again = int(order[i]), int(order[i + 1])
+        earlier = rows.place[first]
+        earlier = earlier if isinstance(earlier, str) else f"line {earlier}"
+        raise InputError(f"{rows.said(again)}: the row of {earlier} stands there once more; keep one of the two.")
+
+
+def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
+    """Number and text of every line below the first that is not empty."""
+    line = 0
+    try:
+        with opened(path, "CSV file") as stream:
+            for line, raw in enumerate(iter(lambda: stream.readline(LONGEST_LINE + 1), b""), start=1):
+                if len(raw) > LONGEST_LINE:
+                    raise InputError(f"{path}, line {line}: a line of at most {LONGEST_LINE} characters is needed.")
+                text = raw.decode("utf-8-sig" if line == 1 else "utf-8").strip()
+                if line == 1:
+                    _check_header(text, f"{path}, line 1")
+                elif text:
+                    yield line, text
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a CSV file.") from error
+    if not line:
+        raise InputError(f"{path}: the file is empty; {WANTED} in its first line.")
+
+
+def _check_header(text: str, place: str) -> None:
+    found = tuple(cell.strip() for cell in text.split(","))
+    if found == COLUMNS:
+        return
+    check_separator(place, found)
+    for column in COLUMNS:
+        if column not in found:
+            raise InputError(f"{place}: the column '{column}' is missing; {WANTED}.")
+    raise InputError(f"{place}: the columns are {text[:80]}; {WANTED}.")
+
+
+def _row(text: str, place: str) -> tuple[int, int, int, list[float]]:
+    """Scene, image, object and the twelve numbers of R and t."""
+    cells = text.split(",")
+    if len(cells) != len(COLUMNS):
+        raise InputError(f"{place}: {len(COLUMNS)} cells are needed, one for each column, {len(cells)} were given.")
+    scene, image, part = (_id(cell.strip(), place, name) for cell, name in zip(cells, COLUMNS[:3], strict=False))
+    _numbers(cells[3], 1, f"{place}, score")
+    pose = _numbers(cells[4], 9, f"{place}, R") + _numbers(cells[5], 3, f"{place}, t")
+    _numbers(cells[6], 1, f"{place}, time")
+    return scene, image, part, pose
+
+
+def _id(text: str, place: str, name: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) <= 10 and int(text) <= LARGEST_ID):
+        raise InputError(f"{place}, {name}: a whole number from 0 is needed, '{text[:40]}' was given.")
+    return int(text)
+
+
+def _numbers(text: str, count: int, place: str) -> list[float]:
+    try:
+        found = [float(word) for word in text.split()]
+    except ValueError:
+        found = []
+    if len(found) == count and all(-LARGEST_MM <= x <= LARGEST_MM for x in found) and "_" not in text:
+        return found
+    what = "a number" if count == 1 else f"{count} numbers with spaces between them"
+    given = f"{len(found)} numbers were given" if len(found) not in (0, count) else f"'{text.strip()[:40]}' was given"
+    raise InputError(f"{place}: {what} of at most {LARGEST_MM:g} is needed, {given}.")

@@ -1,0 +1,158 @@
+"""Observed poses as comma-separated values: one row per operation, columns known by their names.
+
+    operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz,deviation_mm,deviation_deg,seen
+
+The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad`. The order of the columns is free,
+that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
+about each axis of the part (then those that are assumed), and whether the operation was seen (then it was). One more
+column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError
+from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, within
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.rigid import FARTHEST_M
+from apo_bench.io.strict_csv import Columns, Row, read_csv
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Scenario
+
+POSITION, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+_LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
+COLUMNS: Columns = {
+    **{name: (name, 1.0) for name in ("operation", "part")},
+    **{f"{name}_{unit}": (name, size) for name in POSITION for unit, size in _LENGTHS.items()},
+    **{name: (name, 1.0) for name in QUATERNION},
+    **{f"deviation_{unit}": ("deviation", size) for unit, size in _LENGTHS.items()},
+    **{f"deviation_{unit}": ("turn deviation", size) for unit, size in _ANGLES.items()},
+    "seen": ("seen", 1.0),
+    **{f"play_{unit}": ("play", size) for unit, size in _LENGTHS.items()},
+}
+"""What a column stands for, and its unit in m or rad."""
+REQUIRED = ("operation", "part", *POSITION, *QUATERNION)
+_FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
+
+
+def read_table(
+    path: str | Path,
+    scenario: Scenario,
+    *,
+    deviation_mm: float = DEVIATION_MM,
+    deviation_deg: float = DEVIATION_DEG,
+) -> tuple[Observation, bool]:
+    """An observation from a CSV file, and whether a standard deviation had to be assumed.
+
+    Parts start where those of the scenario do.
+
+    Raises:
+        InputError: Anything in the file that is not as described, naming line and column.
+    """
+    assembly, rows = scenario.assembly, dict[int, Row]()
+    for row in read_csv(path, COLUMNS, REQUIRED):
+        k = _operation(row, assembly)
+        if k in rows:
+            row.fail("operation", f"every operation stands once, this one is in line {rows[k].line} already")
+        rows[k] = row
+    for k, operation in enumerate(assembly.operations):
+        if k not in rows:
+            raise InputError(
+                f"{path}: the row of operation {k + 1} ({operation.main}) is missing; "
+                f"give one row for each of the {len(assembly)} operations."
+            )
+    ordered = [rows[k] for k in range(len(assembly))]
+    shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
+    turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
+    stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
+    seen = Observation(
+        assembly=assembly,
+        start=layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
+        goals=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
+        covariance=np.array([np.diag([s] * 3 + [t] * 3) ** 2 for s, t in zip(shift, turn, strict=True)]).reshape(
+            -1, 6, 6
+        ),
+        seen=np.array([_flag(row) for row in ordered], dtype=np.bool_),
+        gap_m=scenario.gap_mm * 1e-3,
+        play_m=_play(ordered, scenario.clearance_mm * 1e-3),
+    )
+    return seen, not stated
+
+
+def table(assembly: Assembly, goals: Array) -> str:
+    """Goals (n, 4, 4) as such a table, in mm, numbers to the last digit."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["operation", "part", *(f"{name}_mm" for name in POSITION), *QUATERNION])
+    for k, (operation, T) in enumerate(zip(assembly.operations, goals, strict=True)):
+        packed = pose.pack(T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]
+        writer.writerow([k + 1, operation.main, *map(repr, packed.tolist())])
+    return text.getvalue()
+
+
+def _operation(row: Row, assembly: Assembly) -> int:
+    """Which operation a row is of, counted from 0."""
+    text = row.text("operation")
+    if not text.isdecimal() or len(text) > 9 or not 1 <= int(text) <= len(assembly):
+        row.fail("operation", f"a whole number from 1 to {len(assembly)} is needed")
+    k = int(text) - 1
+    if row.text("part") != assembly.operations[k].main:
+        row.fail("part", f"'{assembly.operations[k].main}' is needed, the part that operation {k + 1} moves")
+    return k
+
+
+def _pose(row: Row) -> Array:
+    position = [row.number(name, FARTHEST_M) for name in POSITION]
+    x, *others = (row.cells[name] for name in POSITION)
+    for other in others:
+        if other[2] != x[2]:
+            raise InputError(
+                f"{row.file}: the columns '{x[0]}' and '{other[0]}' are of different units; "
+                "give all three positions in mm, or all in m."
+            )
+    q = np.array([row.number(name, 2.0) for name in QUATERNION])
+    if abs(np.linalg.norm(q) - 1.0) > 1e-3:
+        raise InputError(
+            f"{row.file}, line {row.line}, columns qw to qz: a quaternion of length 1 (within 0.001) is needed, "
+            f"one of length {np.linalg.norm(q):.4g} was given; divide it by its length."
+        )
+    return pose.unpack(np.array([*position, *q]))
+
+
+def _deviation(row: Row, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
+    """A standard deviation; the assumed one if the cell is empty."""
+    if not row.text(meaning):
+        return assumed
+    x, unit = row.number(meaning, math.inf), row.cells[meaning][2]
+    if not within(x, limits):
+        low, high = (limit / unit for limit in limits)
+        row.fail(meaning, f"a standard deviation from {low:g} to {high:g} is needed")
+    return x
+
+
+def _play(rows: Sequence[Row], assumed: float) -> float:
+    """The play of parts that fit, [m], which is one number for all rows."""
+    stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
+    for row, x in stated:
+        if x < 0.0:
+            row.fail("play", "a length from 0 is needed")
+        if x != stated[0][1]:
+            row.fail("play", f"one length for all rows is needed, line {stated[0][0].line} says another")
+    return stated[0][1] if stated else assumed
+
+
+def _flag(row: Row) -> bool:
+    text = row.text("seen").lower()
+    if text not in _FLAGS:
+        row.fail("seen", "true or false is needed")
+    return _FLAGS[text]

@@ -1,0 +1,115 @@
+"""Observed poses from a file: the JSON form of `apo_bench.files.json_forms`, or a table of comma-separated values."""
+
+from __future__ import annotations
+
+from math import radians
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.errors import InputError
+from apo_bench.files.csv_form import read_table
+from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
+from apo_bench.geometry.rigid import FARTHEST_M
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Scenario
+
+
+class Observed(NamedTuple):
+    """An observation with its scenario."""
+
+    observation: Observation
+    scenario: Scenario
+    assumed: bool
+    """Whether a standard deviation had to be assumed."""
+
+
+def read_observation(
+    path: str | Path,
+    scenario: Scenario | str | Path,
+    *,
+    deviation_mm: float = DEVIATION_MM,
+    deviation_deg: float = DEVIATION_DEG,
+) -> Observation:
+    """An observation from a `.csv` file, or from the JSON form of any other.
+
+    Args:
+        scenario: The scenario it is of, its name, or its file.
+        deviation_mm: Standard deviation along each axis where the file states none.
+        deviation_deg: The same about each axis.
+
+    Raises:
+        InputError: Anything that is not as described, with the place where it stands.
+    """
+    return observed(path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg).observation
+
+
+def observed(
+    path: str | Path,
+    scenario: Scenario | str | Path,
+    *,
+    deviation_mm: float = DEVIATION_MM,
+    deviation_deg: float = DEVIATION_DEG,
+) -> Observed:
+    """The same, with what is known of it."""
+    from apo_bench.files import json_forms as files
+    from apo_bench.scenario.file import load_scenario
+
+    check_deviations(deviation_mm, deviation_deg)
+    if not isinstance(path, str | Path):
+        raise InputError(f"{path!r} was given as an observation; give the path of a .csv or .json file.")
+    known = load_scenario(scenario)
+    if Path(path).suffix.lower() != ".csv":
+        seen, assumed = files.read_observed(path, known, (deviation_mm, deviation_deg))
+        _check_near(path, seen)
+    else:
+        seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
+    return Observed(seen, known, assumed)
+
+
+def read_stated(path: str | Path, scenario: Scenario) -> Observation:
+    """An observation from a file that states every standard deviation itself.
+
+    Raises:
+        InputError: As `read_observation`, or one is missing.
+    """
+    if Path(path).suffix.lower() != ".csv":
+        from apo_bench.files import json_forms as files
+
+        seen = files.read_observation(path, scenario)
+        _check_near(path, seen)
+        return seen
+    seen, _, assumed = observed(path, scenario)
+    if assumed:
+        raise InputError(
+            f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row."
+        )
+    return seen
+
+
+def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
+    """The nominal goals of a scenario, as if they had been seen with these standard deviations."""
+    check_deviations(deviation_mm, deviation_deg)
+    layout, n = layout_at(scenario, 0.0, 0.0, 0.0), len(scenario.assembly)
+    covariance = np.diag([deviation_mm * 1e-3] * 3 + [radians(deviation_deg)] * 3) ** 2
+    return Observation(
+        assembly=scenario.assembly,
+        start=layout.start,
+        goals=layout.goals,
+        covariance=np.tile(covariance, (n, 1, 1)),
+        seen=np.ones(n, dtype=np.bool_),
+        gap_m=scenario.gap_mm * 1e-3,
+        play_m=scenario.clearance_mm * 1e-3,
+    )
+
+
+def _check_near(path: str | Path, seen: Observation) -> None:
+    """Refuse poses so far away that nothing can be computed with them; a CSV file is checked cell by cell."""
+    for k, T in enumerate(seen.goals):
+        if np.abs(T[:3, 3]).max() > FARTHEST_M:
+            raise InputError(
+                f"{path}, operation {k + 1}, position_mm: numbers of at most {FARTHEST_M * 1e3:g} are needed, "
+                f"{np.abs(T[:3, 3]).max() * 1e3:g} was given."
+            )

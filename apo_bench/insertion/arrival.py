@@ -1,0 +1,191 @@
+"""How a part comes into its contacts: the macros, and the straight line on which it arrives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.assembly.touching import Touching, corners, touching
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.insertion.line import Attach, Preference
+from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departs
+from apo_bench.insertion.screw import Screw, screw_state
+from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space, snapped
+from apo_bench.insertion.swept import Posed, exit_after, free
+
+ROOM_M = 0.02
+"""A part begins its way in so far outside of what it goes into."""
+TRAVEL_M = 0.03
+"""How far before its goal the line begins at least."""
+CLEAR_M = 0.3
+"""A part comes from above to where its way in begins: so much above that place must be free."""
+SAME = 1e-9
+ANY = Preference()
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Arrival:
+    """A part at a place, and how it comes there."""
+
+    main: str
+    T: Array
+    """(4, 4), where the main part then is; directions below are in the frame of the same world."""
+    touched: tuple[Touching, ...]
+    chain: Chain
+    """Its macros, contacts by their number in `touched`."""
+    departs: tuple[Macro, ...]
+    """By which the part leaves again, apart from being lifted."""
+    line: Attach
+    """The line on which it arrives, in its own frame."""
+    free: bool
+    """Whether nothing is in the way of that line, nor above its beginning."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T", frozen(self.T, 4, 4))
+
+    @property
+    def state(self) -> State:
+        return self.chain.state
+
+    @property
+    def macros(self) -> tuple[Macro, ...]:
+        return self.chain.macros
+
+    def contacts(self, macro: Macro) -> tuple[Contact, ...]:
+        """Those that a macro makes, or opens."""
+        return tuple(self.touched[i].contact for i in macro.makes)
+
+    def own(self, direction: Array) -> Array:
+        """A direction, (3,), in the frame of the part."""
+        return _own(direction, self.T)
+
+    @property
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Directions of the part's place, each (k, 3): settled by position, by feeling, by walls."""
+        cone = classify(_normals(self.touched))
+        walls = cone.rows[~cone.detachable]
+        position = readable(null_space(cone.rows), self.T)
+        felt = np.array([macro.direction for macro in self.macros if macro.guarded]).reshape(-1, 3)
+        across = readable(null_space(null_space(walls)) if len(walls) else np.zeros((0, 3)), self.T)
+        return position, felt, across
+
+
+def arrive(
+    assembly: Assembly,
+    moves: Sequence[str],
+    contacts: Iterable[Contact],
+    poses: Poses,
+    stated: Preference = ANY,
+    angle_rad: float = ANGLE_RAD,
+) -> Arrival:
+    """How what moves, the main part first, comes into its contacts.
+
+    Args:
+        poses: Every part, what moves at its goal, z upwards, [m]. Nothing else may be inside of anything.
+        stated: A line to be preferred, in the frame of the main part; one that leads through a contact is not.
+        angle_rad: Normals this near to parallel are; more than rounding where poses were only seen.
+    """
+    T = poses[moves[0]]
+    touched = tuple(touching(assembly, contacts, moves, poses))
+    normals = _normals(touched, angle_rad)
+    moving = [Posed(assembly.solids[part].boxes, poses[part]) for part in moves]
+    resting = {part: Posed(solid.boxes, poses[part]) for part, solid in assembly.solids.items() if part not in moves}
+    direction = stated.direction
+    if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
+        direction = None
+
+    def clear(way: Array, length_m: float) -> bool:
+        begin = [Posed(posed.boxes, _shifted(posed.T, length_m * way)) for posed in moving]
+        others = list(resting.values())
+        return free(moving, way, length_m, others) and free(begin, UP, CLEAR_M, others)
+
+    def reach(exit_m: float) -> float:
+        return _length(exit_m) if stated.travel_m is None else stated.travel_m
+
+    def out(along: Array, walls: tuple[int, ...]) -> Way:
+        around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
+        floors = [normals[i] for i in range(len(normals)) if i not in walls]
+        there = [-(T[:3, :3] @ direction)] if direction is not None else list(_directions(along, floors, T))
+        ways = [Way(u, exit_after(moving, u, around), False) for u in there]
+        found = (way._replace(free=True) for way in ways if clear(way.direction, reach(way.length_m)))
+        return next(found, ways[0])
+
+    found = chain(normals, out, float(np.sin(angle_rad)))
+    if found.way is not None:
+        line, is_free = Attach(_own(-found.way.direction, T), reach(found.way.length_m)), found.way.free
+    else:
+        there = list(_admissible(found, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
+        way = next((way for way in there if clear(way, reach(0.0))), None)
+        line, is_free = Attach(_own(-(there[0] if way is None else way), T), reach(0.0)), way is not None
+    if direction is not None:
+        line = Attach(direction, line.travel_m)
+    supports = tuple(i for i, n in enumerate(normals) if n @ UP > 0.5)
+    return Arrival(moves[0], T, touched, found, departs(found, supports), line, is_free and not found.locked)
+
+
+def turning(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
+    """The state of what has arrived if it may also turn; `poses` as it was understood at."""
+    return screw_state(*corners(assembly, found.touched, poses))
+
+
+def readable(basis: Array, T: Array) -> Array:
+    """Another basis of the span of (m, 3): axes of the part at T as far as they lie in it, then what is left."""
+    found: list[Array] = []
+    for axis in (*T[:3, :3].T, *basis):
+        rest = basis.T @ (basis @ axis)
+        rest = rest - sum(((rest @ other) * other for other in found), np.zeros(3))
+        inside = np.linalg.norm(rest - axis) < 1e-6 or any(axis is row for row in basis)
+        if inside and np.linalg.norm(rest) > 1e-6 and len(found) < len(basis):
+            found.append(rest / np.linalg.norm(rest))
+    return np.array(found).reshape(-1, 3)
+
+
+def _admissible(found: Chain, normals: Array, T: Array) -> Iterator[Array]:
+    """Ways off contacts that enclose nothing: straight up if that is one, as the first contact opens, any other."""
+    cone = classify(normals)
+    if found.locked:
+        yield UP
+        return
+    first = [-found.macros[0].direction] if found.macros else []
+    inside = [cone.direction] if cone.direction.any() else []
+    for way in (UP, *first, *inside, *(sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0))):
+        if cone.admits(way):
+            yield way
+
+
+def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Array]:
+    """Ways out between walls: up, off the floor, and along the axes of the part, backwards before forwards."""
+    axes = [sign * axis for sign in (-1.0, 1.0) for axis in T[:3, :3].T]
+    for way in (UP, *floors, *axes, *(-along), *along):
+        within = along.T @ (along @ way)
+        size = float(np.linalg.norm(within))
+        if size > 0.5:
+            yield np.round(within / size, 12) + 0.0
+
+
+def _length(exit_m: float) -> float:
+    """How long the line of attach is for a part that is free after a way, in whole millimetres, [m]."""
+    return max(TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + ROOM_M) - 1e-3)))
+
+
+def _normals(touched: Sequence[Touching], angle_rad: float = ANGLE_RAD) -> Array:
+    return snapped(np.array([each.normal for each in touched]).reshape(-1, 3), angle_rad)
+
+
+def _own(direction: Array, T: Array) -> Array:
+    """A direction in the frame of the part; exact where it is vertical."""
+    if np.linalg.norm(direction + UP) < SAME:
+        return np.asarray(T[:3, :3].T @ -UP)
+    return np.asarray(np.round(T[:3, :3].T @ direction, 12) + 0.0)
+
+
+def _shifted(T: Array, by: Array) -> Array:
+    out = np.array(T)
+    out[:3, 3] += by
+    return out

@@ -1,0 +1,80 @@
+"""What a part touches when it is moved: at its side, below it, later; what that asks of the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.solid import Solid, extent
+from apo_bench.insertion.arrival import Arrival
+
+SLOW_M = 0.003
+STRAIGHT = 1e-9
+WALL_MARGIN_M = 0.002
+OVER_M = 0.02
+"""Room between what is carried and what it is carried over."""
+
+
+def slides(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[Array, ...]:
+    """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are believed to be."""
+    sides: list[Array] = []
+    for macro in found.macros:
+        if macro.name == "slide-to-contact":
+            first = found.touched[macro.makes[0]]
+            (rests,) = (of for of in first.contact if of.part == first.rests)
+            side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
+            if first.normal @ macro.direction > -1.0 + STRAIGHT:
+                side = poses[found.main][:3, :3] @ found.own(macro.direction)
+            if abs(side[2]) < 0.5:
+                sides.append(side)
+    return tuple(sides)
+
+
+def walls(found: Arrival) -> tuple[Contact, ...]:
+    """The contacts between which the part is inserted."""
+    return tuple(contact for macro in found.macros if macro.inserts for contact in found.contacts(macro))
+
+
+def slow_before(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> float:
+    """How far before the goal a motion from above turns slow: where an insertion begins, or just above the floor."""
+    depth = SLOW_M
+    for m, e in walls(found):
+        corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+        if len(corners):
+            depth = max(depth, float(np.ptp(corners @ way)) + WALL_MARGIN_M)
+    return depth
+
+
+def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
+    """Normals of the part's faces, (3,) each, that later operations fit or slide something against.
+
+    Only those before the part is moved by itself again.
+    """
+    walls = []
+    for operation in assembly.operations[k + 1 :]:
+        if operation.main == part:
+            break
+        for contact in operation.contacts:
+            walls += [assembly.face(of).normal for of in contact if of.part == part]
+    return walls
+
+
+def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:
+    """What the moved part touches."""
+    return {of.part for contact in contacts for of in contact} - set(moved)
+
+
+def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
+    """The top of what stands, and the bottom of what moves, [m]."""
+    ends = {part: _heights(solid, poses[part]) for part, solid in assembly.solids.items()}
+    top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)
+    return top, min(ends[part][0] for part in moved)
+
+
+def _heights(solid: Solid, T: Array) -> tuple[float, float]:
+    """The lowest and the highest point of a part, [m]."""
+    low, high = extent(solid.boxes, T[2, :3])
+    return float(T[2, 3] + low), float(T[2, 3] + high)

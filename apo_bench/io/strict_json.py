@@ -1,0 +1,180 @@
+"""JSON read strictly: every complaint is one sentence that names the file and the key."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NoReturn, final
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.io.reading import read_text
+
+DEEPEST = 32
+"""Levels of nesting; no file of ours has more than 6."""
+LARGEST_INTEGER = 10**308
+"""Larger ones are no floating-point numbers."""
+
+
+@final
+@dataclass(frozen=True)
+class Node:
+    """A value of a JSON document and where it stands in it."""
+
+    value: Any
+    file: str
+    key: str = ""
+    """From the root, such as `operation 2, position_mm`; empty for the document itself."""
+
+    def fail(self, allowed: str, remedy: str = "") -> NoReturn:
+        """Raise the `InputError` that says what stands here and what is allowed instead."""
+        place = f"{self.file}, {self.key}" if self.key else self.file
+        raise InputError(f"{place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
+
+    def child(self, value: Any, key: str) -> Node:
+        return Node(value, self.file, f"{self.key}, {key[:60]}" if self.key else key[:60])
+
+    def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, Node]:
+        """The members of an object: every required key, no unknown one."""
+        required, optional = tuple(required), tuple(optional)
+        if not isinstance(self.value, dict):
+            self.fail("an object with named keys is needed", f"its keys are {', '.join((*required, *optional))}")
+        known = (*required, *optional)
+        for key in self.value:
+            if key not in known:
+                near = get_close_matches(key, known, n=1, cutoff=0.5)
+                hint = f"; did you mean '{near[0]}'? Allowed" if near else "; allowed"
+                place = f"{self.file}, {self.key}" if self.key else self.file
+                raise InputError(f"{place}: unknown key '{key[:60]}'{hint}: {', '.join(known)}.")
+        for key in required:
+            if key not in self.value:
+                place = f"{self.file}, {self.key}" if self.key else self.file
+                raise InputError(f"{place}: the key '{key}' is missing; needed are {', '.join(required)}.")
+        return {key: self.child(value, key) for key, value in self.value.items()}
+
+    def items(self, name: str, count: int | None = None) -> Sequence[Node]:
+        """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given."""
+        if not isinstance(self.value, list):
+            self.fail("a list is needed")
+        if count is not None and len(self.value) != count:
+            raise InputError(f"{self.file}, {self.key}: {count} entries are needed, {len(self.value)} were given.")
+        return [Node(value, self.file, f"{name} {i}") for i, value in enumerate(self.value, start=1)]
+
+    def numbers(self, *shape: int) -> Array:
+        """Finite numbers in nested lists of this shape."""
+        size = " x ".join(map(str, shape))
+        if not _fits(self.value, shape):
+            self.fail(f"{size} finite numbers are needed")
+        array = np.array(self.value, dtype=np.float64)
+        if not np.isfinite(array).all():
+            self.fail(f"{size} finite numbers are needed")
+        return array
+
+    def number(self, low: float, high: float = math.inf, *, above: bool = False) -> float:
+        """A finite number that is at least `low`, or above it, and at most `high`."""
+        most = f" to {high:g}" if math.isfinite(high) else ""
+        wanted = f"a finite number {'above' if above else 'from'} {low:g}{most} is needed"
+        if not _fits(self.value, ()):
+            self.fail(wanted)
+        x = float(self.value)
+        if not math.isfinite(x) or x > high or x < low or (above and x == low):
+            self.fail(wanted)
+        return x
+
+    def integer(self) -> int:
+        if not isinstance(self.value, int) or isinstance(self.value, bool):
+            self.fail("a whole number is needed")
+        return self.value
+
+    def text(self) -> str:
+        if not isinstance(self.value, str):
+            self.fail("a text in quotes is needed")
+        if UNSHOWN.search(self.value.replace("\n", " ").replace("\t", " ")):
+            self.fail("a text without control characters is needed")
+        return self.value
+
+    def flag(self) -> bool:
+        if not isinstance(self.value, bool):
+            self.fail("true or false is needed")
+        return self.value
+
+
+def read_json(path: str | Path) -> Node:
+    """The document in a file.
+
+    Raises:
+        InputError: No such file, too large, not UTF-8, not JSON, a repeated key, NaN or Infinity.
+    """
+    return parse_json(read_text(path, "JSON file"), str(path))
+
+
+def parse_json(text: str, file: str) -> Node:
+    """The document in a text; `file` is its name in messages."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        members = dict(pairs)
+        if len(members) < len(pairs):
+            twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+            raise InputError(f"{file}: the key '{twice[:60]}' stands twice in one object; keep one of the two.")
+        return members
+
+    def refuse(constant: str) -> NoReturn:
+        raise InputError(f"{file}: every number must be finite, {constant} was given.")
+
+    try:
+        document = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
+    except (RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{file}: this is not a JSON document that can be read (nested too deep, or a huge number)."
+        ) from error
+    check_plain(document, file)
+    return Node(document, file)
+
+
+def check_plain(document: Any, file: str) -> None:
+    """Raise an `InputError` if a document is nested too deep or holds a huge number, a date or a time."""
+
+    def place(key: str) -> str:
+        return f"{file}, {key}" if key else file
+
+    level: list[tuple[str, Any]] = [("", document)]
+    for _ in range(DEEPEST):
+        below: list[tuple[str, Any]] = []
+        for key, value in level:
+            if isinstance(value, dict):
+                below += [(f"{key}, {name[:60]}" if key else name[:60], entry) for name, entry in value.items()]
+            elif isinstance(value, list):
+                below += [(key, entry) for entry in value]
+            elif isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER:
+                raise InputError(f"{place(key)}: whole numbers go to 1e308, a larger one was given.")
+            elif not isinstance(value, str | int | float | bool | None):
+                raise InputError(
+                    f"{place(key)}: the date or time {value} was given, which no key takes; put it into quotes."
+                )
+        if not below:
+            return
+        level = below
+    raise InputError(f"{file}: the document is nested more than {DEEPEST} levels deep; no file of ours is.")
+
+
+def _fits(value: Any, shape: tuple[int, ...]) -> bool:
+    if not shape:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+    return isinstance(value, list) and len(value) == shape[0] and all(_fits(entry, shape[1:]) for entry in value)
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "..."

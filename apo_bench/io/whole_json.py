@@ -1,0 +1,73 @@
+"""JSON of which nothing is lost when it is read: no key stands twice in an object, and no text has half a letter."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import Counter
+from typing import Any, Never
+
+import msgspec
+
+from apo_bench.errors import InputError
+from apo_bench.io.plain_text import clean
+
+HALF = re.compile("[\ud800-\udfff]")
+"""Half a letter, such as a lone \\ud800, which no file can hold as UTF-8."""
+HALF_BUT_OF_FILES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
+"""The same but for those that stand for bytes in names of files that are not UTF-8."""
+WHOLE_LETTERS = "text without half letters (a lone \\ud800 to \\udfff) is needed"
+LONGEST_KEY = 60
+
+
+def is_whole(text: bytes) -> bool:
+    """Surely so: nothing is escaped, and as many colons come back when it is read and written again; fast."""
+    return b"\\" not in text and text.count(b":") == msgspec.json.encode(msgspec.json.decode(text)).count(b":")
+
+
+def read_whole(text: bytes, where: str, half: re.Pattern[str]) -> Any:
+    """The document, read by the library of the language, which is slower and sees every key.
+
+    Args:
+        where: File and line, for the complaint.
+        half: `HALF` or `HALF_BUT_OF_FILES`.
+
+    Raises:
+        InputError: A key stands twice, or a text has half a letter.
+        ValueError: It is no JSON.
+    """
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        members = dict(pairs)
+        if len(members) < len(pairs):
+            twice = clean(Counter(key for key, _ in pairs).most_common(1)[0][0])[:LONGEST_KEY]
+            raise InputError(f"{where}: the key '{twice}' stands twice in one object; keep one of the two.")
+        return members
+
+    def refuse(constant: str) -> Never:
+        raise ValueError(constant)
+
+    def finite(number: str) -> float:
+        return x if math.isfinite(x := float(number)) else refuse(number)
+
+    said = json.loads(text.decode(), object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
+    field = half_letter(said, half)
+    if field is not None:
+        raise InputError(f"{where}, field {field}: {WHOLE_LETTERS}; remove it, or the folder.")
+    return said
+
+
+def half_letter(said: Any, half: re.Pattern[str], field: str = "") -> str | None:
+    """The first field of a document with half a letter in its name or text, such as `tried[0].step`."""
+    if isinstance(said, str):
+        return field if half.search(said) else None
+    inside: list[tuple[str, Any]] = []
+    if isinstance(said, list):
+        inside = [(f"{field}[{i}]", entry) for i, entry in enumerate(said)]
+    if isinstance(said, dict):
+        for name, entry in said.items():
+            place = f"{field}.{clean(name)[:LONGEST_KEY]}".lstrip(".")
+            inside += [(place, name), (place, entry)]
+    found = (half_letter(entry, half, place) for place, entry in inside)
+    return next((place for place in found if place is not None), None)

@@ -1,0 +1,1 @@
+"""The judge: is the assembly right? Knows geometry, the assembly and what was reached, nothing else."""

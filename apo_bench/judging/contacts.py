@@ -1,0 +1,114 @@
+"""Whether the contacts of an assembly were made, measured on the nominal faces at the poses that were reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry.overlap import Overlap, overlap
+from apo_bench.records.thresholds import Thresholds
+
+Moment = Literal["made", "end"]
+Share = Callable[[Overlap, Overlap], float]
+"""How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
+
+
+class ContactVerdict(NamedTuple):
+    """One contact at one moment."""
+
+    contact: Contact
+    operation: int
+    """The operation that made it, counted from 0."""
+    moment: Moment
+    """`made`: when its operation was over; `end`: at the end, if nothing moved the parts away from each other."""
+    gap_mm: float | None
+    """Largest |e|: distance of a corner of the overlap to the plane of the other face; None without any overlap."""
+    angle_deg: float
+    """Between the normals of the faces; 0 if they look straight at each other."""
+    overlap: float
+    """How much of the true overlap is covered."""
+    touching: bool
+    """Strict in gap, loose in angle; faces that look at each other but do not overlap leave this open, as true."""
+    covering: bool
+    """There is an overlap, and it is large enough."""
+    loose: bool
+    allowed_mm: float
+    """The largest gap that counts as touching."""
+
+    @property
+    def strict(self) -> bool:
+        return self.touching and self.covering
+
+
+class ContactJudge(NamedTuple):
+    """What is asked of a contact, whatever the moment."""
+
+    assembly: Assembly
+    thresholds: Thresholds
+    clearance_mm: float
+
+    def verdict(
+        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Overlap, share: Share
+    ) -> ContactVerdict:
+        """Measure one contact.
+
+        Args:
+            poses: Where the parts are, world frame, [m].
+            true: The overlap of the two faces at the true goals.
+        """
+        asked, fits = self.thresholds, self.assembly.is_fit(contact)
+        allowed = self.clearance_mm + asked.fit_margin_mm if fits else asked.support_mm
+        gap, angle, found = _measured(self.assembly, contact, poses)
+        covered = share(found, true)
+        covering = gap is not None and covered >= asked.overlap_fraction
+        near = angle <= asked.loose_angle_deg and (gap is None or gap <= asked.loose_gap_mm)
+        touching = near and (gap is None or gap <= allowed)
+        loose = near and covering
+        return ContactVerdict(
+            contact, operation, moment, gap, angle, covered, touching, covering, loose, allowed_mm=allowed
+        )
+
+
+def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
+    """Of the contacts that are worst: `gap` and `overlap`, each with what is wrong, if there is anything."""
+    apart = [c for c in contacts if not c.touching]
+    if apart:
+        worst = max(apart, key=lambda c: (c.angle_deg > thresholds.loose_angle_deg, c.gap_mm or 0.0))
+        if worst.gap_mm is None or worst.angle_deg > thresholds.loose_angle_deg:
+            how = f"turned by {worst.angle_deg:.1f} deg, where {thresholds.loose_angle_deg:g} deg are allowed"
+        else:
+            how = f"off by {worst.gap_mm:.2f} mm, where {worst.allowed_mm:g} mm are allowed"
+        yield "gap", f"{worst.contact} is {how}{_when(worst)}"
+    bare = [c for c in contacts if not c.covering]
+    if bare:
+        worst = min(bare, key=lambda c: c.overlap)
+        how = (
+            f"{100 * worst.overlap:.0f} % of the true overlap, where {100 * thresholds.overlap_fraction:g} % are asked"
+        )
+        yield "overlap", f"{worst.contact} covers {how}{_when(worst)}"
+
+
+def face_overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
+    """The overlap of the two faces of a contact; nothing, if they do not look at each other."""
+    m, e = contact
+    return overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])
+
+
+def _when(found: ContactVerdict) -> str:
+    return f" after operation {found.operation + 1}" if found.moment == "made" else ""
+
+
+def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float | None, float, Overlap]:
+    """Largest |e| [mm], angle between the normals [degrees], and the overlap."""
+    plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
+    found = face_overlap(assembly, contact, poses)
+    T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]
+    n = T_m[:3, :3] @ plane[:3]
+    angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
+    if not found:
+        return None, angle, found
+    return float(np.abs((found.corners - T_m[:3, 3]) @ n + plane[3]).max()) * 1e3, angle, found

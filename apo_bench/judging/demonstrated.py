@@ -1,0 +1,92 @@
+"""Was the assembly made as it was demonstrated? Every contact is asked for when it is made, and at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from apo_bench.assembly.goals import Reached, Snapshot
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import NOTHING, Overlap
+from apo_bench.judging.contacts import ContactJudge, ContactVerdict, Moment, face_overlap
+from apo_bench.judging.judgement import Judgement, judgement
+from apo_bench.records.thresholds import Thresholds
+
+
+def demonstrated(
+    assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
+) -> Judgement:
+    """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
+
+    At the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit contacts and
+    `support_mm` for the others; the overlap is at least a part of the true one, at its place on the environment face,
+    so an assembly that is right in itself but stands elsewhere on the table is not what was shown; no two geoms are
+    too deep in each other; nothing holds a part; nothing moves; no part that was in place is pushed before it is moved
+    again.
+
+    Args:
+        reached: Sound snapshots.
+        reference: (n, 4, 4), the true goals, world frame, [m].
+    """
+    after, final = reached.after, reached.final
+    asked = ContactJudge(assembly, thresholds, clearance_mm)
+    states = [snapshot for snapshot in (*after, final) if snapshot is not None]
+    return judgement(
+        _contacts(asked, after, final, reference),
+        states,
+        [(part, push * 1e3) for part, push in _pushes(assembly, after, final)],
+        thresholds,
+        all_made=len(states) == len(after) + 1,
+    )
+
+
+def _contacts(
+    asked: ContactJudge, after: Sequence[Snapshot | None], final: Snapshot | None, reference: Array
+) -> tuple[ContactVerdict, ...]:
+    """Every contact in the snapshot after its operation, and at the end if it still stands.
+
+    Moments of which there is no snapshot are left out.
+    """
+    true = _true_overlaps(asked.assembly, after, reference)
+    out = []
+    for k, (contact, made, lost) in enumerate(asked.assembly.relations()):
+        moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
+        for moment, snapshot in moments.items():
+            if snapshot is not None:
+                out.append(asked.verdict(contact, made, moment, snapshot.poses, true[k], Overlap.share))
+    return tuple(out)
+
+
+def _true_overlaps(assembly: Assembly, after: Sequence[Snapshot | None], reference: Array) -> list[Overlap]:
+    """The overlap of every contact when it is made at the true goals.
+
+    A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
+    """
+    first = next((snapshot for snapshot in after if snapshot is not None), None)
+    if first is None:
+        return [NOTHING] * len(assembly.relations())
+    history = placed(assembly, first.poses, reference)
+    return [face_overlap(assembly, contact, history[made]) for contact, made, _ in assembly.relations()]
+
+
+def _pushes(
+    assembly: Assembly, after: Sequence[Snapshot | None], final: Snapshot | None
+) -> Iterator[tuple[str, float]]:
+    """How far the centroid of each part lies, at each later moment, from where its last operation had put it, [m]."""
+    put: dict[str, Array] = {}
+    for k, snapshot in enumerate((*after, final)):
+        moved = assembly.operations[k].moves if k < len(assembly) else ()
+        for part in moved:
+            put.pop(part, None)
+        if snapshot is not None:
+            at = {part: _centroid(assembly, part, snapshot) for part in (*put, *moved)}
+            yield from ((part, float(np.linalg.norm(at[part] - where))) for part, where in put.items())
+            put.update({part: at[part] for part in moved})
+
+
+def _centroid(assembly: Assembly, part: str, snapshot: Snapshot) -> Array:
+    return pose.apply(snapshot.poses[part], assembly.solids[part].centroid[None])[0]

@@ -1,0 +1,116 @@
+"""Is the finished assembly right? What a person says who sees it, whatever became of it on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from apo_bench.assembly.goals import Reached, Snapshot
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Contact, Relation
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import Overlap
+from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.symmetry import nearest, symmetries
+from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
+from apo_bench.judging.judgement import Judgement, judgement
+from apo_bench.records.thresholds import Thresholds
+
+SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
+
+
+def finished(
+    assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
+) -> Judgement:
+    """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and that all parts stayed where put.
+
+    Asked for are the contacts that stand at the end. A part may have been put in by any of its symmetries: the one
+    nearest in rotation to its true final pose counts, for all its contacts. On a fixed part the area of the overlap
+    counts, wherever it is, so that an assembly that is right in itself may stand elsewhere on the table; between
+    movable parts the overlap has its place on the environment face. Where fixtures end is free. No corner of a part
+    lies at the end further than `pushed_mm` from where it was after the last operation that moved the part. Every
+    operation must have ended.
+
+    Args:
+        reached: Sound snapshots.
+        reference: (n, 4, 4), the true goals, world frame, [m].
+    """
+    final, made = reached.final, all(snapshot is not None for snapshot in (*reached.after, reached.final))
+    if final is None:
+        return judgement((), (), (), thresholds, all_made=False)
+    away = fixtures(assembly)
+    return judgement(
+        tuple(_contacts(ContactJudge(assembly, thresholds, clearance_mm), final, reference, away)),
+        [final],
+        [(part, push * 1e3) for part, push in _displacements(assembly, reached.after, final, away)],
+        thresholds,
+        all_made=made,
+    )
+
+
+def fixtures(assembly: Assembly) -> frozenset[str]:
+    """The parts that were used and put away.
+
+    The last operation of such a part breaks its last contacts with movable parts and makes contacts with fixed parts
+    only. One that ends against a movable part is none, even if that part leaves it later.
+    """
+    relations = assembly.relations()
+    return frozenset(part for part, k in _last_moves(assembly).items() if _put_away(assembly, relations, part, k))
+
+
+def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k: int) -> bool:
+    mine = [relation for relation in relations if part in {end.part for end in relation.contact}]
+    movable = [relation for relation in mine if not _on_fixed(assembly, relation.contact)]
+    breaks = any(relation.lost == k for relation in movable)
+    makes = any(relation.made == k for relation in mine if relation not in movable)
+    return breaks and makes and all(relation.lost is not None and relation.lost <= k for relation in movable)
+
+
+def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
+    return any(end.part in assembly.fixed for end in contact)
+
+
+def _contacts(asked: ContactJudge, final: Snapshot, reference: Array, away: frozenset[str]) -> Iterator[ContactVerdict]:
+    """Those that stand at the end, of parts that are no fixtures."""
+    assembly = asked.assembly
+    true = placed(assembly, final.poses, reference)[-1]
+    poses = {part: _nearest_alike(assembly, part, T, true[part]) for part, T in final.poses.items()}
+    for contact, made, lost in assembly.relations():
+        if lost is None and not away & {end.part for end in contact}:
+            share = _share_of_area if _on_fixed(assembly, contact) else Overlap.share
+            yield asked.verdict(contact, made, "end", poses, face_overlap(assembly, contact, true), share)
+
+
+def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Array:
+    """The pose at which the part looks as it does, turned from the true one the least."""
+    if part in assembly.fixed:
+        return T
+    return np.asarray(T @ nearest(symmetries(assembly.solids[part]), (pose.inverse(true) @ T)[None])[0])
+
+
+def _share_of_area(found: Overlap, true: Overlap) -> float:
+    return min(1.0, found.area / true.area) if true else 1.0
+
+
+def _last_moves(assembly: Assembly) -> dict[str, int]:
+    """Part -> the last operation that moves it, counted from 0."""
+    return {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
+
+
+def _displacements(
+    assembly: Assembly, after: tuple[Snapshot | None, ...], final: Snapshot, away: frozenset[str]
+) -> Iterator[tuple[str, float]]:
+    """How far a corner of each part lies at most from where it was after the part's last operation, [m]."""
+    for part, k in _last_moves(assembly).items():
+        put = after[k]
+        if put is not None and part not in away:
+            corners = _corners(assembly.solids[part])
+            moved = pose.apply(final.poses[part], corners) - pose.apply(put.poses[part], corners)
+            yield part, float(np.linalg.norm(moved, axis=1).max())
+
+
+def _corners(solid: Solid) -> Array:
+    """Of every box, (8 k, 3), in the frame of the solid, [m]."""
+    return np.concatenate([box.center + SIGNS * box.half for box in solid.boxes])

@@ -1,0 +1,81 @@
+"""Is the assembly right? A pure function of what was reached; it knows no plan, no corrector and no residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Reached, Snapshot
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry.arrays import Array
+from apo_bench.judging.demonstrated import demonstrated
+from apo_bench.judging.finished import finished
+from apo_bench.judging.judgement import Judgement
+from apo_bench.records.thresholds import Meaning, Thresholds
+
+
+@final
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an assembly succeeded, by both rules."""
+
+    meaning: Meaning
+    finished: Judgement
+    """Of the end: what a person says who sees the finished assembly."""
+    demonstrated: Judgement
+    """Of every contact when it was made, too: what a person says who watched the demonstration."""
+
+    @property
+    def success(self) -> bool:
+        """The finished assembly is right; where the scenario says so, it was made as demonstrated, too."""
+        return self.as_demonstrated if self.meaning == "as_demonstrated" else self.finished.holds
+
+    @property
+    def as_demonstrated(self) -> bool:
+        """The finished assembly is right, and each contact was made when and where it was shown."""
+        return self.finished.holds and self.demonstrated.holds
+
+    @property
+    def loose_success(self) -> bool:
+        """Every contact that `success` asks for is there within millimetres and degrees; implied by `success`."""
+        return self.rests_on.loose
+
+    @property
+    def rests_on(self) -> Judgement:
+        """The faults and numbers behind `success`: those of the stricter rule where it is asked for and fails."""
+        strict = self.meaning == "as_demonstrated" and (self.finished.holds or not self.demonstrated.holds)
+        return self.demonstrated if strict else self.finished
+
+
+def judge(
+    assembly: Assembly,
+    reached: Reached,
+    reference: Array,
+    thresholds: Thresholds,
+    clearance_mm: float,
+    meaning: Meaning = "assembled",
+) -> Verdict:
+    """Judge what was reached.
+
+    Args:
+        reached: Snapshots after each operation and at the end. One that is missing, or whose poses are not finite,
+            fails the assembly.
+        reference: (n, 4, 4), the true goals, world frame, [m]; they say how large an overlap should be, and which of
+            a part's symmetries is meant.
+        clearance_mm: Per side, of the parts that were used.
+    """
+    sound = Reached(after=tuple(map(_sound, reached.after)), final=_sound(reached.final))
+    return Verdict(
+        meaning,
+        finished=finished(assembly, sound, reference, thresholds, clearance_mm),
+        demonstrated=demonstrated(assembly, sound, reference, thresholds, clearance_mm),
+    )
+
+
+def _sound(snapshot: Snapshot | None) -> Snapshot | None:
+    """The snapshot, unless a pose in it is not finite."""
+    if snapshot is None or not all(np.isfinite(T).all() for T in snapshot.poses.values()):
+        return None
+    return snapshot

@@ -1,0 +1,1 @@
+"""Noise measured of a pose estimator: from residuals to a noise file."""

@@ -1,0 +1,113 @@
+"""Fit the noise of a camera to residuals: tails by maximum likelihood, rates of outliers and of misses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Measured
+from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
+from apo_bench.observation.models.tails import Split, log_density_across, log_density_along, of_numbers
+
+FEWEST = 30
+"""Four numbers are not fitted to fewer errors."""
+PERCENTILES = (25, 50, 75, 90, 95)
+
+
+class Figures(NamedTuple):
+    """What was measured and what the fitted distribution says, by `PERCENTILES`."""
+
+    name: str
+    unit: str
+    observed: Array
+    fitted: Array
+    distance: float
+    """Of Kolmogorov and Smirnov: the largest difference of the two cumulative distributions."""
+
+
+def fit(residuals: Residuals, source: str) -> Measured:
+    """The noise that makes the residuals most likely.
+
+    Errors are taken about the truth, not about their mean: a bias of the estimator is part of their size, and the noise
+    that is drawn has none.
+
+    Raises:
+        InputError: Too few inliers, or they are all exactly right.
+    """
+    found, inlier, upright = residuals.found, residuals.inlier, residuals.upright
+    for kept, limit in ((inlier, f"{INLIER_MM:g} mm"), (upright, f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg")):
+        if kept.sum() < FEWEST:
+            raise InputError(
+                f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {FEWEST} are needed "
+                "for a fit, so give more images, or the truth of the same ones."
+            )
+    far = residuals.off_mm[found & ~inlier]
+    return Measured(
+        source=source,
+        shift_mm=fit_split(residuals.shift_mm[inlier], INLIER_MM, "places"),
+        turn_deg=fit_split(residuals.turn_deg[upright], TURNED_DEG, "rotations"),
+        missed=float(1.0 - found.mean()),
+        outliers=float(1.0 - inlier.sum() / found.sum()),
+        farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
+    )
+
+
+def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
+    """The scales and degrees of freedom under which errors (n, 3), all within the limit, are most likely.
+
+    The likelihood is that of the limited distribution, so what is missing beyond the limit is no sign of short tails.
+    """
+    from scipy.optimize import minimize
+
+    r, x = np.linalg.norm(errors[:, :2], axis=1), errors[:, 2]
+    if max(np.median(r), np.median(np.abs(x))) <= SMALLEST * limit:
+        raise InputError(
+            f"the {name} that were estimated are the true ones, or nearly: half of them are off by less than "
+            f"{SMALLEST * limit:g}; give the estimates of an estimator."
+        )
+
+    def surprise(at: Array) -> float:
+        split = of_numbers(at, limit)
+        seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
+        return float(np.log(max(split.inside, 1e-300)) - seen)
+
+    low, high = np.log(SMALLEST * limit), np.log(limit)
+    start = [np.log(max(size, SMALLEST * limit)) for size in (np.median(r) / 1.18, np.median(np.abs(x)) / 0.675)]
+    best = minimize(
+        surprise,
+        [start[0], 0.15, start[1], 0.15],
+        bounds=[(low, high), (0.0, 1.0 / LEAST_FREEDOM)] * 2,
+        method="L-BFGS-B",
+        options={"ftol": 1e-13, "gtol": 1e-7},
+    )
+    return of_numbers(best.x, limit)
+
+
+def compared(residuals: Residuals, measured: Measured) -> tuple[Figures, ...]:
+    """Goodness of fit: across and along the ray of inliers, and angles of those that are not turned."""
+    inlier, upright = residuals.inlier, residuals.upright
+    shift, turn = measured.shift_mm, measured.turn_deg
+    return (
+        _figures("across the ray", "mm", residuals.across_mm[inlier], shift.cdf_across, shift.limit),
+        _figures("along the ray", "mm", residuals.along_mm[inlier], shift.cdf_along, shift.limit),
+        _figures("turn", "deg", residuals.angle_deg[upright], turn.cdf_length, turn.limit),
+    )
+
+
+def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> Figures:
+    grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
+    chance = np.maximum.accumulate(cdf(grid))
+    ordered, n = np.sort(sizes), len(sizes)
+    at = np.interp(ordered, grid, chance)
+    step = np.arange(n + 1) / n
+    return Figures(
+        name=name,
+        unit=unit,
+        observed=np.percentile(sizes, PERCENTILES),
+        fitted=np.interp(np.array(PERCENTILES) / 100.0, chance, grid),
+        distance=float(max((step[1:] - at).max(), (at - step[:-1]).max())),
+    )

@@ -1,0 +1,1 @@
+"""Noise models, one a file: what a camera makes of the true poses."""

@@ -1,0 +1,173 @@
+"""Noise that draws from the residuals of a pose estimator themselves; `noise fit --residuals` writes a file of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import ClassVar, final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.io.strict_csv import Row, read_csv
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.models.fitted import UNITS, check_level, reported
+from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.residuals import Residuals
+
+KINDS = INLIER, TURNED, OUTLIER, MISSED = "inlier", "turned", "outlier", "missed"
+ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
+COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *ERRORS)
+MOST_ROWS = 8000
+"""A file holds no more residuals; of more, every so-many-th is written."""
+LARGEST_MM, LARGEST_DEG = 1e5, 180.01
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Residuals to draw from, as errors in the frames of rays, [m, rad], whose shift acts in the frame that is seen."""
+
+    inliers: Array
+    """(k, 6), those that are not turned."""
+    outliers: Array
+    """(m, 6)."""
+    missed: float
+    """Part of all that nothing was found for."""
+    gross: float
+    """Part of those that were found, that are outliers."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inliers", frozen(self.inliers, None, 6))
+        object.__setattr__(self, "outliers", frozen(self.outliers, None, 6))
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), of an inlier taken with either sign: its mean square."""
+        return self.inliers.T @ self.inliers / len(self.inliers)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Empirical:
+    """As `Fitted`, but every error is one that was measured, drawn with its six numbers together, at random.
+
+    It is taken as it is or with the opposite sign, both alike often, so that it is 0 in the mean: a bias of the
+    estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers that are
+    turned by more than 30 degrees are left out, as a part that looks alike when turned cannot be told from a wrong one.
+    """
+
+    sample: Sample
+    level: Level
+    camera: Camera = field(default_factory=Camera)
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="the residuals of a pose estimator themselves, drawn at random",
+        formula=("T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w), (d, w) = L times a residual, or minus that",),
+        frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
+        parameters=("all in the file: the residuals, which of them are outliers, and how many parts were missed",),
+        states="the mean square of the residuals of what is no outlier, turned into the part that is seen",
+        notes=("Level 1 is as measured", "At level 0 nothing is missed"),
+        measured=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_level(self.level, self.sample.covariance)
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        n, sample = len(assembly), self.sample
+        chance, sign = rng.random((n, 3)), rng.choice([-1.0, 1.0], (n, 1))
+        errors = _picked(sample.inliers, chance[:, 0])
+        if len(sample.outliers):
+            errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
+        missed = chance[:, 2] < sample.missed
+        return reported(self.camera, self.level, shown, assembly, sign * errors, sample.covariance, missed)
+
+
+def empirical_noise(path: Path, level: Level) -> Empirical:
+    """The noise model of a file of residuals; a file is read once.
+
+    Raises:
+        InputError: Anything in the file that is not as described, with the line where it stands.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: the file of residuals cannot be read; check the path behind 'empirical:'."
+        ) from error
+    return Empirical(_read_once(path, found.st_mtime_ns, found.st_size), level)
+
+
+def residuals_text(residuals: Residuals) -> str:
+    """A file of residuals: one row for every part that was there, mm and degrees in the frame of its ray."""
+    every = -(-len(residuals.where) // MOST_ROWS)
+    lines = [",".join(COLUMNS)]
+    for k in range(0, len(residuals.where), every):
+        kind = kind_of(residuals, k)
+        numbers = np.concatenate([residuals.shift_mm[k], residuals.turn_deg[k]])
+        cells = [""] * 6 if kind == MISSED else [f"{x:.3f}" for x in numbers]
+        lines.append(",".join([*map(str, residuals.where[k].tolist()), kind, *cells]))
+    return "\n".join(lines) + "\n"
+
+
+def kind_of(residuals: Residuals, k: int) -> str:
+    """What became of one part."""
+    if not residuals.found[k]:
+        return MISSED
+    if not residuals.inlier[k]:
+        return OUTLIER
+    return INLIER if residuals.upright[k] else TURNED
+
+
+def read_residuals(path: str | Path) -> Sample:
+    """The residuals of a file; see `empirical_noise`."""
+    columns = {name: (name, 1.0) for name in COLUMNS}
+    errors: dict[str, list[list[float]]] = {kind: [] for kind in KINDS}
+    for row in read_csv(path, columns, COLUMNS):
+        kind = row.text("kind")
+        if kind not in KINDS:
+            row.fail("kind", f"{', '.join(KINDS[:-1])} or {KINDS[-1]} is needed")
+        errors[kind].append([] if kind == MISSED else _error(row))
+    count = {kind: len(found) for kind, found in errors.items()}
+    found = sum(count.values()) - count[MISSED]
+    if not count[INLIER]:
+        raise InputError(f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals.")
+    return Sample(
+        inliers=_acting_where_seen(errors[INLIER]),
+        outliers=_acting_where_seen(errors[OUTLIER]),
+        missed=count[MISSED] / (found + count[MISSED]),
+        gross=count[OUTLIER] / found,
+    )
+
+
+@lru_cache(maxsize=8)
+def _read_once(path: Path, _changed: int, _size: int) -> Sample:
+    return read_residuals(path)
+
+
+def _error(row: Row) -> list[float]:
+    return [row.number(name, LARGEST_MM if name.endswith("_mm") else LARGEST_DEG) for name in ERRORS]
+
+
+def _acting_where_seen(errors: list[list[float]]) -> Array:
+    """Residuals [mm, deg] as the errors (d, w) [m, rad] that `Camera.twists` takes.
+
+    There a part that is turned by w is shifted by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d): so d
+    is the shift that was measured, times the inverse of V(-w), and the pose that was estimated comes back exactly.
+    """
+    measured = np.array(errors).reshape(-1, 6) * UNITS
+    back = np.concatenate([np.zeros((len(measured), 3)), -measured[:, 3:]], axis=1)
+    T = pose.exp(back)
+    T[:, :3, 3] = measured[:, :3]
+    return np.concatenate([pose.log(T)[:, :3], measured[:, 3:]], axis=1)
+
+
+def _picked(rows: Array, chance: Array) -> Array:
+    return rows[np.minimum((chance * len(rows)).astype(np.int64), len(rows) - 1)]

@@ -1,0 +1,148 @@
+"""Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.outliers import UNKNOWN, last_seen
+from apo_bench.observation.models.tails import Split
+
+SMALLEST, LEAST_FREEDOM = 1e-4, 0.5
+"""Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
+
+
+UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
+"""[m] per mm and [rad] per degree."""
+LARGEST_M, LARGEST_RAD = 0.4, 2.0
+"""A standard deviation per axis beyond which a level makes no sense."""
+
+
+@final
+@dataclass(frozen=True)
+class Measured:
+    """The noise of a pose estimator, as a file states it."""
+
+    source: str
+    """Which estimator on which data, and where the numbers are from."""
+    shift_mm: Split
+    """Where parts are taken to be, those that are found."""
+    turn_deg: Split
+    """How parts are taken to be turned, those that are found and not turned by more than its limit."""
+    missed: float
+    """Part of all that nothing was found for."""
+    outliers: float
+    """Part of those that were found, that are off by more than the limit of the shift."""
+    farthest_mm: float
+    """Outliers are off by the limit to this, alike in each octave."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Every goal is seen at `T exp(xi)`, xi of the error (x, y, along; rx, ry, about) that is drawn in its ray's frame.
+
+    Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
+    changes which operations are outliers or missed, but at level 0 all is seen as shown. The covariance is that of
+    inliers; an observation does not know which of its goals are outliers, and does not state them.
+    """
+
+    measured: Measured
+    level: Level
+    camera: Camera = field(default_factory=Camera)
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="the tails, outliers and misses that were fitted to a pose estimator",
+        formula=(
+            "T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w)",
+            "d = L (s1 t1 / sqrt(c1 / n1), s2 e3 / sqrt(c2 / n2)), t1 = (e1, e2), w alike; no |d|, |w| above its limit",
+            "of an outlier: |d| log-uniform from the limit to the farthest, any direction, any turn; times L",
+        ),
+        frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
+        parameters=("all in the file: scales s, degrees of freedom n, limits, shares of outliers and misses, source",),
+        states="that of what is no outlier, within the limits, turned into the part that is seen",
+        notes=("Level 1 is as measured", "At level 0 nothing is missed"),
+        measured=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_level(self.level, self.covariance)
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), of inliers at level 1 in the frame of the ray, [m, rad]."""
+        (across, along), (out, about) = self.measured.shift_mm.variances, self.measured.turn_deg.variances
+        return np.diag(np.array([across, across, along, out, out, about]) * UNITS**2)
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        n, measured = len(assembly), self.measured
+        errors = np.concatenate([measured.shift_mm.draw(n, rng), measured.turn_deg.draw(n, rng)], axis=1)
+        gross, chance = _gross(measured, n, rng), rng.random((n, 2))
+        errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
+        missed = chance[:, 1] < measured.missed
+        return reported(self.camera, self.level, shown, assembly, errors * UNITS, self.covariance, missed)
+
+
+def check_level(level: Level, covariance: Array) -> None:
+    """Refuse a level at which what is measured would be worse than `LARGEST_M`, `LARGEST_RAD`.
+
+    Args:
+        covariance: (6, 6), at level 1, [m, rad].
+    """
+    worst = np.sqrt(np.diagonal(covariance).reshape(2, 3).max(axis=1))
+    for given, deviation, largest, unit in zip(level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True):
+        if given * deviation > largest:
+            raise InputError(
+                f"a level of {given:g} {unit} was given for noise that is measured, where 1 is as measured; at most "
+                f"{np.floor(10.0 * largest / deviation) / 10.0:g} is allowed, else parts are seen outside the room."
+            )
+
+
+def reported(
+    camera: Camera,
+    level: Level,
+    shown: Demonstration,
+    assembly: Assembly,
+    errors: Array,
+    covariance: Array,
+    missed: NDArray[np.bool_],
+) -> Observation:
+    """What a camera reports that makes these errors.
+
+    Args:
+        errors: (n, 6), at level 1, in the frames of the rays: (x, y, along; rx, ry, about), [m, rad].
+        covariance: (6, 6), of inliers, alike.
+        missed: (n,), what nothing is found for.
+    """
+    scale = np.repeat([level.mm, level.deg], 3)
+    xi = camera.twists(shown.goals, errors * scale)
+    found = seen_at(assembly, shown, xi, np.zeros((6, 6)))
+    made = seen_at(assembly, shown, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale)))
+    missed = missed & (max(level) > 0.0)
+    goals, stated = made.goals.copy(), made.covariance.copy()
+    goals[missed] = last_seen(assembly, shown.start, goals, ~missed)[missed]
+    stated[missed] = np.diag(UNKNOWN**2)
+    return replace(made, goals=goals, covariance=stated, seen=~missed)
+
+
+def _gross(measured: Measured, n: int, rng: np.random.Generator) -> Array:
+    """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
+    limit = measured.shift_mm.limit
+    direction = rng.standard_normal((n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    size = limit * (measured.farthest_mm / limit) ** rng.random((n, 1))
+    q = rng.standard_normal((n, 4))
+    turned = pose.log(pose.unpack(np.concatenate([np.zeros((n, 3)), q], axis=1)))[:, 3:]
+    return np.concatenate([direction * size, np.degrees(turned)], axis=1)

@@ -1,0 +1,69 @@
+"""Noise that is right on SE(3): the same in every direction, in the frame of the part that was seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.models.level import Level
+
+FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)
+"""Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
+FLOOR.flags.writeable = False
+
+
+@final
+@dataclass(frozen=True)
+class Isotropic:
+    """Every goal is seen at `T exp(xi)`, xi a Gaussian body twist of zero mean.
+
+    Levels only scale the unit draws, so the same generator gives comparable errors at all levels, and level 0 draws
+    exactly zero: the goals are then those that were shown, bit for bit.
+    """
+
+    level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="the same in every direction",
+        formula=("T_seen = T exp(L e)",),
+        frame="of the part that is seen",
+        parameters=(),
+        states="L^2 in every direction, which is exact",
+    )
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        xi = rng.standard_normal((len(assembly), 6)) * sigma
+        return seen_at(assembly, shown, xi, np.diag(sigma**2))
+
+
+def seen_at(assembly: Assembly, shown: Demonstration, xi: Array, covariance: Array) -> Observation:
+    """Every goal seen at `T exp(xi)`; it states the covariance of xi, what carelessness adds, and at least the floor.
+
+    Args:
+        xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
+        covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
+    """
+    goals = np.where(np.any(xi, axis=1, keepdims=True)[..., None], shown.goals @ pose.exp(xi), shown.goals)
+    stated = floored(covariance + shown.careless)
+    return Observation(assembly, shown.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+
+
+def floored(covariance: Array) -> Array:
+    """The least covariance (n, 6, 6) above the given one that says at least `FLOOR` in every direction.
+
+    In units of the floor, eigenvalues below 1 are raised to 1, so the result is symmetric and positive definite.
+    """
+    unit = np.outer(FLOOR, FLOOR)
+    w, V = np.linalg.eigh(covariance / unit)
+    raised = unit * ((V * np.maximum(w, 1.0)[:, None]) @ np.swapaxes(V, -1, -2))
+    return np.where(
+        np.all(w >= 1.0, axis=1, keepdims=True)[..., None], covariance, (raised + np.swapaxes(raised, -1, -2)) / 2
+    )

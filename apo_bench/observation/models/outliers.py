@@ -1,0 +1,95 @@
+"""Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Demonstration, Observation, Poses
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.level import Level
+
+OUTLIERS, MISSES = 0.1, 0.02
+"""Share of operations that are seen quite wrongly, and that are not seen."""
+TIMES = 10.0
+"""An outlier errs by so many times the level."""
+UNKNOWN = np.repeat([0.5, np.pi / 2.0], 3)
+"""Standard deviation that is stated of what was not seen, [m, rad]."""
+UNKNOWN.flags.writeable = False
+
+
+@final
+@dataclass(frozen=True)
+class Outliers:
+    """As `isotropic`, but some errors are many times larger, nobody says which, and some operations are missed.
+
+    What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
+    it is wrong; `inflation` says how much larger the covariance of all errors is. Shares do not depend on the level:
+    the same operations are outliers and missed at every level, but for level 0, at which everything is seen as shown.
+    """
+
+    level: Level
+    outliers: float = OUTLIERS
+    misses: float = MISSES
+    times: float = TIMES
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="gross outliers that do not say so, and operations that are missed",
+        formula=("T_seen = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: seen = false"),
+        frame="of the part that is seen, the same in every direction",
+        parameters=(
+            f"p = {OUTLIERS:g}: share of outliers among what is seen",
+            f"q = {MISSES:g}: share of misses",
+            f"m = {TIMES:g}: an outlier errs m times as much",
+        ),
+        states=(
+            f"L^2, the covariance of what is no outlier; that of all errors is 1 + p (m^2 - 1) = "
+            f"{1.0 + OUTLIERS * (TIMES**2 - 1.0):g} times as large"
+        ),
+        notes=(
+            f"A missed operation has the pose at which its part was seen last, or started, with {UNKNOWN[0]:g} m and "
+            f"{np.degrees(UNKNOWN[3]):g} deg: no method carries it out",
+            "At level 0 nothing is missed",
+        ),
+    )
+
+    def __post_init__(self) -> None:
+        for name, share in (("outliers", self.outliers), ("misses", self.misses)):
+            if not 0.0 <= share <= 1.0:
+                raise InputError(f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
+        if not 1.0 <= self.times < inf:
+            raise InputError(f"outliers {self.times:g} times as large were given; give a finite number from 1.")
+
+    @property
+    def inflation(self) -> float:
+        """Covariance of the errors of all that is seen, over the one that is stated."""
+        return 1.0 + self.outliers * (self.times**2 - 1.0)
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        unit, chance = rng.standard_normal((len(assembly), 6)), rng.random((len(assembly), 2))
+        times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
+        made = seen_at(assembly, shown, unit * times * sigma, np.diag(sigma**2))
+        missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
+        goals, covariance = made.goals.copy(), made.covariance.copy()
+        goals[missed] = last_seen(assembly, shown.start, goals, ~missed)[missed]
+        covariance[missed] = np.diag(UNKNOWN**2)
+        return replace(made, goals=goals, covariance=covariance, seen=~missed)
+
+
+def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:
+    """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
+    now, out = dict(start), goals.copy()
+    for k, operation in enumerate(assembly.operations):
+        if seen[k]:
+            now[operation.main] = goals[k]
+        out[k] = now.get(operation.main, np.eye(4))
+    return out

@@ -1,0 +1,142 @@
+"""How far estimates are from the truth, in the frames of the rays on which a camera saw the parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.errors import InputError
+from apo_bench.files.bop import Located
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.camera import Camera
+
+INLIER_MM = 50.0
+"""An estimate that is farther off than this is of something else."""
+TURNED_DEG = 30.0
+"""An estimate that is turned more than this is of a part that looks alike when turned, or was taken the wrong way
+round; which of the two cannot be told without the symmetries of the models."""
+MOST_PAIRS = 10_000_000
+MOST_IN_ONE_IMAGE = "at most 3000 estimates of one object in one image can be matched; leave out those of low score"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """One row for every part that was there; what nothing was found for is NaN."""
+
+    where: NDArray[np.int64]
+    """(n, 3): scene, image, object."""
+    shift_mm: Array
+    """(n, 3), from the true to the estimated place: x, y, along the ray."""
+    turn_deg: Array
+    """(n, 3), rotation vector from the true to the estimated rotation: about x, about y, about the ray."""
+    trace_deg: Array
+    """(n,), the angle that the trace of the two matrices says as they are written."""
+    surplus: int = 0
+    """Estimates that were left when every part had one."""
+    distance_mm: float = float("nan")
+    """Median distance from the camera."""
+
+    @cached_property
+    def found(self) -> NDArray[np.bool_]:
+        return np.isfinite(self.shift_mm[:, 0])
+
+    @cached_property
+    def inlier(self) -> NDArray[np.bool_]:
+        return np.nan_to_num(self.off_mm, nan=np.inf) < INLIER_MM
+
+    @cached_property
+    def upright(self) -> NDArray[np.bool_]:
+        """Inliers that are not turned."""
+        return self.inlier & (np.nan_to_num(self.angle_deg, nan=np.inf) < TURNED_DEG)
+
+    @cached_property
+    def off_mm(self) -> Array:
+        return np.asarray(np.linalg.norm(self.shift_mm, axis=1))
+
+    @cached_property
+    def across_mm(self) -> Array:
+        return np.asarray(np.linalg.norm(self.shift_mm[:, :2], axis=1))
+
+    @cached_property
+    def along_mm(self) -> Array:
+        return np.abs(self.shift_mm[:, 2])
+
+    @cached_property
+    def angle_deg(self) -> Array:
+        return np.asarray(np.linalg.norm(self.turn_deg, axis=1))
+
+
+def compare(estimates: Located, truth: Located, scene: int | None = None) -> Residuals:
+    """Match estimates to the truth and say how far off they are; of one scene, estimates of others do not count.
+
+    Per image and object, every part that was there gets an estimate of its own so that the distances add up to the
+    least (the Hungarian method), however far off: what is gross is told afterwards by `INLIER_MM`. Scores do not count.
+    Rotations are the nearest ones to the matrices as written.
+    """
+    from scipy.spatial.transform import Rotation
+
+    partner = matched(estimates, truth)
+    found, n = partner >= 0, len(partner)
+    asked = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
+    there = np.zeros((n, 4, 4))
+    there[:] = np.eye(4)
+    there[:, :3, 3] = truth.t_mm * 1e-3
+    F = Camera(np.eye(4)).frames(there)[found]
+    R, R_seen = truth.R[found], estimates.R[partner[found]]
+    turn = Rotation.from_matrix(nearest(R_seen) @ np.swapaxes(nearest(R), 1, 2)).as_rotvec(degrees=True)
+    shift, turned = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    shift[found] = np.einsum("nji,nj->ni", F, estimates.t_mm[partner[found]] - truth.t_mm[found])
+    turned[found] = np.einsum("nji,nj->ni", F, turn)
+    trace = np.full(n, np.nan)
+    trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_seen, R) - 1.0) / 2.0, -1.0, 1.0)))
+    return Residuals(
+        where=truth.where,
+        shift_mm=shift,
+        turn_deg=turned,
+        trace_deg=trace,
+        surplus=asked - int(found.sum()),
+        distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
+    )
+
+
+def nearest(R: Array) -> Array:
+    """The rotations that are nearest to matrices (n, 3, 3), in the sense of least squares."""
+    U, _, Vt = np.linalg.svd(R)
+    return np.asarray(U @ Vt)
+
+
+def matched(estimates: Located, truth: Located) -> NDArray[np.int64]:
+    """The row of the estimates that belongs to each row of the truth, or -1, (n,)."""
+    from scipy.optimize import linear_sum_assignment
+
+    partner = np.full(len(truth.where), -1, dtype=np.int64)
+    for there, seen in _groups(truth.where, estimates.where):
+        if len(there) * len(seen) > MOST_PAIRS:
+            raise InputError(f"{estimates.said(int(seen[0]))}: {MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
+        off = np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2)
+        i, j = linear_sum_assignment(off)
+        partner[there[i]] = seen[j]
+    return partner
+
+
+def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
+    """Rows of the truth and of the estimates that are of one object in one image, where there are both."""
+    _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
+    key = key.reshape(-1)
+    there, seen = key[: len(truth)], key[len(truth) :]
+    by_truth, by_estimate = np.argsort(there, kind="stable"), np.argsort(seen, kind="stable")
+    common = np.intersect1d(there, seen)
+    for side in zip(
+        *(
+            np.stack([np.searchsorted(keys, common, "left"), np.searchsorted(keys, common, "right")], axis=1)
+            for keys in (there[by_truth], seen[by_estimate])
+        ),
+        strict=True,
+    ):
+        yield by_truth[slice(*side[0])], by_estimate[slice(*side[1])]

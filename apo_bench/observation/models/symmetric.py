@@ -1,0 +1,102 @@
+"""Noise for parts that look the same when turned: which of the equal poses is reported, and how well it is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.symmetry import folds, nearest, symmetries
+from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.level import Level
+
+WORSE, MANY = 3.0, 3.0
+"""Factor on the level of a turn about an axis with so many equal places in a whole turn, or more."""
+
+
+@final
+@dataclass(frozen=True)
+class Symmetric:
+    """As `isotropic` about the centre of volume, but turns that hardly change how a part looks are less certain.
+
+    About an axis of fourfold symmetry the second moments of a part are those of a body of revolution, and only its
+    edges tell how far it is turned: there the standard deviation is `WORSE` times the level.
+
+    Of the poses at which a part looks the same, the one nearest to the truth is reported: contacts name faces, they are
+    taken as certain, and they say which of the equal sides is which. A turn is thus wrong by half the angle between
+    two equal poses at most, whatever the level.
+    """
+
+    level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="turns about axes of symmetry are less certain; of equal poses the nearest is reported",
+        formula=(
+            "T_seen = T C exp(xi) C^-1 g, C the shift to the centre of volume",
+            f"xi = L (e1, e2, e3, s1 e4, s2 e5, s3 e6), s_i = {WORSE:g} about axes of fourfold symmetry, else 1",
+            "g the one of the part's symmetries with which T_seen is turned the least",
+        ),
+        frame="of the part that is seen, about its centre of volume",
+        parameters=(
+            f"s = {WORSE:g}: factor on turns about axes with {MANY:g} or more equal places in a whole turn",
+            "symmetries: proper rotations, computed from the boxes of each part (stick 8, castle 2, block 24)",
+        ),
+        states="the covariance of xi about the part's origin, where the standard deviation of a turn about an axis "
+        "with m equal places counts as 180 / m / sqrt(3) deg at most; exact while errors are small against 180 / m deg "
+        "(up to level 4), above an upper bound",
+        notes=(
+            "`apo_bench.observation.models.symmetric:AnyTurn` reports any of the equal poses instead, each as likely, "
+            "also at level 0: an estimator that knows nothing of faces. The same space is filled, but a contact that "
+            "names a face is then asked of another side",
+        ),
+    )
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        unit = rng.standard_normal((len(assembly), 6))
+        xi, covariance = np.zeros((len(assembly), 6)), np.zeros((len(assembly), 6, 6))
+        groups = {part: symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
+        for k, operation in enumerate(assembly.operations):
+            solid, group = assembly.solids[operation.main], groups[operation.main]
+            about = pose.adjoint(pose.at(solid.centroid))
+            sigma, stated = self._deviations(folds(group))
+            if np.any(unit[k] * sigma):
+                off = pose.exp(about @ (unit[k] * sigma))[None]
+                xi[k] = pose.log(off @ nearest(group, off))[0]
+            covariance[k] = about @ np.diag(stated**2) @ about.T
+        return seen_at(assembly, shown, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
+
+    def _deviations(self, fold: Array) -> tuple[Array, Array]:
+        """Those that are drawn and those that are stated, (6,) each, about the centre of volume, [m, rad]."""
+        turn = np.radians(self.level.deg) * np.where(fold >= MANY, WORSE, 1.0)
+        place = np.full(3, self.level.mm * 1e-3)
+        return np.append(place, turn), np.append(place, np.minimum(turn, np.pi / fold / np.sqrt(3.0)))
+
+
+@final
+@dataclass(frozen=True)
+class AnyTurn:
+    """As `symmetric`, but any of the equal poses is reported, each as likely, whatever the level.
+
+    The covariance is that about the pose of the same look which is nearest to what is reported.
+    """
+
+    level: Level
+
+    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        seen = Symmetric(self.level)(assembly, shown, rng)
+        g = np.array([self._one(assembly.solids[o.main], rng) for o in assembly.operations]).reshape(-1, 4, 4)
+        Ad = pose.adjoint(pose.inverse(g))
+        C = Ad @ seen.covariance @ np.swapaxes(Ad, 1, 2)
+        return replace(seen, goals=seen.goals @ g, covariance=(C + np.swapaxes(C, 1, 2)) / 2)
+
+    @staticmethod
+    def _one(solid: Solid, rng: np.random.Generator) -> Array:
+        group = symmetries(solid)
+        return np.asarray(group[rng.integers(len(group))])

@@ -1,0 +1,1 @@
+"""Will a plan fail, where and why? Said before anything moves."""

@@ -1,0 +1,72 @@
+"""Would a part stay where a plan puts it? Balance of weight by what lies below and above it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+
+LEVEL = float(np.cos(np.radians(30.0)))
+"""A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
+BALANCED = 1e-7
+"""What is left of the weight, and of its moments over 10 mm, where forces balance it."""
+
+
+def unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
+    """The first operation whose part, with what it carries, would not stand at its planned goal, counted from 0.
+
+    Vertical forces act at the corners of the overlaps of its contacts: floors push up, ceilings push down, walls
+    carry nothing (there is no friction to count on). If no such forces balance the weight and its moments, the part
+    falls. Of an operation without a contact on a floor or a ceiling nothing is claimed.
+
+    Args:
+        start: Poses before the first operation, world frame, [m].
+        goals: (n, 4, 4), the planned goals, world frame, [m].
+
+    Returns:
+        The operation, or None if every part would stand.
+    """
+    for k, (operation, poses) in enumerate(zip(assembly.operations, placed(assembly, start, goals), strict=True)):
+        forces = _forces(assembly, operation, poses)
+        if forces is not None and not _balanced(*forces, _centroid(assembly, operation, poses)):
+            return k
+    return None
+
+
+def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Array, Array] | None:
+    """Where vertical forces may act, (k, 3), world, [m], and whether each pushes up (1) or down (-1), (k,).
+
+    None if the operation makes no contact that could carry weight.
+    """
+    points, signs, level = [np.zeros((0, 3))], [np.zeros(0)], False
+    for m, e in operation.contacts:
+        up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
+        if abs(up) >= LEVEL:
+            level = True
+            corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+            points.append(corners)
+            signs.append(np.full(len(corners), np.sign(up)))
+    return (np.concatenate(points), np.concatenate(signs)) if level else None
+
+
+def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
+    """Centre of mass of all that moves, (3,), world, [m]; parts are homogeneous and of one density."""
+    volumes = np.array([assembly.solids[part].volume for part in operation.moves])
+    centroids = [pose.apply(poses[part], assembly.solids[part].centroid[None])[0] for part in operation.moves]
+    return np.asarray(volumes @ np.array(centroids) / volumes.sum())
+
+
+def _balanced(points: Array, signs: Array, centroid: Array) -> bool:
+    """Whether forces >= 0 at the points balance a unit weight at the centroid: three equations, least squares."""
+    from scipy.optimize import nnls
+
+    if not len(points):
+        return False
+    arms = (points - centroid)[:, :2] / 0.01
+    balance = np.vstack([signs, signs * arms[:, 0], signs * arms[:, 1]])
+    return bool(nnls(balance, np.array([1.0, 0.0, 0.0]))[1] < BALANCED)

@@ -1,0 +1,230 @@
+"""Which face touches which, from what was seen: solids, poses and their stated noise (Section 1, first half).
+
+Operation by operation, faces of the parts that moved are held against faces of the parts that stand there. A pair is a
+candidate if its normals are opposite within an angle, its gap is small and its overlap large enough. Noise moves whole
+parts, so the contacts of an operation are not judged one by one: the likeliest is believed, the goals are put where
+that one closes, and the others are looked at from there. Where that leaves candidates over, other beginnings are tried
+and the likeliest set wins (joint compatibility: Neira and Tardos, "Data association in stochastic mapping using the
+joint compatibility test", 2001).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.facing import Facing, facing, gap
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Assembly, Contact, PartFace
+from apo_bench.errors import InputError, kind
+from apo_bench.geometry.arrays import Array
+from apo_bench.recognition.belief import Belief, Standing, believed
+from apo_bench.recognition.thresholds import NOISE, Allowed, Rules, allowed, reality, slack
+
+BEGINNINGS = 12
+"""Candidates that are tried as the first of an operation, at most."""
+
+
+@final
+@dataclass(frozen=True)
+class Evidence:
+    """Why a contact is believed: what was measured when it was taken, and what was allowed."""
+
+    contact: Contact
+    made: int
+    """The operation that made it, counted from 0."""
+    gap_m: float
+    """Above 0 apart, below 0 inside each other, where the contacts taken before put the parts."""
+    angle_rad: float
+    share: float
+    """Overlap over the smaller face."""
+    most: Allowed
+    """The thresholds."""
+    seen_gap_m: float
+    """The gap at the goals as they were seen."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Recognised:
+    """The assembly with the contacts that were recognised, all of them asked to coincide."""
+
+    assembly: Assembly
+    evidence: tuple[Evidence, ...]
+    """One for each contact, in the order of `assembly.relations()`."""
+
+
+def recognise(seen: Observation, rules: Rules = NOISE, *, first_seen: Array | None = None) -> Recognised:
+    """Find the face contacts of every operation; those that the observation came with are not looked at.
+
+    Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
+    contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
+
+    Args:
+        rules: `NOISE` or `FIXED` of `apo_bench.recognition.thresholds`, or your own.
+        first_seen: (n, 4, 4), the goals that the evidence calls seen, where those of `seen` were corrected already.
+
+    Raises:
+        InputError: Something else was given.
+    """
+    for given, wanted in ((seen, Observation), (rules, Rules)):
+        if not isinstance(given, wanted):
+            raise InputError(
+                f"{kind(given)} was given to recognise; an Observation is allowed (read_observation reads one from a "
+                "file), and as rules NOISE, FIXED or Rules(...) of apo_bench.recognition.thresholds."
+            )
+    bare = tuple(replace(operation, contacts=()) for operation in seen.assembly.operations)
+    assembly = replace(seen.assembly, operations=bare, gaps={})
+    seen = replace(seen, assembly=assembly)
+    belief, evidence = believed(seen), list[Evidence]()
+    as_seen = belief if first_seen is None else replace(belief, goals=first_seen)
+    known = set(assembly.fixed)
+    for k, operation in enumerate(bare):
+        around = _Around(seen, rules, k, tuple(p for p in assembly.solids if p in known - set(operation.moves)))
+        found = around.fixed(belief) if rules.fixed else around.likeliest(belief)
+        belief = found.belief
+        evidence += around.evidence(found, as_seen.standing(k))
+        known |= set(operation.moves)
+    made = [tuple(e.contact for e in evidence if e.made == k) for k in range(len(bare))]
+    operations = tuple(replace(operation, contacts=made[k]) for k, operation in enumerate(bare))
+    return Recognised(replace(assembly, operations=operations), tuple(evidence))
+
+
+class _Candidate(NamedTuple):
+    """A pair of faces that may touch, and how well that fits what is believed."""
+
+    contact: Contact
+    pair: Facing
+    slope: Array
+    """(3, 6 n): derivative of its residual by body twists of all goals."""
+    noise: Array
+    """(3, 3): see `reality`."""
+    most: Allowed
+    distance: float
+    """Squared Mahalanobis length of its residual."""
+    gain: float
+    """Twice the logarithm of how much likelier a closed pair is than one anywhere within the bounds, see `_gain`."""
+
+
+class _Found(NamedTuple):
+    """Contacts that go together."""
+
+    taken: tuple[_Candidate, ...]
+    belief: Belief
+    score: float
+    """Sum of the squared lengths, less what each equation that was not implied gains by closing: see `_gain`."""
+    left: tuple[Contact, ...]
+    """Candidates at the beginning that were not taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """One operation and what stands around it."""
+
+    seen: Observation
+    rules: Rules
+    k: int
+    others: tuple[str, ...]
+
+    def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[_Candidate, ...]:
+        """The pairs within the thresholds that were not taken yet, the likeliest first."""
+        now = belief.standing(self.k)
+        found = [c for a, b, pair in self._pairs(now, taken) for c in self._judged(a, b, pair, now, belief)]
+        return tuple(sorted(found, key=lambda c: (c.distance, c.contact)))
+
+    def fixed(self, belief: Belief) -> _Found:
+        """Every pair within fixed thresholds; nothing is concluded from one to the other."""
+        return _Found(self.candidates(belief), belief, 0.0, ())
+
+    def likeliest(self, belief: Belief) -> _Found:
+        """The contacts that go together: of all beginnings, the set with the least score."""
+        best = self._followed(belief, None)
+        for first in best.left[:BEGINNINGS]:
+            other = self._followed(belief, first)
+            if other.score < best.score:
+                best = other
+        return best
+
+    def evidence(self, found: _Found, as_seen: Standing) -> Iterator[Evidence]:
+        """What speaks for the contacts, in the order of parts and faces."""
+        for c in sorted(found.taken, key=lambda c: self._place(c.contact)):
+            yield Evidence(
+                contact=c.contact,
+                made=self.k,
+                gap_m=c.pair.gap_m,
+                angle_rad=c.pair.angle_rad,
+                share=c.pair.share,
+                most=c.most,
+                seen_gap_m=self._gap(c.contact, as_seen),
+            )
+
+    def _followed(self, belief: Belief, first: Contact | None) -> _Found:
+        """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
+        at_first = at_hand = self.candidates(belief)
+        taken, total = list[_Candidate](), 0.0
+        while at_hand:
+            chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
+            if chosen.distance > self.rules.most:
+                break
+            belief = belief.given(chosen.pair.residual, chosen.slope, chosen.noise)
+            taken.append(chosen)
+            total += chosen.distance - chosen.gain
+            at_hand = self.candidates(belief, [c.contact for c in taken])
+        have = {c.contact for c in taken}
+        return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
+
+    def _pairs(self, now: Standing, taken: Collection[Contact]) -> Iterator[tuple[str, str, Facing]]:
+        """Faces of moved parts and of those that stand there, within the bounds, with the names of the parts."""
+        solids, rules = self.seen.assembly.solids, self.rules
+        bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
+        for a in self.seen.assembly.operations[self.k].moves:
+            for b in self.others:
+                known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
+                for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
+                    yield a, b, pair
+
+    def _judged(self, a: str, b: str, pair: Facing, now: Standing, belief: Belief) -> Iterator[_Candidate]:
+        """The pair as a candidate, if it is one."""
+        slope = pair.slope @ (now.reach[a] - now.reach[b])
+        if slope.reshape(3, -1, 6)[:, ~self.seen.seen].any():
+            return
+        contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
+        play_m = self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0
+        C, noise = slope @ belief.covariance @ slope.T, reality(pair, play_m)
+        most = allowed(self.rules, C, slack(pair, play_m))
+        if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:
+            e = pair.residual
+            distance = float(e @ np.linalg.solve(C + noise, e))
+            yield _Candidate(contact, pair, slope, noise, most, distance, _gain(C, noise, self.rules))
+
+    def _place(self, contact: Contact) -> tuple[int, ...]:
+        """Where a contact stands in the order of parts and faces."""
+        solids = self.seen.assembly.solids
+        order = (self.seen.assembly.operations[self.k].moves, self.others)
+        return tuple(
+            i
+            for parts, of in zip(order, contact, strict=True)
+            for i in (parts.index(of.part), list(solids[of.part].faces).index(of.face))
+        )
+
+    def _gap(self, contact: Contact, now: Standing) -> float:
+        """The gap of a contact at given poses: at the middle of the environment face where nothing overlaps."""
+        a, b = contact
+        face_a, face_b = self.seen.assembly.face(a), self.seen.assembly.face(b)
+        return gap(face_a, now.poses[a.part], face_b, now.poses[b.part])
+
+
+def _gain(C: Array, noise: Array, rules: Rules) -> float:
+    """What a pair that closes gains, before its squared length is taken off.
+
+    Along every axis in which the goals leave it uncertain, (range)^2 / (2 pi variance), the range being that within
+    the bounds. What earlier contacts imply anyway gains nothing: it is no coincidence.
+    """
+    span = np.array([2 * rules.gap_m, 2 * rules.angle_rad, 2 * rules.angle_rad])
+    variance, V = np.linalg.eigh(C / np.outer(span, span))
+    real = np.einsum("ij,ik,kj->j", V, noise / np.outer(span, span), V)
+    new = variance > real
+    return float(np.maximum(-np.log(2 * np.pi * (variance + real)[new]), 0.0).sum())

@@ -1,0 +1,64 @@
+"""What a method is called: what the robot is told to do, and whether it feels for holes while it does that."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.records.short_names import METHODS
+
+SEARCH = "search"
+"""What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
+_ENDING = f"+{SEARCH}"
+
+
+class Method(NamedTuple):
+    """A method in its two parts."""
+
+    plan: str
+    """Where the plan comes from: `oracle`, `none`, or a corrector."""
+    searches: bool
+
+
+def parsed(method: str) -> Method:
+    """The parts of a method's name."""
+    if method == SEARCH:
+        return Method("none", True)
+    return Method(method.removesuffix(_ENDING), method.endswith(_ENDING))
+
+
+def checked_method(method: str) -> str:
+    """A method's name as rows spell it: `none+search` is `search`.
+
+    Raises:
+        InputError: It is not `oracle`, `none`, `search`, a corrector by name, or `module:name`, nor one with `+search`.
+    """
+    plan, searches = parsed(method)
+    if searches and parsed(plan).searches:
+        raise InputError(f"the method '{method}' was given; +{SEARCH} is said once, as in contact+{SEARCH}.")
+    if ":" not in plan and plan not in METHODS:
+        raise InputError(
+            unknown("method", plan or method, (*METHODS, SEARCH))
+            + f" Or give your own corrector as 'package.module:name'; any of them may be followed by +{SEARCH}."
+        )
+    return SEARCH if searches and plan == "none" else method
+
+
+def knows_truth(method: str) -> bool:
+    """Whether a method replays the drawn layout, so that it meets neither noise nor carelessness."""
+    return parsed(method).plan == "oracle"
+
+
+def as_seen(method: str) -> bool:
+    """Whether a method replays what was seen."""
+    return parsed(method).plan == "none"
+
+
+def knows_relations(method: str) -> bool:
+    """Whether a method is told what touches what: whether it has a corrector."""
+    return not knows_truth(method) and not as_seen(method)
+
+
+def is_own(method: object) -> bool:
+    """Whether a corrector is named as `module:name`, so that it runs in a process of its own."""
+    return isinstance(method, str) and ":" in method

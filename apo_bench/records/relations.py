@@ -1,0 +1,53 @@
+"""What a corrector is told of the contacts, by the names that rows use.
+
+`given`             the right ones
+`missed`, `false`   one too few, one too many
+`shifted:3`         one face is not where the model of its part says, by 3 mm
+`recognised`        found in what was seen; `recognised-fixed` and `recognised-twice` in other ways
+`module:name`       a function of somebody's own
+"""
+
+from __future__ import annotations
+
+import math
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.records.short_names import RELATIONS
+
+GIVEN = "given"
+"""The contacts come with the demonstration, and are right."""
+WRONG = tuple(RELATIONS)
+RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice")
+KINDS = (GIVEN, *WRONG, *RECOGNISED)
+SHIFT_MM, LARGEST_SHIFT_MM = 2.0, 50.0
+
+
+def relations_name(given: str) -> str:
+    """How rows spell it: `shifted` stands for 2 mm, `shifted:3.0` is `shifted:3`.
+
+    Raises:
+        InputError: A size that is not allowed.
+    """
+    kind, _, size = given.partition(":")
+    if kind != "shifted":
+        return given
+    try:
+        size_mm = float(size or SHIFT_MM)
+    except ValueError:
+        size_mm = math.nan
+    if not 0.0 < size_mm <= LARGEST_SHIFT_MM:
+        raise InputError(
+            f"the relations '{given}' were given; a size above 0 and up to {LARGEST_SHIFT_MM:g} mm is allowed: "
+            "shifted:3."
+        )
+    return f"shifted:{size_mm:g}"
+
+
+def checked_relations(given: str) -> str:
+    """The relations as rows spell them; raise an `InputError` unless there are such."""
+    name = relations_name(given)
+    if name.partition(":")[0] in KINDS and name not in KINDS and not name.startswith("shifted:"):
+        raise InputError(f"the relations '{given}' were given; only shifted has a size, as in shifted:3.")
+    if ":" not in name and name not in KINDS:
+        raise InputError(unknown("kind of relations", given, KINDS) + " Or give your own as 'package.module:name'.")
+    return name

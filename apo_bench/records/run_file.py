@@ -1,0 +1,119 @@
+"""`run.json`: what a sweep was asked to do and what its rows are made of; and whether another sweep is the same."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from apo_bench.errors import InputError
+from apo_bench.io.reading import read_bytes
+from apo_bench.io.writing import to_write
+from apo_bench.records.checked import run_of
+from apo_bench.records.limits import USUAL_LIMITS, Limits
+from apo_bench.records.salt import Salt
+
+RUN = "apo-bench/run/3"
+LARGEST_BYTES = 16_000_000
+
+
+def run_record(
+    grids: Sequence[Mapping[str, Any]],
+    content: Mapping[str, str],
+    code: Mapping[str, str],
+    versions: Mapping[str, str],
+    files: Mapping[str, str],
+    command: str,
+    salt: Salt | None = None,
+    limits: Limits = USUAL_LIMITS,
+) -> dict[str, Any]:
+    """What `run.json` says.
+
+    Args:
+        grids: From `described`.
+        content: What the trials are made of besides the package -> its hash.
+        code: Source file -> its hash.
+        files: Scenarios that were given as files: name -> path.
+        versions: Of packages that may show in a row.
+    """
+    return {
+        "schema": RUN,
+        "grids": list(grids),
+        "files": dict(files),
+        "salt": None if salt is None else salt.hash,
+        "limits": {"trial_s": limits.trial_s, "corrector_s": limits.corrector_s},
+        "content": dict(content),
+        "versions": dict(versions),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "command": command,
+        "code": dict(code),
+    }
+
+
+def write_run(folder: Path, run: Mapping[str, Any]) -> None:
+    """Replace the file at once: it is the old one or the new one, never half of it."""
+    beside = folder / "run.json.new"
+    with to_write(beside) as file:
+        file.write(json.dumps(run, indent=2).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, folder / "run.json")
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """What `run.json` says; nothing if it is not there.
+
+    Raises:
+        InputError: It cannot be read, or is something else; one sentence with file and field.
+    """
+    path = folder / "run.json"
+    return run_of(read_bytes(path, "run file", LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
+
+
+def check_same(folder: Path, run: Mapping[str, Any]) -> None:
+    """Raise an `InputError` that says what differs, unless a folder is of the same sweep; it may have fewer trials."""
+    try:
+        before = read_run(folder)
+    except InputError as error:
+        raise InputError(f"'{folder}' has trials but no readable run.json ({error}); choose another folder.") from error
+    schema = before.get("schema")
+    if schema is None:
+        raise InputError(f"'{folder}' has trials but no readable run.json; choose another folder.")
+    if schema != RUN:
+        raise InputError(f"'{folder}' has a run.json of schema '{schema}', '{RUN}' is needed; choose another folder.")
+    now = json.loads(json.dumps(run))
+    grids = before.get("grids")
+    if not isinstance(grids, list) or len(grids) != len(now["grids"]):
+        count = len(grids) if isinstance(grids, list) else 0
+        _refuse(folder, f"it had {count} grids, now {len(now['grids'])}")
+    for i, (old, new) in enumerate(zip(grids, now["grids"], strict=True), start=1):
+        _refuse_other(folder, f"grid {i}" if len(grids) > 1 else "grid", old, new)
+    _refuse_other_code(folder, before.get("code"), now["code"])
+    for key in ("versions", "content"):
+        _refuse_other(folder, key, before.get(key), now[key])
+
+
+def _refuse_other_code(folder: Path, before: Any, now: Mapping[str, str]) -> None:
+    before = before if isinstance(before, dict) else {}
+    changed = sorted(file for file in {*before, *now} if before.get(file) != now.get(file))
+    if changed:
+        more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
+        _refuse(folder, f"code: apo_bench/{changed[0]}{more} changed")
+
+
+def _refuse_other(folder: Path, what: str, before: Any, now: Mapping[str, Any]) -> None:
+    """More trials of the same grid are welcome; anything else that differs makes another sweep."""
+    before = before if isinstance(before, dict) else {}
+    for key in sorted({*before, *now}):
+        old, new = before.get(key), now.get(key)
+        grown = what.startswith("grid") and key == "trials" and isinstance(old, int) and old <= (new or 0)
+        if old != new and not grown:
+            _refuse(folder, f"{what}: {key} was {json.dumps(old)}, now {json.dumps(new)}")
+
+
+def _refuse(folder: Path, why: str) -> NoReturn:
+    raise InputError(f"'{folder}' holds trials of another sweep ({why}); choose another folder.")

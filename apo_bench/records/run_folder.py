@@ -1,0 +1,204 @@
+"""The folder of a sweep: rows that are only ever appended, whole, and what the sweep was asked to do.
+
+trials.jsonl   one row per trial; nothing but what specification and seed determine
+timing.jsonl   one line per trial: wall times, host, worker; lines that are missing do not matter
+run.json       grids, code, content, versions, command line
+torn.txt       half lines that an interrupted sweep left behind, if any
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any, final
+
+from apo_bench.errors import InputError
+from apo_bench.io.kept_file import is_there, put_back
+from apo_bench.io.reading import each_line
+from apo_bench.io.writing import check_target, to_write
+from apo_bench.records.checked import row_of, unwritable
+from apo_bench.records.key import Key, row_key
+from apo_bench.records.run_file import check_same, write_run
+from apo_bench.records.salt import check_one
+from apo_bench.records.settings import ROW
+
+CHUNK = 1 << 16
+
+
+@final
+class Journal:
+    """Appends rows to the folder of a sweep, and lets nobody else do so meanwhile; a context manager."""
+
+    def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
+        """Open a folder, made if it is not there.
+
+        Raises:
+            InputError: The folder cannot be written, is being written, or holds trials of another sweep.
+        """
+        self.folder = folder
+        self._run = run
+        self.finished: dict[Key, str] = {}
+        """The trials that have a row, and its `spec_hash`."""
+        try:
+            self._place = folder.absolute()
+            folder.mkdir(parents=True, exist_ok=True)
+            self._trials: IO[bytes] = to_write(folder / "trials.jsonl", "a+b", 0)
+            try:
+                _lock(self._trials.fileno(), folder)
+                for name in ("trials.jsonl", "timing.jsonl"):
+                    _set_torn_line_aside(folder / name)
+                self._read(run)
+                write_run(folder, run)
+                self._timing: IO[bytes] = to_write(folder / "timing.jsonl", "a+b", 0)
+                self._size = os.fstat(self._trials.fileno()).st_size
+            except BaseException:
+                self._trials.close()
+                raise
+        except OSError as error:
+            raise InputError(
+                f"the folder '{folder}' cannot be written ({error.strerror}); choose another one with --out."
+            ) from error
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._trials.close()
+        self._timing.close()
+
+    def append(self, row: Mapping[str, Any], timing: Mapping[str, Any]) -> None:
+        """Add a trial that has ended, each line in one write.
+
+        Raises:
+            RuntimeError: The row could not be written, such as on a full disk; what was written of it is taken back.
+                Or it is none by the table of fields, so that nobody could read it again.
+        """
+        wrong = unwritable(row)
+        if wrong:
+            raise RuntimeError(
+                f"a row was made that is none ({wrong}); the {len(self.finished)} before it are kept in {self.folder}."
+            )
+        self._keep()
+        try:
+            self._size += _append(self._trials.fileno(), row)
+        except OSError as error:
+            raise RuntimeError(
+                f"a row could not be written to {self.folder / 'trials.jsonl'} ({error.strerror}); the "
+                f"{len(self.finished)} before it are kept, and the same command continues once there is room."
+            ) from error
+        self.finished[row_key(row)] = row["spec_hash"]
+        with suppress(OSError):
+            _append(self._timing.fileno(), timing)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """All rows of the folder."""
+        self._keep()
+        return read_rows(self._place)
+
+    def _keep(self) -> None:
+        """Put the files back where they were if somebody has removed them.
+
+        Raises:
+            RuntimeError: They cannot be, or rows were taken out of them.
+        """
+        lost = f"the rows of this sweep were removed from '{self.folder}' by somebody else, and"
+        if os.fstat(self._trials.fileno()).st_size < self._size:
+            raise RuntimeError(f"{lost} are lost; the same command runs their trials again.")
+        if is_there(self._trials, self._place / "trials.jsonl"):
+            return
+        try:
+            trials = put_back(self._trials, self._place / "trials.jsonl")
+            self._trials.close()
+            self._trials = trials
+            _lock(trials.fileno(), self.folder)
+            timing = put_back(self._timing, self._place / "timing.jsonl")
+            self._timing.close()
+            self._timing = timing
+            write_run(self._place, self._run)
+        except OSError as error:
+            raise RuntimeError(f"{lost} cannot be put back ({error.strerror}); the same command runs them.") from error
+
+    def _read(self, run: Mapping[str, Any]) -> None:
+        for row in each_row(self.folder):
+            if row["schema"] != ROW:
+                raise InputError(
+                    f"'{self.folder}' holds rows of schema '{row['schema']}', and this version writes '{ROW}'; "
+                    "choose another folder."
+                )
+            check_one(f"'{self.folder}'", run.get("salt"), row["salt"])
+            self.finished[row_key(row)] = row["spec_hash"] or ""
+        if self.finished:
+            check_same(self.folder, run)
+
+
+def read_rows(folder: str | Path) -> list[dict[str, Any]]:
+    """The rows of a sweep, in the order in which they ended; a torn last line is left out.
+
+    Raises:
+        InputError: No such folder, no trials in it, or a line that is not a row.
+    """
+    return list(each_row(folder))
+
+
+def each_row(folder: str | Path) -> Iterator[dict[str, Any]]:
+    """The same, one after the other, so that a reader need not hold them all."""
+    path = Path(folder) / "trials.jsonl"
+    if not path.exists():
+        raise InputError(
+            f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote."
+        )
+    for number, line in each_line(path, "table of trials"):
+        yield row_of(line, f"{path}, line {number}")
+
+
+def _lock(file: int, folder: Path) -> None:
+    """Nobody else may write until the file is closed or the process ends, in whatever way."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise InputError(
+            f"another sweep is writing to '{folder}'; wait until it has ended, or choose another folder."
+        ) from error
+    except OSError:
+        return
+
+
+def _append(file: int, line: Mapping[str, Any]) -> int:
+    """Add a line whole, or not at all; how many bytes it has."""
+    whole = left = json.dumps(line, allow_nan=False).encode() + b"\n"
+    before = os.fstat(file).st_size
+    try:
+        while left:
+            left = left[os.write(file, left) :]
+    except OSError:
+        with suppress(OSError):
+            os.ftruncate(file, before)
+        raise
+    return len(whole)
+
+
+def _set_torn_line_aside(path: Path) -> None:
+    """What follows the last end of a line is no row: a copy of it is kept, and it goes."""
+    check_target(path)
+    if not path.exists():
+        return
+    with path.open("rb+") as file:
+        end = file.seek(0, os.SEEK_END)
+        at = end
+        tail = b""
+        while at > 0 and b"\n" not in tail:
+            at = max(0, at - CHUNK)
+            file.seek(at)
+            tail = file.read(end - at)
+        torn = tail[tail.rfind(b"\n") + 1 :]
+        if torn:
+            with to_write(path.parent / "torn.txt", "ab") as aside:
+                aside.write(torn + b"\n")
+            file.truncate(end - len(torn))

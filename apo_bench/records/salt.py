@@ -1,0 +1,136 @@
+"""A secret that enters every stream of chance, so that nobody without it can draw the trials of a sweep again."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+import re
+import secrets
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.io.reading import read_bytes
+
+FEWEST, MOST = 16, 512
+"""Bytes of a salt; 16 are 128 bits."""
+FEWEST_DIFFERENT = 8
+"""Of 16 bytes at random fewer are different in one of 10^11 cases."""
+FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")
+TEXT = "one line of 32 to 1024 hexadecimal digits, an even number of them, drawn at random"
+
+
+@final
+@dataclass(frozen=True)
+class Salt:
+    """Known to the processes that run trials, and written to no file but its own."""
+
+    secret: bytes = field(repr=False)
+
+    @cached_property
+    def hash(self) -> str:
+        """16 hexadecimal digits that tell salts apart and reveal none."""
+        return hashlib.sha256(b"apo-bench/salt/name/" + self.secret).hexdigest()[:16]
+
+    def words(self, seed: int, which: int) -> list[int]:
+        """Eight numbers of 32 bits for one stream of one trial; those of one stream say nothing of another's."""
+        digest = hmac.digest(self.secret, f"apo-bench/salt/stream/{seed}/{which}".encode(), "sha256")
+        return [int(word) for word in np.frombuffer(digest, dtype=">u4")]
+
+
+def read_salt(path: str | Path) -> Salt:
+    """The salt of a file.
+
+    Raises:
+        InputError: There is no such file, it cannot be read, or it holds something else.
+    """
+    found = FORM.fullmatch(read_bytes(path, "salt file"))
+    secret = bytes.fromhex(found[1].decode()) if found is not None else b""
+    if not FEWEST <= len(secret) <= MOST or len(set(secret)) < FEWEST_DIFFERENT:
+        raise InputError(f"'{path}' is not a salt file; it must hold {TEXT}.")
+    return Salt(secret)
+
+
+def salt_of_sweep(path: str | Path, folder: str | Path) -> Salt:
+    """The salt of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
+
+    Raises:
+        InputError: As `read_salt`, or the file cannot be made.
+    """
+    if os.path.lexists(path):
+        return read_salt(path)
+    trials = Path(folder) / "trials.jsonl"
+    if trials.exists() and trials.stat().st_size > 0:
+        raise InputError(
+            f"the salt file '{path}' is not there, and '{folder}' holds trials already; give the salt file that they "
+            "were drawn with, or choose another folder."
+        )
+    try:
+        make_salt(Path(path))
+    except OSError as error:
+        raise InputError(
+            f"the salt file '{path}' cannot be made ({error.strerror}); name a file in a folder that exists and can be "
+            "written."
+        ) from error
+    return read_salt(path)
+
+
+def make_salt(path: Path) -> None:
+    """Write 256 random bits to a file that only its owner can read; a file that is there by then is left as it is.
+
+    Raises:
+        OSError: The file cannot be made.
+    """
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    file = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0), 0o600)
+    try:
+        with os.fdopen(file, "wb") as whole:
+            whole.write(secrets.token_hex(32).encode() + b"\n")
+            whole.flush()
+            os.fsync(whole.fileno())
+        with suppress(FileExistsError):
+            os.link(beside, path)  # whole or not at all, and never over another file or through a link
+    finally:
+        os.unlink(beside)
+
+
+def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:
+    """The hash of the salt that all rows were drawn with; None for none.
+
+    Raises:
+        InputError: They were drawn with several.
+    """
+    found = sorted({row.get("salt") or "" for row in rows})
+    if len(found) > 1:
+        raise InputError(
+            f"the rows were drawn {' and '.join(map(with_salt, found))}; count trials of one salt at a time."
+        )
+    return found[0] or None if found else None
+
+
+def check_one(asked: str, given: str | None, drawn: str | None) -> None:
+    """Raise an `InputError` unless a salt, or none, is the one that trials were drawn with.
+
+    Args:
+        asked: What holds the trials, in words.
+        given: The hash of the salt at hand; None if there is none.
+        drawn: The hash in their rows.
+    """
+    if given == drawn:
+        return
+    if drawn is None:
+        raise InputError(f"{asked} holds trials drawn without a salt; leave --salt-file out.")
+    what = "no salt file was given" if given is None else f"the salt file given is that of {given}"
+    raise InputError(f"{asked} holds trials drawn with the salt {drawn}, and {what}; give theirs with --salt-file.")
+
+
+def with_salt(drawn: str | None) -> str:
+    """`with the salt 0123456789abcdef`, or `without a salt`."""
+    return f"with the salt {drawn}" if drawn else "without a salt"

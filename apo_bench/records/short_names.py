@@ -1,0 +1,43 @@
+"""Everything that rows and the command line call by a short name, and where it is: data, imported by nobody.
+
+Whoever needs the object behind a name asks `apo_bench.names.resolve`.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+CORRECTORS = MappingProxyType(
+    {
+        "contact": "apo_bench.correction.contact:contact",
+        "contact-refuse": "apo_bench.correction.contact:contact_refuse",
+        "contact-drop": "apo_bench.correction.contact:contact_drop",
+        "contact-fast": "apo_bench.correction.contact:contact_fast",
+        "paper": "apo_bench.correction.baselines.paper:paper",
+        "paper-track": "apo_bench.correction.baselines.track:paper_track",
+        "last-only": "apo_bench.correction.baselines.ablations:last_only",
+        "minimal": "apo_bench.correction.baselines.ablations:minimal",
+        "no-history": "apo_bench.correction.baselines.no_history:no_history",
+        "no-disappeared": "apo_bench.correction.baselines.ablations:no_disappeared",
+        "snap": "apo_bench.correction.baselines.snap:snap",
+        "least-squares": "apo_bench.correction.baselines.least_squares:least_squares",
+        "penalty": "apo_bench.correction.baselines.penalty:penalty",
+        "gtsam": "apo_bench.correction.baselines.gtsam_adapter:gtsam",
+        "cadquery": "apo_bench.correction.baselines.cadquery_adapter:cadquery",
+    }
+)
+"""Those that need an observation and nothing else."""
+SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.settling:settle"})
+"""Correctors that need a simulator; `correct` does not know them, a trial does."""
+METHODS = ("oracle", "none", *CORRECTORS, *SIMULATED)
+"""What a robot can be told to do: `oracle` is the truth, `none` what was seen, anything else a corrector."""
+RELATIONS = MappingProxyType(
+    {
+        "missed": "apo_bench.observation.relations:missed",
+        "false": "apo_bench.observation.relations:false",
+        "shifted": "apo_bench.observation.relations:Shifted",
+    }
+)
+"""Wrong relations that a corrector is told."""
+RESIDUALS = "empirical:"
+"""Begins the name of a noise that draws from a file of residuals."""

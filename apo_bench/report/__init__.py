@@ -1,0 +1,1 @@
+"""What a sweep says, as a page, tables and figures: rows in, files out."""

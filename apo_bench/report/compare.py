@@ -1,0 +1,300 @@
+"""Two sweeps against each other, trial by trial: two versions, two machines, two fidelities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, final
+
+from apo_bench.errors import InputError
+from apo_bench.records.key import Key, row_key
+from apo_bench.records.run_file import read_run
+from apo_bench.records.salt import one_salt, with_salt
+from apo_bench.records.settings import ROW
+from apo_bench.records.slim import NUMBERS, Row, slim_rows
+from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
+from apo_bench.statistics.paired import tango
+from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
+from apo_bench.statistics.settings import at
+
+RUN = "run.json can be read"
+ENDING = ("success", "failure_stage", "failure_code")
+ALL = "all"
+"""Stands for every scenario."""
+
+
+class Side(NamedTuple):
+    """One of the two sweeps."""
+
+    folder: Path
+    run: Mapping[str, Any]
+    rows: Sequence[Row]
+    verdict: str
+    """What its rows have as success: that, or `as_demonstrated`, of older rows."""
+
+
+class Difference(NamedTuple):
+    """A setting that is not the same in both; None where a side does not say."""
+
+    what: str
+    first: Any
+    second: Any
+
+
+@final
+@dataclass(frozen=True)
+class Agreement:
+    """Verdicts of the trials that both have, of one scenario or of all."""
+
+    scenario: str
+    same: Rate
+    """Trials whose verdict is the same; those whose demonstration was right in neither are left out."""
+    same_ending: Rate
+    """Trials whose verdict, stage and code are the same."""
+    same_everywhere: Rate
+    """Seeds with which every trial has the same verdict in both. All random numbers of a trial are drawn from its seed,
+    in every scenario the same, so that seeds, and not trials, are independent."""
+    only_first: int
+    """Trials that were right in the first alone."""
+    only_second: int
+    excluded_in_one: int
+    """Trials whose demonstration was right in one of the two alone."""
+
+    @property
+    def difference(self) -> float | None:
+        """Success of the second minus that of the first, over trials that both count."""
+        n = self.same.trials - self.excluded_in_one
+        return (self.only_second - self.only_first) / n if n else None
+
+    @property
+    def interval(self) -> Interval:
+        """Tango's, of that difference."""
+        return tango(self.only_second, self.only_first, self.same.trials - self.excluded_in_one)
+
+
+class Apart(NamedTuple):
+    """A number of a row, over the trials that both have."""
+
+    name: str
+    both: int
+    """Trials in which both have it."""
+    differ: int
+    """Of these, trials in which it is not exactly the same."""
+    most: float
+    """The largest absolute difference."""
+    alone: int
+    """Trials in which one of the two alone has it."""
+
+
+class Pair(NamedTuple):
+    """Cells of both at the same place, whatever the fidelity; None where one has none."""
+
+    first: Cell | None
+    second: Cell | None
+    shared: int
+    """Trials that both have and both count."""
+    only_first: int
+    """Of these, those that were right in the first alone."""
+    only_second: int
+
+    @property
+    def difference(self) -> float | None:
+        """Success of the second minus that of the first, over the trials that they share."""
+        return (self.only_second - self.only_first) / self.shared if self.shared else None
+
+    @property
+    def interval(self) -> Interval:
+        """Tango's, of that difference."""
+        return tango(self.only_second, self.only_first, self.shared)
+
+
+@final
+@dataclass(frozen=True)
+class Comparison:
+    """All that two sweeps have to say to each other."""
+
+    first: Side
+    second: Side
+    differences: tuple[Difference, ...]
+    shared: int
+    """Trials that both have."""
+    alone: tuple[int, int]
+    """Trials that the first alone, and the second alone, has."""
+    agreements: tuple[Agreement, ...]
+    """By scenario, and of all at the end."""
+    changed: tuple[tuple[Row, Row], ...]
+    """The trials whose verdicts differ."""
+    numbers: tuple[Apart, ...]
+    identical: int
+    """Trials of which verdict, stage, code, words and every number are exactly the same."""
+    cells: tuple[Pair, ...]
+
+
+def compare(first: str | Path, second: str | Path) -> Comparison:
+    """Compare the sweeps of two folders.
+
+    A trial is the same if all that its key holds is: scenario, clearance, seed, carelessness, level, noise, relations,
+    grasp and method; fidelity, arm and time step are not, so that they can be compared.
+
+    Raises:
+        InputError: A folder is no sweep, holds a trial twice, both have no trial in common (of other salts a seed is
+            another trial), or one is of older rows with another verdict.
+    """
+    sides = [_side(Path(folder)) for folder in (first, second)]
+    for side in sides:
+        if not side.rows:
+            raise InputError(f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
+    salts = [one_salt(side.rows) for side in sides]
+    if salts[0] != salts[1]:
+        raise InputError(
+            f"'{first}' was drawn {with_salt(salts[0])} and '{second}' {with_salt(salts[1])}, so that they have no "
+            "trial in common, whatever their seeds; compare sweeps of one salt."
+        )
+    if sides[0].verdict != sides[1].verdict:
+        old, new = sides if sides[0].verdict == AS_DEMONSTRATED else sides[::-1]
+        raise InputError(
+            f"the rows in '{old.folder}' are older than '{ROW}' and say only whether all was as demonstrated, those in "
+            f"'{new.folder}' say success, which is another verdict, so the two are not paired; run the older sweep "
+            "again with this version."
+        )
+    ours, theirs = (_by_key(side) for side in sides)
+    both = [key for key in ours if key in theirs]
+    if not both:
+        raise InputError(
+            f"'{first}' and '{second}' have no trial in common (scenario, clearance, seed, carelessness, level, noise, "
+            "relations, grasp and method); compare sweeps of the same seeds."
+        )
+    pairs = [(ours[key], theirs[key]) for key in both]
+    return Comparison(
+        first=sides[0],
+        second=sides[1],
+        differences=differences(*sides),
+        shared=len(both),
+        alone=(len(ours) - len(both), len(theirs) - len(both)),
+        agreements=agreements(pairs),
+        changed=tuple(pair for pair in sorted(pairs, key=_place_and_seed) if pair[0]["success"] != pair[1]["success"]),
+        numbers=numbers(pairs),
+        identical=sum(_identical(a, b) for a, b in pairs),
+        cells=_cells(sides[0], sides[1], pairs),
+    )
+
+
+def differences(first: Side, second: Side) -> tuple[Difference, ...]:
+    """What the two were asked to do and made with that is not the same; of source files those that differ.
+
+    Where one of them has no `run.json` that can be read, nothing that only stands there is compared.
+    """
+    if not (first.run and second.run):
+        read = [bool(side.run) or None for side in (first, second)]
+        first, second = first._replace(run={RUN: read[0]}), second._replace(run={RUN: read[1]})
+    said = [_said(side) for side in (first, second)]
+    names = list(dict.fromkeys([*said[0], *said[1]]))
+    return tuple(Difference(n, said[0].get(n), said[1].get(n)) for n in names if said[0].get(n) != said[1].get(n))
+
+
+def agreements(pairs: Iterable[tuple[Row, Row]]) -> tuple[Agreement, ...]:
+    """Per scenario, and over all."""
+    groups: dict[str, list[tuple[Row, Row]]] = {}
+    for pair in pairs:
+        groups.setdefault(pair[0]["scenario"], []).append(pair)
+    everything = [pair for own in groups.values() for pair in own]
+    return (*(_agreement(name, groups[name]) for name in sorted(groups)), _agreement(ALL, everything))
+
+
+def numbers(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
+    """One per number that is in any row."""
+    found = []
+    for name in NUMBERS:
+        values = [(a.get(name), b.get(name)) for a, b in pairs]
+        both = [(x, y) for x, y in values if x is not None and y is not None]
+        alone = sum((x is None) != (y is None) for x, y in values)
+        if both or alone:
+            most = max((abs(x - y) for x, y in both), default=0.0)
+            found.append(Apart(name, len(both), sum(x != y for x, y in both), float(most), alone))
+    return tuple(found)
+
+
+def _side(folder: Path) -> Side:
+    rows = slim_rows(folder)
+    verdict = verdict_of(rows, folder)
+    return Side(folder, read_run(folder), by_verdict(rows, verdict), verdict)
+
+
+def _by_key(side: Side) -> dict[Key, Row]:
+    found: dict[Key, Row] = {}
+    for row in side.rows:
+        if row["level"] is None:
+            continue
+        if row_key(row) in found:
+            raise InputError(
+                f"'{side.folder}' holds a trial twice ({row['scenario']}, {row['method']}, level {row['level']:g}, "
+                f"seed {row['seed']}); every trial counts once, so leave one of the two out."
+            )
+        found[row_key(row)] = row
+    return found
+
+
+def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
+    counted = [(a, b) for a, b in pairs if (a["success"], b["success"]) != (None, None)]
+    verdicts = [(a["success"], b["success"]) for a, b in counted]
+    seeds: dict[int, bool] = {}
+    for a, b in counted:
+        seeds[a["seed"]] = seeds.get(a["seed"], True) and a["success"] == b["success"]
+    return Agreement(
+        scenario=name,
+        same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),
+        same_ending=Rate(sum(all(a[x] == b[x] for x in ENDING) for a, b in counted), len(counted)),
+        same_everywhere=Rate(sum(seeds.values()), len(seeds)),
+        only_first=sum((a, b) == (True, False) for a, b in verdicts),
+        only_second=sum((a, b) == (False, True) for a, b in verdicts),
+        excluded_in_one=sum((a is None) != (b is None) for a, b in verdicts),
+    )
+
+
+def _identical(a: Row, b: Row) -> bool:
+    told = ("as_demonstrated", "loose_success", "failure_operation", "sentence", "freed")
+    return all(a.get(name) == b.get(name) for name in (*ENDING, *told, *NUMBERS))
+
+
+def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
+    place = place_of(pair[0])
+    assert place is not None
+    return (*order(place), pair[0]["seed"])
+
+
+def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[Pair, ...]:
+    """Cells by place, fidelity aside; sorted as `tally` sorts."""
+    ours, theirs = ({_anywhere(at(cell)): cell for cell in tally(side.rows)} for side in (first, second))
+    verdicts: dict[Place, list[tuple[Any, Any]]] = {}
+    for a, b in pairs:
+        place = place_of(a)
+        if place is not None and a["success"] is not None and b["success"] is not None:
+            verdicts.setdefault(_anywhere(place), []).append((a["success"], b["success"]))
+    found = []
+    for place in sorted({**ours, **theirs}, key=order):
+        met = verdicts.get(place, [])
+        alone = (met.count((True, False)), met.count((False, True)))
+        found.append(Pair(ours.get(place), theirs.get(place), len(met), *alone))
+    return tuple(found)
+
+
+def _anywhere(place: Place) -> Place:
+    """Whatever the fidelity."""
+    return place._replace(fidelity="full")
+
+
+def _said(side: Side) -> dict[str, Any]:
+    """Settings by name: of `run.json` one level deep, and of the rows what cannot be seen there."""
+    said: dict[str, Any] = {}
+    for name, value in side.run.items():
+        if isinstance(value, dict):
+            said |= {f"{name}: {key}": inner for key, inner in value.items()}
+        elif isinstance(value, list) and all(isinstance(x, dict) for x in value):
+            for i, inner in enumerate(value, start=1):
+                said |= {f"{name} {i}: {key}": x for key, x in inner.items()}
+        else:
+            said[name] = value
+    for name in ("schema", "fidelity", "arm", "timestep_s"):
+        said[f"rows: {name}"] = sorted({row[name] for row in side.rows if name in row})
+    return said

@@ -1,0 +1,89 @@
+"""Which failures a report shows as pictures; who can draw them is somebody else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from apo_bench.records.own_code import left_out, own_code
+from apo_bench.records.replay_command import Files
+from apo_bench.records.salt import Salt
+from apo_bench.statistics.rates import NOT_EXECUTED, rank
+
+Row = Mapping[str, Any]
+
+
+class Draw(Protocol):
+    """Runs failed trials again and draws them; the sentences say what could not be drawn."""
+
+    def __call__(
+        self, chosen: Sequence[Row], folder: Path, files: Files, salt: Salt | None, *, trust_code: bool
+    ) -> tuple[list[FailurePicture], list[str]]: ...
+
+
+class FailurePicture(NamedTuple):
+    """Of one trial."""
+
+    row: Row
+    jpeg: bytes
+    words: str
+    """How it was made."""
+
+
+class Failures(NamedTuple):
+    """How a report draws failures."""
+
+    most: int
+    draw: Draw | None
+    salt: Salt | None
+    trust_code: bool
+    """Run also trials that name code that does not come with the package."""
+
+    def drawn(self, rows: Sequence[Row], folder: Path, files: Files) -> tuple[list[FailurePicture], list[str]]:
+        """The pictures, and sentences on those that are missing."""
+        if not self.most or self.draw is None:
+            return [], []
+        chosen = sample(rows, self.most, trust_code=self.trust_code)
+        taken, missed = self.draw(chosen, folder, files, self.salt, trust_code=self.trust_code)
+        without = "" if self.trust_code else left_out(rows)
+        return taken, [*missed, *([without] if without else [])]
+
+
+def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[Row]:
+    """Failures to be drawn: kinds of failure by turns, the most frequent first, methods and scenarios varied.
+
+    The same rows, in any order, give the same sample. Trials that were not carried out have nothing to be seen.
+
+    Args:
+        trust_code: Also trials that name code of somebody's own.
+    """
+    kinds: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        moved = row.get("sim_seconds") and row["failure_stage"] not in (*NOT_EXECUTED, "plan")
+        if row["success"] is False and moved and row["level"] is not None and (trust_code or not own_code(row)):
+            kinds.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
+    queues = [
+        sorted(found, key=_order) for _, found in sorted(kinds.items(), key=lambda kind: (-len(kind[1]), kind[0]))
+    ]
+    chosen: list[Row] = []
+    while len(chosen) < most and any(queues):
+        for queue in queues:
+            if queue and len(chosen) < most:
+                chosen.append(queue.pop(_newest(queue, chosen)))
+    return chosen
+
+
+def _order(row: Row) -> tuple[Any, ...]:
+    where = (row["scenario"], row["clearance_mm"], row["noise"], row["relations"], row["careless"], row["level"])
+    return (row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)
+
+
+def _newest(queue: Sequence[Row], chosen: Sequence[Row]) -> int:
+    """The first one of a method and scenario that was chosen least."""
+    methods, scenarios = [row["method"] for row in chosen], [row["scenario"] for row in chosen]
+    met: dict[tuple[str, str], int] = {}
+    for i, row in enumerate(queue):
+        met.setdefault((row["method"], row["scenario"]), i)
+    best = min(met, key=lambda pair: (methods.count(pair[0]) + scenarios.count(pair[1]), met[pair]))
+    return met[best]

@@ -1,0 +1,116 @@
+"""The contacts of an operation in a scenario file: faces on faces, and how far apart they are asked to be.
+
+A contact is a pair, `["bottom", "table.top"]`, or a table that says more:
+
+    { faces = ["py", "castle1.spy"], kind = "clearance", gap_mm = [-0.2, 0.3] }
+
+`kind` is `centred` (the default), `contact` or `clearance`, see `apo_bench.assembly.topology.Gap`; `gap_mm` goes
+with the last, and stands for all the play of parts that fit if it is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import get_args
+
+from apo_bench.assembly.topology import Contact, Gap, Kind, PartFace
+from apo_bench.geometry.solid import Solid
+from apo_bench.io.strict_json import Node
+from apo_bench.scenario.keys import LARGEST_MM, read_span, refuse, refuse_name
+
+Asked = Mapping[Contact, Gap]
+"""What is asked of each contact, in the order of the file."""
+KINDS: tuple[Kind, ...] = get_args(Kind)
+EXAMPLE = '["bottom", "table.top"]'
+TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
+
+
+def read_contacts(
+    nodes: tuple[Node, ...], main: str, carries: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]
+) -> Asked:
+    """The contacts that one operation makes.
+
+    Args:
+        main: The part whose faces need no name before them.
+        there: Parts that stand there before the operation.
+    """
+    found: dict[Contact, Gap] = {}
+    for node in nodes:
+        contact, asked = _contact(node, main, solids)
+        _check(contact, node, (main, *carries), there)
+        if contact in found:
+            refuse(node, f"'{contact}' stands here twice; keep one")
+        found[contact] = asked
+    return found
+
+
+def check_kinds(node: Node, asked: Sequence[Asked]) -> None:
+    """A contact that the last of some operations makes again is asked for in the same way as before."""
+    for contact, gap in asked[-1].items():
+        for k, earlier in enumerate(asked[:-1], start=1):
+            wanted = earlier.get(contact, gap)
+            if wanted != gap:
+                refuse(
+                    node,
+                    f"'{contact}' is asked to be {gap} here and {wanted} in operation {k}; ask for the same in both",
+                )
+
+
+def _contact(node: Node, main: str, solids: Mapping[str, Solid]) -> tuple[Contact, Gap]:
+    keys = node.fields(("faces",), ("kind", "gap_mm")) if isinstance(node.value, dict) else {"faces": node}
+    pair = keys["faces"]
+    if not isinstance(pair.value, list) or len(pair.value) != 2:
+        pair.fail(f"a pair is needed, such as {EXAMPLE}, or a table, such as {TABLE}")
+    above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
+    contact = Contact(_face(above, main, solids), _face(below, None, solids))
+    fits = any(solids[of.part].faces[of.face].fit for of in contact)
+    return contact, _gap(keys, node, contact, fits)
+
+
+def _gap(keys: Mapping[str, Node], node: Node, contact: Contact, fits: bool) -> Gap:
+    kind = _kind(keys["kind"]) if "kind" in keys else Gap().kind
+    if "gap_mm" not in keys:
+        if kind == "clearance" and not fits:
+            refuse(node, f"'{contact}': faces without play have no clearance; say gap_mm = [lowest, highest]")
+        return Gap(kind)
+    if kind != "clearance":
+        refuse(keys["gap_mm"], f'"{kind}" has no interval; say kind = "clearance", or take gap_mm out')
+    low, high = read_span(keys["gap_mm"], -LARGEST_MM, LARGEST_MM)
+    if not (low <= 0.0 <= high and low < high):
+        keys["gap_mm"].fail(
+            "a lowest number up to 0 and a higher one from 0 are needed", "the faces of the goals coincide"
+        )
+    return Gap(kind, 1e-3 * low, 1e-3 * high)
+
+
+def _kind(node: Node) -> Kind:
+    for kind in KINDS:
+        if node.value == kind:
+            return kind
+    node.fail(f"{', '.join(KINDS[:-1])} or {KINDS[-1]} is needed")
+
+
+def _check(contact: Contact, node: Node, moves: tuple[str, ...], there: set[str]) -> None:
+    """The first face is of a part that moves, the second of one that rests where it was put."""
+    above, below = node.child(None, "first"), node.child(None, "second")
+    a, b = contact.manipulated.part, contact.environment.part
+    if a not in moves:
+        refuse(above, f"'{a}' does not move here; name a face of '{moves[0]}' or a carried part")
+    if b in moves:
+        refuse(below, f"'{b}' moves in this operation; name a face of a part that rests")
+    if b not in there:
+        refuse(below, f"'{b}' is not there yet; name a fixed part or one that was moved before")
+
+
+def _face(node: Node, main: str | None, solids: Mapping[str, Solid]) -> PartFace:
+    """`part.face`, or a face of the main part."""
+    text = node.text()
+    name, dot, face = text.rpartition(".")
+    if not dot and main is None:
+        node.fail("a face as 'part.face' is needed")
+    part = name if dot or main is None else main
+    if part not in solids:
+        refuse_name(node, "part", part, solids)
+    if face not in solids[part].faces:
+        refuse_name(node, f"face of part '{part}'", face, solids[part].faces)
+    return PartFace(part, face)

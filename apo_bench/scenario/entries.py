@@ -1,0 +1,219 @@
+"""The tables [parts] and [[operations]] of a scenario file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.topology import Operation
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid
+from apo_bench.insertion.line import Preference
+from apo_bench.io.strict_json import Node
+from apo_bench.parts import load_part, part_path
+from apo_bench.parts.allowed import NAME
+from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
+from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
+from apo_bench.scenario.scenario import Grasp, Shift
+
+MOST_PARTS, MOST_OPERATIONS, MOST_CONTACTS, MOST_SHIFTS = 50, 100, 50, 20
+"""In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
+ARM = "arm"
+"""What the robot is called in a scene."""
+RAISED = 0.15
+"""Height of a grasp over the middle of the part, as a part of the height of the part."""
+LEVEL = 1e-6
+"""Vertical component below which a unit vector is level."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One entry of [parts]."""
+
+    path: Path
+    solid: Solid
+    fixed: bool
+    follows_site: bool
+    start: Array
+    """(4, 4), [m]."""
+    color: tuple[float, float, float] | None
+
+
+class Entry(NamedTuple):
+    """One entry of [[operations]]."""
+
+    operation: Operation
+    asked: Asked
+    goal: Array
+    """(4, 4), frame of the assembly, [m]."""
+    attach: Preference
+    grasp: Grasp
+    shifts: tuple[Shift, ...]
+
+
+def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
+    """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
+    if not isinstance(node.value, dict) or not node.value:
+        node.fail("at least one table [parts.NAME] is needed")
+    if len(node.value) > MOST_PARTS:
+        refuse(node, f"at most {MOST_PARTS} parts are allowed, {len(node.value)} were given")
+    solids: dict[Path, Solid] = {}
+    return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
+
+
+def _part(node: Node, name: str, folder: Path, solids: dict[Path, Solid]) -> Part:
+    if not NAME.fullmatch(name):
+        refuse(node, f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores")
+    if name == ARM:
+        refuse(node, f"a part cannot be called '{ARM}', as the robot is; give it another name")
+    keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
+    fixed = "fixed" in keys and keys["fixed"].flag()
+    follows = "follows_site" in keys and keys["follows_site"].flag()
+    if follows and not fixed:
+        refuse(keys["follows_site"], "only a fixed part can follow the site; say fixed = true, or leave this key out")
+    if not fixed and "start" not in keys:
+        refuse(node, "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }")
+    path, solid = _solid(keys["file"], folder, solids)
+    start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
+    return Part(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
+
+
+def _solid(node: Node, folder: Path, solids: dict[Path, Solid]) -> tuple[Path, Solid]:
+    try:
+        path = part_path(node.text())
+        path = path if path.is_absolute() else folder / path
+        if path not in solids:
+            solids[path] = load_part(path)
+    except InputError as error:
+        if str(error).startswith(f"{node.file}, "):
+            raise
+        raise InputError(f"{node.file}, {node.key}: {error}") from error
+    return path, solids[path]
+
+
+def _color(node: Node) -> tuple[float, float, float]:
+    r, g, b = node.numbers(3)
+    if not (min(r, g, b) >= 0 and max(r, g, b) <= 1):
+        node.fail("red, green and blue from 0 to 1 are needed")
+    return float(r), float(g), float(b)
+
+
+def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
+    """Every operation in order, with defaults filled in."""
+    nodes = node.items("operation")
+    if not nodes:
+        refuse(node, "the list is empty; give at least one [[operations]]")
+    if len(nodes) > MOST_OPERATIONS:
+        refuse(node, f"at most {MOST_OPERATIONS} operations are allowed, {len(nodes)} were given")
+    poses = {name: part.start for name, part in parts.items()}
+    there = {name for name, part in parts.items() if part.fixed}
+    entries = []
+    for k, each in enumerate(nodes):
+        entry = _entry(each, k, parts, poses, there)
+        entries.append(entry)
+        check_kinds(each.child(None, "contacts"), [earlier.asked for earlier in entries])
+        T = entry.goal @ pose.inverse(poses[entry.operation.main])
+        poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
+        there |= set(entry.operation.moves)
+    if sum(len(entry.shifts) for entry in entries) > MOST_SHIFTS:
+        refuse(node, f"at most {MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends")
+    return tuple(entries)
+
+
+def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Array], there: set[str]) -> Entry:
+    keys = node.fields(("move", "goal", "contacts"), ("carries", "attach", "grasp", "vary"))
+    main = _movable(keys["move"], parts)
+    carries = tuple(_movable(n, parts) for n in _items(keys["carries"], "entry")) if "carries" in keys else ()
+    for name in carries:
+        if name == main:
+            refuse(keys["carries"], f"'{name}' would carry itself, it is the moved part; leave it out of this list")
+        if carries.count(name) > 1:
+            refuse(keys["carries"], f"'{name}' stands here twice; name it once")
+        if name not in there:
+            refuse(keys["carries"], f"'{name}' is carried before any operation has moved it; move it first")
+    goal = read_pose(keys["goal"])
+    solids = {name: part.solid for name, part in parts.items()}
+    contacts = _items(keys["contacts"], "contact")
+    if len(contacts) > MOST_CONTACTS:
+        refuse(keys["contacts"], f"at most {MOST_CONTACTS} contacts are allowed, {len(contacts)} were given")
+    asked = read_contacts(contacts, main, carries, solids, there)
+    if not asked:
+        refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
+    return Entry(
+        Operation(main, tuple(asked), carries),
+        asked,
+        goal,
+        _attach(keys["attach"]) if "attach" in keys else Preference(),
+        _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
+        _shifts(keys["vary"], k) if "vary" in keys else (),
+    )
+
+
+def _items(node: Node, name: str) -> tuple[Node, ...]:
+    """The entries of a list within an operation, with the operation in their key."""
+    return tuple(Node(each.value, each.file, f"{node.key}, {each.key}") for each in node.items(name))
+
+
+def _movable(node: Node, parts: Mapping[str, Part]) -> str:
+    name = node.text()
+    if name not in parts:
+        refuse_name(node, "part", name, parts)
+    if parts[name].fixed:
+        refuse(node, f"'{name}' is fixed and cannot be moved; move another part, or take fixed = true away")
+    return name
+
+
+def _attach(node: Node) -> Preference:
+    """What is stated of the line to the goal."""
+    keys = node.fields((), ("along", "travel_mm"))
+    direction = read_axis(keys["along"]) if "along" in keys else None
+    travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else None
+    if travel_m is not None and travel_m > 1e-3 * LARGEST_MM:
+        keys["travel_mm"].fail(f"a length of at most {LARGEST_MM:g} mm is needed")
+    return Preference(direction, travel_m)
+
+
+def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp:
+    """The grasp; above the middle, across the narrower level axis unless the file says otherwise."""
+    keys = node.fields((), ("at_mm", "across")) if node else {}
+    low, high = solid.bounds
+    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else _above_middle(solid, before)
+    if ((point < low) | (point > high)).any():
+        span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
+        keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
+    if "across" in keys:
+        across = read_axis(keys["across"])
+        if abs((before[:3, :3] @ across)[2]) > LEVEL:
+            keys["across"].fail(
+                "an axis that is level where the part is picked is needed", "the gripper comes from above"
+            )
+        return Grasp(point, across)
+    level = [axis for axis in range(3) if abs(before[2, axis]) < LEVEL]
+    if len(level) < 2:
+        refuse(entry, "the part does not stand straight where it is picked; say grasp = { across = [x, y, z] }")
+    return Grasp(point, np.eye(3)[min(level, key=lambda axis: (high - low)[axis])])
+
+
+def _above_middle(solid: Solid, T: Array) -> Array:
+    """Over the middle of the part as it stands, so that fingers which reach below it clear what it stands on."""
+    low, high = solid.bounds
+    up = T[2, :3]
+    point: Array = (low + high) / 2 + RAISED * (np.abs(up) @ (high - low)) * up
+    return np.clip(point, low, high)
+
+
+def _shifts(node: Node, operation: int) -> tuple[Shift, ...]:
+    many = node.items(node.key) if isinstance(node.value, list) else (node,)
+    shifts = []
+    for each in many:
+        keys = each.fields(("along", "mm"))
+        low, high = read_span(keys["mm"], -LARGEST_MM, LARGEST_MM)
+        shifts.append(Shift(operation, read_axis(keys["along"]), 1e-3 * low, 1e-3 * high))
+    return tuple(shifts)

@@ -1,0 +1,156 @@
+"""Scenario files: a TOML file becomes a checked `Scenario`; every complaint names file, key and remedy.
+
+Lengths in mm, angles in degrees, operations numbered from 1; `scenarios/stick_in_tower.toml` shows every key.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.assembly.topology import Assembly, Gap
+from apo_bench.errors import InputError, unknown
+from apo_bench.insertion.line import Preference
+from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.records.thresholds import MEANINGS, Meaning, Thresholds
+from apo_bench.resources import folder
+from apo_bench.scenario.attach import with_lines
+from apo_bench.scenario.checks import check_scenario
+from apo_bench.scenario.entries import Entry, read_operations, read_parts
+from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_span, refuse
+from apo_bench.scenario.scenario import Carelessness, Scenario, Site
+
+SCHEMA = 1
+LARGEST_CLEARANCE_MM = 5.0
+
+
+def scenario_names() -> tuple[str, ...]:
+    """The short names of the scenarios that come with the package."""
+    return tuple(sorted(path.stem for path in folder("scenarios").glob("*.toml")))
+
+
+def load_scenario(given: str | Path | Scenario) -> Scenario:
+    """The scenario of a short name, of a TOML file anywhere, or the object itself.
+
+    Part files in it are short names, or paths relative to the scenario file.
+
+    Raises:
+        InputError: No such scenario, or the file breaks a rule; one sentence with file, key, what was given, what is
+            allowed and what to do.
+    """
+    if isinstance(given, Scenario):
+        return given
+    path = _path(given)
+    document = read_toml(path, "scenario file")
+    if UNSHOWN.search(path.stem):
+        raise InputError(
+            f"{path}: the file's name, which the scenario gets, holds control characters; rename the file."
+        )
+    scenario, stated = _scenario(document, path)
+    check_scenario(scenario, str(path))
+    return with_lines(scenario, stated, str(path))
+
+
+def _path(given: str | Path) -> Path:
+    if not isinstance(given, str | Path):
+        raise InputError(f"a scenario is a short name, a path or a Scenario, a {type(given).__name__} was given.")
+    if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
+        return Path(given)
+    if given not in scenario_names():
+        raise InputError(unknown("scenario", given, scenario_names()) + " Or give the path of a .toml file.")
+    return folder("scenarios") / f"{given}.toml"
+
+
+def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
+    """The scenario without lines of attach, and what the file states of them."""
+    schema = root.value.get("schema", SCHEMA)
+    if isinstance(schema, bool) or schema != SCHEMA:
+        root.child(schema, "schema").fail(f"schema = {SCHEMA} is needed", "no other format is known to this version")
+    top = root.fields(
+        ("schema", "title", "parts", "operations"),
+        ("paper", "human", "success", "clearance_mm", "gap_mm", "site", "careless", "judge"),
+    )
+    parts = read_parts(top["parts"], path.parent)
+    entries = read_operations(top["operations"], parts)
+    assembly = Assembly(
+        {name: part.solid for name, part in parts.items()},
+        tuple(entry.operation for entry in entries),
+        frozenset(name for name, part in parts.items() if part.fixed),
+        {contact: gap for entry in entries for contact, gap in entry.asked.items() if gap != Gap()},
+    )
+    for name in parts:
+        if name not in assembly.fixed and not any(name in operation.moves for operation in assembly.operations):
+            refuse(top["parts"], f"no operation moves '{name}'; give it one, or say fixed = true")
+    thresholds, means = _judge(top["judge"]) if "judge" in top else (Thresholds(), MEANINGS[0])
+    scenario = Scenario(
+        name=path.stem,
+        **{key: top[key].text() if key in top else "" for key in ("title", "paper", "human", "success")},
+        assembly=assembly,
+        part_files={name: part.path for name, part in parts.items()},
+        colors={name: part.color for name, part in parts.items() if part.color is not None},
+        start={name: part.start for name, part in parts.items()},
+        goals=np.array([entry.goal for entry in entries]),
+        attach=(),
+        grasps=tuple(entry.grasp for entry in entries),
+        site=_site(top["site"]) if "site" in top else Site(),
+        shifts=tuple(shift for entry in entries for shift in entry.shifts),
+        careless=_careless(top["careless"], entries) if "careless" in top else None,
+        thresholds=thresholds,
+        success_means=means,
+        clearance_mm=_number(top["clearance_mm"], LARGEST_CLEARANCE_MM) if "clearance_mm" in top else 0.25,
+        gap_mm=_number(top["gap_mm"], LARGEST_CLEARANCE_MM, above=True) if "gap_mm" in top else 0.1,
+        follows_site=frozenset(name for name, part in parts.items() if part.follows_site),
+    )
+    return scenario, tuple(entry.attach for entry in entries)
+
+
+def _site(node: Node) -> Site:
+    keys = node.fields((), ("center_mm", "spread_mm", "yaw_deg"))
+    center = _pair(keys["center_mm"], -LARGEST_MM) if "center_mm" in keys else (0.0, 0.0)
+    spread = _pair(keys["spread_mm"], 0.0) if "spread_mm" in keys else (0.0, 0.0)
+    yaw = read_span(keys["yaw_deg"], -360.0, 360.0) if "yaw_deg" in keys else (0.0, 0.0)
+    return Site(
+        (1e-3 * center[0], 1e-3 * center[1]),
+        (1e-3 * spread[0], 1e-3 * spread[1]),
+        (float(np.radians(yaw[0])), float(np.radians(yaw[1]))),
+    )
+
+
+def _pair(node: Node, low: float) -> tuple[float, float]:
+    x, y = node.numbers(2)
+    if not (low <= min(x, y) and max(x, y) <= LARGEST_MM):
+        node.fail(f"two lengths from {low:g} to {LARGEST_MM:g} mm are needed")
+    return float(x), float(y)
+
+
+def _careless(node: Node, entries: tuple[Entry, ...]) -> Carelessness:
+    keys = node.fields(("operation", "along", "size_mm"))
+    number = keys["operation"].integer()
+    if not 1 <= number <= len(entries):
+        keys["operation"].fail(f"an operation from 1 to {len(entries)} is needed")
+    axis = read_axis(keys["along"])
+    if abs((entries[number - 1].goal[:3, :3] @ axis)[2]) > 1e-6:
+        keys["along"].fail("a direction that is level at the goal is needed", "what lies below decides the height")
+    low, high = read_span(keys["size_mm"], 0.0, 100.0)
+    return Carelessness(number - 1, axis, 1e-3 * low, 1e-3 * high)
+
+
+def _judge(node: Node) -> tuple[Thresholds, Meaning]:
+    keys = dict(node.fields((), ("success", *(field.name for field in fields(Thresholds)))))
+    means = keys.pop("success", None)
+    if means is not None and means.value not in MEANINGS:
+        means.fail(f"{' or '.join(MEANINGS)} is needed")
+    largest = {"overlap_fraction": 1.0, "loose_angle_deg": 180.0}
+    thresholds = Thresholds(**{key: _number(value, largest.get(key, 1e4)) for key, value in keys.items()})
+    return thresholds, MEANINGS[0] if means is None else means.value
+
+
+def _number(node: Node, high: float, *, above: bool = False) -> float:
+    x = node.number(0.0, above=above)
+    if x > high:
+        node.fail(f"a number of at most {high:g} is needed")
+    return x

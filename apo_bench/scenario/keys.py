@@ -1,0 +1,59 @@
+"""What a value in a scenario file may be: poses, axes, spans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NoReturn
+
+import numpy as np
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.strict_json import Node
+
+LARGEST_MM = 2000.0
+"""No length in a scenario is larger: the room of an arm on a table."""
+AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0)) for i in range(3)}
+
+
+def refuse(node: Node, sentence: str) -> NoReturn:
+    """Raise the error of a key."""
+    place = f"{node.file}, {node.key}" if node.key else node.file
+    raise InputError(f"{place}: {sentence}.")
+
+
+def refuse_name(node: Node, kind: str, given: str, allowed: Iterable[str]) -> NoReturn:
+    raise InputError(f"{node.file}, {node.key}: {unknown(kind, given, allowed)}")
+
+
+def read_pose(node: Node) -> Array:
+    """`{ at_mm = [x, y, z], turn_deg = [rx, ry, rz] }` as (4, 4), [m]."""
+    keys = node.fields(("at_mm",), ("turn_deg",))
+    at, turn = keys["at_mm"].numbers(3), keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
+    if np.abs(at).max() > LARGEST_MM:
+        keys["at_mm"].fail(f"three lengths from -{LARGEST_MM:g} to {LARGEST_MM:g} mm are needed")
+    if np.abs(turn).max() > 360:
+        keys["turn_deg"].fail("three angles from -360 to 360 degrees are needed")
+    return pose.at(1e-3 * at, turn)
+
+
+def read_axis(node: Node) -> Array:
+    """`"x"`, `"+x"`, `"-x"` ... or three numbers, as a unit vector (3,)."""
+    if isinstance(node.value, str):
+        if node.value not in AXES:
+            node.fail("an axis is needed: x, y, z with or without a sign, or three numbers")
+        return AXES[node.value] * np.eye(3)["xyz".index(node.value[-1])]
+    vector = node.numbers(3)
+    length = float(np.linalg.norm(vector / max(1.0, np.abs(vector).max())))
+    if length < 1e-9:
+        node.fail("an axis is needed: x, y, z with or without a sign, or three numbers that are not all zero")
+    return vector / np.linalg.norm(vector)
+
+
+def read_span(node: Node, low: float, high: float) -> tuple[float, float]:
+    """`[lowest, highest]` within bounds."""
+    a, b = node.numbers(2)
+    if not low <= a <= b <= high:
+        node.fail(f"a lowest and a highest number between {low:g} and {high:g} are needed")
+    return float(a), float(b)

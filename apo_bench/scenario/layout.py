@@ -1,0 +1,69 @@
+"""The truth of a trial: where a seed puts the assembly, and how far it shifts what no contact fixes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from apo_bench.assembly.goals import Layout
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.solid import extent
+from apo_bench.scenario.scenario import Scenario
+
+
+def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: float | None = None) -> Layout:
+    """A consistent layout: every contact of the scenario stays closed.
+
+    Uniform draws in this order: x, y and yaw of the site, then one for each shift of the scenario. Parts start where
+    the scenario says, in the world; only fixed parts that follow the site move with it.
+
+    Args:
+        clearance_mm: Of the parts that are used (none: the scenario's): a part that stands on a fit face at its start
+            stands that much lower.
+    """
+    site, unit = scenario.site, rng.uniform(-1.0, 1.0, size=3 + len(scenario.shifts))
+    x, y = np.asarray(site.center_m) + unit[:2] * site.spread_m
+    yaw = _between(*site.yaw_rad, unit[2])
+    shifts = [_between(shift.low_m, shift.high_m, u) for shift, u in zip(scenario.shifts, unit[3:], strict=True)]
+    return layout_at(scenario, x, y, yaw, shifts, scenario.clearance_mm if clearance_mm is None else clearance_mm)
+
+
+def layout_at(
+    scenario: Scenario,
+    x_m: float,
+    y_m: float,
+    yaw_rad: float,
+    shifts_m: Sequence[float] | None = None,
+    clearance_mm: float = 0.0,
+) -> Layout:
+    """The layout with the assembly at (x, y), turned by yaw about the vertical, and given shifts (none: all zero).
+
+    Without a clearance it is that of the nominal parts.
+
+    Goals are T_world_assembly T_assembly_part, each shifted along its axis in the frame of its own part.
+    """
+    T_world_assembly = pose.at((x_m, y_m, 0.0), (0.0, 0.0, np.degrees(yaw_rad)))
+    goals = T_world_assembly @ scenario.goals
+    lengths = [0.0] * len(scenario.shifts) if shifts_m is None else shifts_m
+    for shift, length in zip(scenario.shifts, lengths, strict=True):
+        goals[shift.operation] = goals[shift.operation] @ pose.at(length * shift.axis)
+    start = {part: T_world_assembly @ T if part in scenario.follows_site else T for part, T in scenario.start.items()}
+    return Layout(goals, {part: _at_rest(scenario, part, T, 1e-3 * clearance_mm) for part, T in start.items()})
+
+
+def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Array:
+    """The start of the physical part: let down until its lowest point is where the nominal one was."""
+    solid = scenario.assembly.solids[part]
+    if part in scenario.assembly.fixed or clearance_m == 0.0 or not any(face.fit for face in solid.faces.values()):
+        return T
+    lowered = np.array(T)
+    lowered[2, 3] -= extent(physical_boxes(solid, clearance_m), T[2, :3])[0] - extent(solid.boxes, T[2, :3])[0]
+    return lowered
+
+
+def _between(low: float, high: float, unit: float) -> float:
+    """The point of an interval that stands for `unit` in -1..1."""
+    return 0.5 * (low + high) + 0.5 * (high - low) * unit

@@ -1,0 +1,92 @@
+"""Whether the operations of a scenario follow from each other: what is carried hangs together, nothing goes twice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact, Operation
+from apo_bench.errors import InputError
+
+SAME = 1e-9
+"""Poses that differ by less, [m] and unitless, are one and the same."""
+
+
+def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> None:
+    """Check what is carried and what is moved again.
+
+    Args:
+        stages: Where every part stands before the first operation and after each.
+
+    Raises:
+        InputError: The first thing found wrong.
+    """
+    for k, operation in enumerate(assembly.operations):
+        loose = _loose(assembly, k)
+        if loose is not None:
+            raise InputError(
+                f"{file}, operation {k + 1}, carries: '{loose}' is carried, but no contact that stands at that time "
+                f"connects it with '{operation.main}', not even through another carried part; leave it out, or let an "
+                "earlier operation make that contact."
+            )
+        if np.abs(stages[k + 1][operation.main] - stages[k][operation.main]).max() < SAME:
+            raise InputError(
+                f"{file}, operation {k + 1}, goal: '{operation.main}' stands there already; give another goal, or take "
+                "this operation out."
+            )
+        earlier = _put_aside_before(assembly, k)
+        if earlier is not None:
+            raise InputError(
+                f"{file}, operation {k + 1}, move: operation {earlier + 1} has already taken '{operation.main}' away, "
+                "and nothing is put against it after that; take one of the two operations out."
+            )
+        left = _left_in_the_air(assembly, k)
+        if left is not None:
+            raise InputError(
+                f"{file}, operation {k + 1}, carries: after it '{left}' rests on nothing that a contact names; "
+                "carry it along, or move it first."
+            )
+
+
+def _left_in_the_air(assembly: Assembly, k: int) -> str | None:
+    """A part that was put down before and, after operation k, has no contact left."""
+    put = {part for operation in assembly.operations[: k + 1] for part in operation.moves}
+    known = assembly.first(k + 1)
+    held = {part for relation in known.relations() if relation.lost is None for part in _ends(relation.contact)}
+    return next((part for part in assembly.solids if part in put - held), None)
+
+
+def _loose(assembly: Assembly, k: int) -> str | None:
+    """A part that operation k carries and that does not hang together with its main part."""
+    operation = assembly.operations[k]
+    standing = [_ends(relation.contact) for relation in assembly.first(k).relations() if relation.lost is None]
+    together = {operation.main}
+    for _ in operation.carries:
+        together |= {part for ends in standing if ends & together for part in ends & {*operation.carries}}
+    return next((part for part in operation.carries if part not in together), None)
+
+
+def _ends(contact: Contact) -> set[str]:
+    return {contact.manipulated.part, contact.environment.part}
+
+
+def _put_aside_before(assembly: Assembly, k: int) -> int | None:
+    """The operation that had already put aside what operation k puts aside."""
+    main = assembly.operations[k].main
+    last = max((j for j in range(k) if main in assembly.operations[j].moves), default=None)
+    if last is None or not (_puts_aside(assembly, last, main) and _puts_aside(assembly, k, main)):
+        return None
+    return last
+
+
+def _puts_aside(assembly: Assembly, k: int, part: str) -> bool:
+    """Whether operation k only moves a part away: not for the first time, alone, and nothing meets it afterwards."""
+    operation = assembly.operations[k]
+    again = any(part in earlier.moves for earlier in assembly.operations[:k])
+    alone = operation.moves == (part,) and _met(operation) <= assembly.fixed
+    return again and alone and not any(part in _met(later) for later in assembly.operations[k + 1 :])
+
+
+def _met(operation: Operation) -> set[str]:
+    """The parts that are touched or taken along."""
+    return {contact.environment.part for contact in operation.contacts} | {*operation.carries}

@@ -1,0 +1,129 @@
+"""A scenario: one demonstration as a recipe. Files are read by `apo_bench.scenario.file`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses, frozen_poses
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
+from apo_bench.insertion.line import Attach
+from apo_bench.records.thresholds import Meaning, Thresholds
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """Where the gripper holds the main part, from above."""
+
+    point: Array
+    """Centre between the fingertips, (3,), part frame, [m]."""
+    across: Array
+    """Unit vector along which the fingers close, (3,), part frame, horizontal when the part stands at its start."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", frozen(self.point, 3))
+        object.__setattr__(self, "across", frozen(self.across, 3))
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """How far the truth of an operation may vary along a direction that no contact fixes."""
+
+    operation: int
+    """Counted from 0."""
+    axis: Array
+    """Unit vector, (3,), in the frame of the main part at its goal."""
+    low_m: float
+    high_m: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", frozen(self.axis, 3))
+
+
+@final
+@dataclass(frozen=True)
+class Site:
+    """Where the assembly may stand: a rigid planar pose, drawn uniformly per seed."""
+
+    center_m: tuple[float, float] = (0.0, 0.0)
+    spread_m: tuple[float, float] = (0.0, 0.0)
+    """Half widths."""
+    yaw_rad: tuple[float, float] = (0.0, 0.0)
+    """Lowest and highest turn about the vertical."""
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Carelessness:
+    """What the human gets wrong: an offset of random sign, its size uniform between two bounds."""
+
+    operation: int
+    """Counted from 0."""
+    axis: Array
+    """Unit vector, (3,), in the frame of the main part at its goal."""
+    low_m: float
+    high_m: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", frozen(self.axis, 3))
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square of the offset: E x^2 of a uniform size is (a^2 + ab + b^2) / 3."""
+        a, b = self.low_m, self.high_m
+        return float(np.sqrt((a * a + a * b + b * b) / 3.0))
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """One demonstration: topology, nominal goals, and how its truth and its human vary."""
+
+    name: str
+    title: str
+    paper: str
+    """Where it stands in the paper."""
+    human: str
+    """What the human does and gets wrong, in words."""
+    success: str
+    """When it is right, in words."""
+    assembly: Assembly
+    part_files: Mapping[str, Path]
+    colors: Mapping[str, tuple[float, float, float]]
+    start: Poses
+    """Where every part stands before the demonstration; fixed parts stay there. World frame."""
+    goals: Array
+    """(n, 4, 4): the nominal goals, consistent with every contact; frame of the assembly."""
+    attach: tuple[Attach, ...]
+    """The line of every operation, stated or found (`apo_bench.scenario.attach`)."""
+    grasps: tuple[Grasp, ...]
+    site: Site
+    shifts: tuple[Shift, ...]
+    careless: Carelessness | None
+    thresholds: Thresholds
+    clearance_mm: float
+    gap_mm: float
+    """Largest |e| at which the contact equations count as solved."""
+    success_means: Meaning = "assembled"
+    """What the judge calls a success: that the finished assembly is right, or that it was made as demonstrated."""
+    follows_site: frozenset[str] = frozenset()
+    """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "goals", frozen(self.goals, len(self.assembly), 4, 4))
+        object.__setattr__(self, "start", frozen_poses(self.start))
+        object.__setattr__(self, "part_files", MappingProxyType(dict(self.part_files)))
+        object.__setattr__(self, "colors", MappingProxyType(dict(self.colors)))

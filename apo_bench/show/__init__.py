@@ -1,0 +1,1 @@
+"""Pictures and words about one plan, one part, one noise model."""

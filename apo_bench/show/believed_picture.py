@@ -1,0 +1,129 @@
+"""What is believed after a step, drawn: the parts where the motion parameters put them (Fig. 9, 13 and 16)."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.graph import arc_residuals, relation_graph
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.solid import extent
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.show.explain_text import listed
+
+WIDTH, HEIGHT, LINE_PX = 620, 480, 20
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
+MOST_LINES, LETTERS = 6, 86
+
+
+class Belief(NamedTuple):
+    """A panel: where the motion parameters put the parts, and which contacts are not right then."""
+
+    title: str
+    poses: Poses
+    gap_m: float
+    """The largest |e| of all contacts."""
+    open: tuple[str, ...]
+    """`R4 stick -> castle2: 1.31 mm`, the worst first; then `R1 castle1 -> table: beside it`, of faces that stand and
+    cover nothing of each other."""
+    warning: str = ""
+    """What else is wrong with it: what the test says, and the failure that is foretold."""
+
+
+def belief(title: str, seen: Observation, goals: Array, step: int, warning: str = "") -> Belief:
+    """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
+    graph = relation_graph(seen.assembly, step)
+    residuals = arc_residuals(seen.assembly, seen.start, goals, graph)
+    found = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
+    wrong = tuple(
+        f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}" for e, arc in found if e > seen.gap_m
+    )
+    poses = placed(seen.assembly.first(step), seen.start, goals[:step])[-1]
+    standing = [arc for arc in graph.arcs if arc.lost is None]
+    beside = tuple(f"{arc}: beside it" for arc in standing if not _covered(seen.assembly, arc.contacts, poses))
+    return Belief(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
+
+
+def _covered(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> bool:
+    """Whether the faces of every contact lie over each other somewhere."""
+    ends = [((assembly.face(end), poses[end.part]) for end in contact) for contact in contacts]
+    return all(overlap(*a, *b).area > 0.0 for a, b in ends)
+
+
+def belief_lines(beliefs: Sequence[Belief]) -> list[str]:
+    """A sentence for each: `as seen: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
+    return [
+        f"{b.title}: largest gap {1e3 * b.gap_m:.3f} mm; "
+        + (f"open: {', '.join(b.open)}" if b.open else "all hold")
+        + (f"; {b.warning}" if b.warning else "")
+        for b in beliefs
+    ]
+
+
+def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: str | Path) -> None:
+    """Write the panels beside each other, from one point of view, as PNG.
+
+    Raises:
+        InputError: There is nothing to draw with, or the file cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    from apo_bench.simulation.scene.render import picture
+    from apo_bench.simulation.scene.scene import build_scene
+
+    scene = build_scene(scenario)
+    last = scenario.assembly.operations[step - 1]
+    near = dict.fromkeys([*last.moves, *(c.environment.part for c in last.contacts)])
+    camera = _camera(scenario, beliefs[0].poses, tuple(part for part in near if part not in scenario.assembly.fixed))
+    lines = max(len(_below(b)) for b in beliefs) + 1
+    below, width = LINE_PX * lines + 8, WIDTH * len(beliefs)
+    height = HEIGHT + below + 56
+    figure = Figure(figsize=(width / 100, height / 100))
+    what = listed([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"
+    figure.text(0.5, 1 - 16 / height, f"{scenario.name}, believed after {'operation' if step == 1 else 'operations'} "
+                f"{what}", ha="center", va="center", fontsize=12)  # fmt: skip
+    for i, one in enumerate(beliefs):
+        axes = figure.add_axes((i / len(beliefs), below / height, 1 / len(beliefs), HEIGHT / height))
+        axes.imshow(picture(scene, one.poses, WIDTH, HEIGHT, camera))
+        axes.axis("off")
+        figure.text((i + 0.5) / len(beliefs), 1 - 42 / height, one.title, ha="center", va="center", fontsize=11)
+        for j, line in enumerate(_below(one)):
+            figure.text(
+                (i + 0.03) / len(beliefs), (below - LINE_PX * (j + 0.8)) / height, line, va="center", fontsize=9.5
+            )
+    try:
+        figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{out} cannot be written ({error.strerror}); choose another place.") from error
+
+
+def _below(one: Belief) -> list[str]:
+    """The lines below a panel."""
+    warning = textwrap.wrap(one.warning, LETTERS)
+    if not one.open:
+        return [f"every contact holds: largest gap {1e3 * one.gap_m:.3f} mm", *warning]
+    shown = [f"contacts that do not hold: {one.open[0]}", *one.open[1 : MOST_LINES - 1]]
+    left = len(one.open) - len(shown)
+    return [*shown, *([f"and {left} more"] if left else []), *warning]
+
+
+def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
+    """One that sees what the last operation was about, obliquely to the assembly."""
+    from apo_bench.simulation.scene.render import view
+
+    boxes = {part: scenario.assembly.solids[part].boxes for part in parts}
+    ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
+    at = np.array([poses[part][:3, 3] for part in parts])
+    low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+    first = poses[scenario.assembly.operations[0].main]
+    azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + AZIMUTH_DEG
+    return view((low + high) / 2, NEAREST_M + FARTHER * float(np.linalg.norm(high - low)), azimuth, ELEVATION_DEG)

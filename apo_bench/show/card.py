@@ -1,0 +1,159 @@
+"""The task card of a scenario, in Markdown: everything in it is read off the scenario, nothing is said twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from apo_bench.assembly.goals import Layout
+from apo_bench.assembly.graph import Arc, Graph, relation_graph
+from apo_bench.assembly.placement import placed
+from apo_bench.geometry.arrays import Array
+from apo_bench.judging.finished import fixtures
+from apo_bench.scenario.human_error import NOTHING_M, spread
+from apo_bench.scenario.scenario import Carelessness, Scenario
+
+OPPOSITE = 0.99
+"""Normals whose cosine is below minus this look at each other; a face whose normal is as upright is level."""
+
+
+def cards(scenarios: Sequence[Scenario], command: str, picture: str) -> str:
+    """A page with the cards of all, written by `command`; `picture` is the path of a graph with `{}` for the name."""
+    lines = [f"<!-- Written by `{command}`; change the scenarios, not this page. -->", "", "# Scenarios", ""]
+    lines += [f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios]
+    lines += ["", "What is asked for under *Success*: [the two verdicts](verdict.md)."]
+    for s in scenarios:
+        head, _, rest = card(s, 2).partition("\n\n")
+        shown = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"
+        lines += ["", f'<a id="{s.name}"></a>', "", head, "", shown, "", rest.rstrip("\n")]
+    return "\n".join(lines) + "\n"
+
+
+def card(scenario: Scenario, level: int = 1) -> str:
+    """The card of a scenario under a heading of that level."""
+    mark, graph = "#" * level, relation_graph(scenario.assembly)
+    parts = [f"{mark} {scenario.name}: {scenario.title}"]
+    if scenario.paper:
+        parts.append(f"In the paper: {scenario.paper}.")
+    parts += [
+        f"{mark}# Parts\n\n" + _list(_parts(scenario)),
+        f"{mark}# Operations\n\n" + "\n".join(_operations(scenario, graph)),
+        f"{mark}# The human\n\n" + _list(_human(scenario)),
+        f"{mark}# What varies\n\n" + _list(_varies(scenario)),
+        f"{mark}# Success\n\n" + _list(_success(scenario)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _list(lines: Iterable[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)
+
+
+def _parts(scenario: Scenario) -> Iterator[str]:
+    for name, path in scenario.part_files.items():
+        kind = "" if path.stem == name else f" ({path.stem})"
+        yield f"{name}{kind}{', fixed' if name in scenario.assembly.fixed else ''}"
+
+
+def _operations(scenario: Scenario, graph: Graph) -> Iterator[str]:
+    """`5. stick into cube2 and cube3: R6 stick -> cube2 (py-hpy, ...), R7 ...; loses R2`."""
+    for k, operation in enumerate(scenario.assembly.operations):
+        made = [arc for arc in graph.arcs if arc.made == k]
+        lost = [arc.name for arc in graph.arcs if arc.lost == k]
+        carrying = f", carrying {_and(operation.carries)}," if operation.carries else ""
+        where = _where(scenario, made)
+        relations = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in made) or "no contact"
+        loses = f"; loses {', '.join(lost)}" if lost else ""
+        yield f"{k + 1}. {operation.main}{carrying}{f' {where}' if where else ''}: {relations}{loses}"
+
+
+def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
+    """`onto table and against cube`."""
+    ends = dict.fromkeys((_way(scenario, arc), arc.environment.part) for arc in made)
+    ways = groupby(ends, key=lambda end: end[0])
+    return _and([f"{way} {_and([part for _, part in found])}" for way, found in ways])
+
+
+def _way(scenario: Scenario, arc: Arc) -> str:
+    """`into` between faces that look at each other, `against` upright ones, `onto` others."""
+    poses = placed(scenario.assembly, scenario.start, scenario.goals)[arc.made]
+    part = arc.manipulated.part
+    N = np.array([scenario.assembly.face(c.manipulated).normal for c in arc.contacts]) @ poses[part][:3, :3].T
+    if (N @ N.T).min() < -OPPOSITE:
+        return "into"
+    return "against" if np.abs(N[:, 2]).max() < 1 - OPPOSITE else "onto"
+
+
+def _human(scenario: Scenario) -> Iterator[str]:
+    if scenario.human:
+        yield scenario.human
+    how = scenario.careless
+    if how is None:
+        yield "No carelessness is drawn."
+        return
+    main = scenario.assembly.operations[how.operation].main
+    yield (
+        f"At `careless` 1, operation {how.operation + 1} puts {main} {_span(how.low_m, how.high_m)} mm aside along "
+        f"{_axis(how.axis)}, to either side{_followers(scenario, how)}; "
+        "what is wrong is mended at the last operation, unseen."
+    )
+
+
+def _followers(scenario: Scenario, how: Carelessness) -> str:
+    """The operations that an error leads astray, being guided by a displaced face."""
+    offsets = spread(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
+    led = [k for k in np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M) if k != how.operation]
+    words = [f"{scenario.assembly.operations[k].main} (operation {k + 1})" for k in led]
+    return f"; {_and(words)} {'follow' if len(words) > 1 else 'follows'}" if words else ""
+
+
+def _varies(scenario: Scenario) -> Iterator[str]:
+    site = scenario.site
+    x, y = (f"{c * 1e3:g} ± {s * 1e3:g}" for c, s in zip(site.center_m, site.spread_m, strict=True))
+    low, high = np.degrees(site.yaw_rad)
+    yield f"Where the assembly stands: x {x} mm, y {y} mm, turned by {low:g} to {high:g} degrees."
+    for shift in scenario.shifts:
+        main = scenario.assembly.operations[shift.operation].main
+        span = _span(shift.low_m, shift.high_m)
+        yield f"Operation {shift.operation + 1}: {main} by {span} mm along {_axis(shift.axis)}."
+
+
+def _success(scenario: Scenario) -> Iterator[str]:
+    t, clearance = scenario.thresholds, scenario.clearance_mm
+    if scenario.success:
+        yield scenario.success
+    yield (
+        f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
+        f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
+        f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
+        f"another, no corner of a part more than {t.pushed_mm:g} mm from where it was put; all let go of and slower "
+        f"than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
+    )
+    away = sorted(fixtures(scenario.assembly))
+    if away:
+        yield f"Where {_and(away)} ends is free: it is a fixture, used and put away."
+    yield (
+        "As demonstrated: the same, and every contact also when it was made, where it was shown; no part in place "
+        "pushed on the way." + (" Here only that is a success." if scenario.success_means != "assembled" else "")
+    )
+    yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
+    yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."
+
+
+def _span(low_m: float, high_m: float) -> str:
+    return f"{low_m * 1e3:g} to {high_m * 1e3:g}"
+
+
+def _axis(axis: Array) -> str:
+    """`its x axis`, of the part at its goal."""
+    i = int(np.argmax(np.abs(axis)))
+    if abs(axis[i]) > 1 - 1e-9:
+        return f"its {'-' if axis[i] < 0 else ''}{'xyz'[i]} axis"
+    return f"its direction ({', '.join(f'{a:.3g}' for a in axis)})"
+
+
+def _and(words: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -1,0 +1,174 @@
+"""A correction in words and tables for people, and as one JSON object."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.goals import Consistency, Correction, Observation
+from apo_bench.correction.explain import Explanation
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.show.explain_text import covariance_form, explanation_form, sentences, total
+
+CORRECTION = "apo-bench/correction/1"
+TOO_GOOD = 1e-6
+"""A p-value nearer to 1 happens to nobody whose noise is what was stated, ..."""
+TESTED = 3
+"""... if at least so many degrees of freedom are tested."""
+
+
+def correction_lines(seen: Observation, made: Correction, found: Explanation | None) -> list[tuple[str, str]]:
+    """How it ended, the gaps, the test, what is free: name and text of each line."""
+    lines = [("ended", f"{'' if made.ok else f'{made.status}: '}{made.sentence}")]
+    lines.append(("contact gap", _gaps(made)))
+    if made.test is not None:
+        lines.append(("test", _test(made.test, made.status == "inconsistent")))
+    if made.dropped:
+        lines.append(("left out", ", ".join(made.dropped)))
+    if made.test_after is not None:
+        lines.append(("test without", _test(made.test_after, made.status == "inconsistent")))
+    if found is not None:
+        lines.append(("contacts", total(found)))
+        lines += [("" if i else "free", sentence) for i, sentence in enumerate(sentences(found))]
+    return lines
+
+
+def pose_table(seen: Observation, made: Correction) -> Any:
+    """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
+    from rich.table import Table
+
+    found = Table("", "part", box=None, pad_edge=False)
+    for name in ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg"):
+        found.add_column(name, justify="right")
+    moved = _moved(seen, made)
+    for k, operation in enumerate(seen.assembly.operations):
+        packed = pose.pack(made.goals[k])
+        places = (*(_short(x, 3) for x in packed[:3] * 1e3), *(_short(q, 6) for q in packed[3:]))
+        found.add_row(str(k + 1), operation.main, *places, *(f"{x:.3f}" for x in moved[k]))
+    return found
+
+
+def suspect_table(test: Consistency) -> Any:
+    """Every relation, and how well the rest fits without it, as a table of `rich`."""
+    from rich.table import Table
+
+    found = Table("without", "made", "contacts", box=None, pad_edge=False)
+    for name in ("chi-square", "of", "p"):
+        found.add_column(name, justify="right")
+    found.add_column("")
+    for suspect in test.suspects:
+        contacts = ", ".join(map(str, suspect.contacts))
+        numbers = (f"{suspect.chi_square:.1f}", str(suspect.freedom), f"{suspect.p_value:.2g}")
+        verdict = "may be wrong" if suspect in test.ambiguous else ""
+        found.add_row(suspect.relation, str(suspect.made + 1), contacts, *numbers, verdict)
+    return found
+
+
+def correction_form(
+    scenario: str, method: str, seen: Observation, made: Correction, found: Explanation | None, assumed: bool
+) -> dict[str, Any]:
+    """What `json` can write: mm, degrees, wxyz, operations from 1; poses only of a correction that converged."""
+    return {
+        "schema": CORRECTION,
+        "scenario": scenario,
+        "method": method,
+        "status": made.status,
+        "sentence": made.sentence,
+        "gap_before_mm": _number(made.gap_before_m * 1e3),
+        "gap_after_mm": _number(made.gap_after_m * 1e3) if made.ok else None,
+        "rank": made.rank,
+        "freedom": None if found is None else found.freedom,
+        "deviations_assumed": assumed,
+        "operations": _operations_form(seen, made) if made.ok else None,
+        "test": None if made.test is None else _test_form(made.test),
+        "test_after": None if made.test_after is None else _test_form(made.test_after),
+        "dropped": list(made.dropped),
+        "explanation": None if found is None else explanation_form(scenario, found),
+    }
+
+
+def _gaps(made: Correction) -> str:
+    """The largest gap before and, of a correction that converged, after."""
+    said = f"{made.gap_before_m * 1e3:.3f} mm as seen"
+    if not made.ok:
+        return said
+    of = ", relations that were left out counted too" if made.dropped else ""
+    return f"{said}, {made.gap_after_m * 1e3:.3f} mm corrected{of}"
+
+
+def _test(test: Consistency, contradictory: bool) -> str:
+    said = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
+    if test.passes and contradictory:
+        return f"{said}, but the contacts contradict each other"
+    if test.passes and test.p_value > 1.0 - TOO_GOOD and test.freedom >= TESTED:
+        return f"{said}: the stated noise is far larger than what was seen; are the units right?"
+    if test.passes:
+        return f"{said}: explained by the stated noise"
+    named = [suspect.relation for suspect in test.ambiguous]
+    who = f"; {'one of ' * (len(named) > 1)}{', '.join(named)} may be wrong" if named else ""
+    if contradictory:
+        return f"{said}: the contacts contradict each other{who}"
+    return f"{said}: longer than the stated noise explains{who}"
+
+
+def shown_p(p: float, level: float) -> str:
+    """Two digits, or as many as it takes to see on which side of the level it is."""
+    texts = (f"{p:.{digits}g}" for digits in range(2, 18))
+    return next(text for text in texts if (float(text) >= level) == (p >= level))
+
+
+def _moved(seen: Observation, made: Correction) -> Array:
+    """How far each goal was moved and turned, (n, 2), [mm, degrees]."""
+    D = pose.inverse(seen.goals) @ made.goals
+    turned = np.linalg.norm(pose.log(D)[..., 3:], axis=-1)
+    return np.column_stack([np.linalg.norm(D[..., :3, 3], axis=-1) * 1e3, np.degrees(turned)])
+
+
+def _operations_form(seen: Observation, made: Correction) -> list[dict[str, Any]]:
+    packed, moved = pose.pack(made.goals), _moved(seen, made)
+    return [
+        {
+            "operation": k + 1,
+            "part": operation.main,
+            "position_mm": (packed[k, :3] * 1e3).tolist(),
+            "quaternion_wxyz": packed[k, 3:].tolist(),
+            "moved_mm": float(moved[k, 0]),
+            "turned_deg": float(moved[k, 1]),
+            "covariance_mm_deg": None if made.covariance is None else covariance_form(made.covariance[k]),
+        }
+        for k, operation in enumerate(seen.assembly.operations)
+    ]
+
+
+def _test_form(test: Consistency) -> dict[str, Any]:
+    return {
+        "chi_square": _number(test.chi_square),
+        "freedom": test.freedom,
+        "p_value": test.p_value,
+        "level": test.level,
+        "passes": test.passes,
+        "suspects": [
+            {
+                "relation": suspect.relation,
+                "made": suspect.made + 1,
+                "contacts": list(map(str, suspect.contacts)),
+                "chi_square": _number(suspect.chi_square),
+                "freedom": suspect.freedom,
+                "p_value": suspect.p_value,
+            }
+            for suspect in test.suspects
+        ],
+        "ambiguous": [suspect.relation for suspect in test.ambiguous],
+    }
+
+
+def _short(x: float, digits: int) -> str:
+    """No `-0.000`."""
+    return f"{round(float(x), digits) + 0.0:.{digits}f}"
+
+
+def _number(x: float) -> float | None:
+    """JSON knows no infinity."""
+    return float(x) if np.isfinite(x) else None

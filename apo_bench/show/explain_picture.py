@@ -1,0 +1,161 @@
+"""The free directions of every part, drawn as arrows on the finished assembly, with a sentence for each below."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.correction.directions import Direction
+from apo_bench.correction.explain import Determined, Explanation
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid, extent
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.show.explain_text import listed, size, the
+
+WIDTH, HEIGHT = 900, 540
+LINE_PX = 21
+ARROW_M, AWAY_M = 0.038, 0.006
+"""Length of an arrow, and how far from its part it begins."""
+GRAY = (0.45, 0.45, 0.45)
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.12, 1.0, 230.0, -33.0
+LOW = 0.3
+"""How high on its part a ring lies, from its lower end along the axis."""
+SHADE = 0.8
+"""Arrows are that much darker than their part."""
+
+
+class _Drawn(NamedTuple):
+    """A part, where it stands at the end, and what is free of the operation that last put it down by itself."""
+
+    solid: Solid
+    pose: Array
+    color: tuple[float, float, float]
+    operation: Determined
+
+
+def draw_explanation(scenario: Scenario, seen: Observation, found: Explanation, out: str | Path) -> None:
+    """Write a PNG picture.
+
+    Raises:
+        InputError: There is nothing to draw with, or the file cannot be written.
+    """
+    from apo_bench.simulation.scene.marks import Marks, pixels
+    from apo_bench.simulation.scene.render import picture, view
+    from apo_bench.simulation.scene.scene import build_scene
+
+    drawn, scene = _parts(scenario, found), build_scene(scenario)
+    low, high = _bounds(drawn)
+    azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + AZIMUTH_DEG
+    middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
+    camera = view(middle, NEAREST_M + FARTHER * float(np.linalg.norm(high - low)), azimuth, ELEVATION_DEG)
+    marks = [mark for one in drawn for mark in _marks(one, -_looking(azimuth))]
+    poses = {**seen.start, **{part.part: part.pose for part in found.parts}}
+    image = picture(scene, poses, WIDTH, HEIGHT, camera, Marks(marks))
+    fovy = float(scene.shown.model.vis.global_.fovy)
+    names = [(mark, pixels(mark.tips, camera, fovy, WIDTH, HEIGHT)) for mark in marks]
+    figure = _captioned(image, scenario, found, drawn)
+    for mark, tips in names:
+        x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
+        _name(figure, mark.name, x, y, mark.color)
+    try:
+        figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{out} cannot be written ({error.strerror}); choose another place.") from error
+
+
+def _parts(scenario: Scenario, found: Explanation) -> list[_Drawn]:
+    own = {o.part: o for o in found.operations}
+    return [
+        _Drawn(scenario.assembly.solids[part.part], part.pose, scenario.colors.get(part.part, GRAY), own[part.part])
+        for part in found.parts
+        if part.part in own
+    ]
+
+
+def _bounds(drawn: list[_Drawn]) -> tuple[Array, Array]:
+    """Lowest and highest corner of all, world frame, [m]."""
+    ends = np.array([[extent(one.solid.boxes, one.pose[i, :3]) for i in range(3)] for one in drawn])
+    at = np.array([one.pose[:3, 3] for one in drawn])
+    return (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+
+
+def _looking(azimuth_deg: float) -> Array:
+    """The horizontal direction in which a camera looks."""
+    a = np.radians(azimuth_deg)
+    return np.array([np.cos(a), np.sin(a), 0.0])
+
+
+def _marks(one: _Drawn, toward: Array) -> list[Any]:
+    return [_mark(one, free.direction, toward) for free in one.operation.free]
+
+
+def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
+    """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
+    from apo_bench.simulation.scene.marks import Shift, Turn
+
+    R, middle = one.pose[:3, :3], one.solid.bounds.mean(axis=0)
+    r, g, b = one.color
+    color = (SHADE * r, SHADE * g, SHADE * b)
+    axis = R @ direction.axis
+    if not direction.turns:
+        reach = extent(one.solid.boxes, direction.axis)[1] - direction.axis @ middle
+        center = R @ middle + one.pose[:3, 3]
+        return Shift(center, axis, reach + AWAY_M, reach + AWAY_M + ARROW_M, color, str(direction))
+    low, high = extent(one.solid.boxes, direction.axis)
+    about = direction.point + (LOW * high + (1 - LOW) * low - direction.point @ direction.axis) * direction.axis
+    across = _across(direction.axis)
+    ends = np.array([extent(one.solid.boxes, v) for v in across]) - (across @ about)[:, None]
+    radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * AWAY_M
+    return Turn(R @ about + one.pose[:3, 3], axis, toward, radius, color, str(direction))
+
+
+def _across(axis: Array) -> Array:
+    """Two unit vectors at right angles to an axis, (2, 3)."""
+    return np.linalg.svd(axis[None])[2][1:]
+
+
+def _captioned(image: Any, scenario: Scenario, found: Explanation, drawn: list[_Drawn]) -> Any:
+    """The picture with its title above and a line for each part below."""
+    from matplotlib.figure import Figure
+
+    below = LINE_PX * (len(drawn) + 1)
+    height = HEIGHT + below + 30
+    figure = Figure(figsize=(WIDTH / 100, height / 100))
+    axes = figure.add_axes((0.0, below / height, 1.0, HEIGHT / height))
+    axes.imshow(image)
+    axes.axis("off")
+    title = f"{scenario.name}: what no contact fixes ({found.freedom} of {6 * len(found.goals)} directions)"
+    figure.text(0.5, 1.0 - 15 / height, title, ha="center", va="center", fontsize=12)
+    for i, one in enumerate(drawn):
+        y = (below - LINE_PX * (i + 0.8)) / height
+        figure.text(0.02, y, "\u25a0", color=one.color, fontsize=14, va="center")
+        figure.text(0.045, y, _line(found, one.operation), va="center", fontsize=10)
+    return figure
+
+
+def _name(figure: Any, name: str, x: float, y: float, color: tuple[float, float, float]) -> None:
+    """Write the name of a direction where its arrow ends, (x, y) in pixels of the picture."""
+    from matplotlib.patheffects import withStroke
+
+    axes = figure.axes[0]
+    shade = tuple(0.75 * c for c in color)
+    axes.text(
+        x, y, name, color=shade, fontsize=13, weight="bold", ha="center", va="center",
+        path_effects=[withStroke(linewidth=3.5, foreground="white")],
+    )  # fmt: skip
+
+
+def _line(found: Explanation, o: Determined) -> str:
+    """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
+    together: dict[tuple[int, ...], list[str]] = {}
+    for free in o.free:
+        together.setdefault(free.along, []).append(f"{free.direction} ({size(free)})")
+    said = []
+    for along, words in together.items():
+        others = dict.fromkeys(the(found.operations[j].part) for j in along)
+        said.append(f"{listed(words)} free{f' with {listed(others)}' if others else ''}")
+    return f"{o.part}: {'; '.join([*said, f'{listed(o.fixed)} fixed'] if o.fixed else said)}"

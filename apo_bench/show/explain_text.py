@@ -1,0 +1,199 @@
+"""What the contacts determine, in sentences and tables for people, and as one JSON object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.topology import spelled
+from apo_bench.correction.directions import SHIFTS, TURNS
+from apo_bench.correction.explain import Determined, Explanation, Free, Standing
+from apo_bench.correction.holding import Hold
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+EXPLANATION = "apo-bench/explanation/1"
+TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
+_OFF_M = 1e-6
+"""A turn is said to be about a point only if that is farther from the origin of the part."""
+
+
+def total(found: Explanation) -> str:
+    """`the contacts fix 13 of 18 directions; 5 are free and 14 equations redundant`."""
+    return (
+        f"the contacts fix {found.rank} of {6 * len(found.goals)} directions; {found.freedom} are free "
+        f"and {found.redundant} of {found.rank + found.redundant} equations redundant"
+    )
+
+
+def sentences(found: Explanation) -> list[str]:
+    """One for each operation: what is fixed by which parts, and what is free."""
+    return [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(found, o.free)}" for o in found.operations]
+
+
+def explanation_tables(found: Explanation) -> list[Any]:
+    """What holds each operation, and how well every part is known at the end, as tables of `rich`."""
+    from rich.table import Table
+
+    operations = Table("", "operation", "fixed", "free", "through", "agrees", box=None, pad_edge=False)
+    for o in found.operations:
+        through, agreeing = ("\n".join(map(_hold, some)) or "-" for some in (o.through, o.agreeing))
+        free = "\n".join(map(_free, o.free)) or "-"
+        operations.add_row(str(o.operation + 1), o.part, f"{o.rank} of 6", free, through, agreeing)
+    parts = Table("at the end", "pose", "fixed", box=None, pad_edge=False)
+    for name in (*(f"{name} mm" for name in SHIFTS), *(f"{name} deg" for name in TURNS)):
+        parts.add_column(name, justify="right")
+    for part in found.parts:
+        deviations = [f"{x:.2f}" for x in part.deviations * TO_MM_DEG]
+        parts.add_row(part.part, spelled(part.odl), f"{part.rank} of 6", *deviations)
+    return [operations, parts]
+
+
+def explanation_form(scenario: str, found: Explanation) -> dict[str, Any]:
+    """What `json` can write: mm, degrees, operations from 1; a spectral gap of null is infinite."""
+    return {
+        "schema": EXPLANATION,
+        "scenario": scenario,
+        "operations": [_operation_form(found, o) for o in found.operations],
+        "parts": [_part_form(part) for part in found.parts],
+        "rank": found.rank,
+        "freedom": found.freedom,
+        "redundant": found.redundant,
+        "spectral_gap": found.spectral_gap if np.isfinite(found.spectral_gap) else None,
+    }
+
+
+def the(part: str) -> str:
+    """`the stick`, but `castle2` and `A`."""
+    return part if part[-1].isdigit() or part[0].isupper() else f"the {part}"
+
+
+def listed(words: Iterable[str]) -> str:
+    """`x`, `x and y`, `x, y and yaw`."""
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def size(free: Free) -> str:
+    """`1.00 mm` or `0.58 deg`."""
+    return f"{_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
+
+
+def covariance_form(C: Array) -> list[list[float]]:
+    """(6, 6), in mm and degrees."""
+    return (C * np.outer(TO_MM_DEG, TO_MM_DEG)).tolist()
+
+
+def _fixed(o: Determined) -> str:
+    if not o.through:
+        return "nothing is fixed by contacts"
+    others = dict.fromkeys(part for hold in o.through for part in sorted(hold.parts) if part != o.part)
+    names = [hold.relation + ("" if hold.lost is None else f" until operation {hold.lost + 1}") for hold in o.through]
+    agreeing = [hold.relation for hold in o.agreeing]
+    agrees = f"; {listed(agreeing)} agree{'s' * (len(agreeing) == 1)}" if agreeing else ""
+    return f"{', '.join(o.fixed)} fixed by {listed(map(the, others))} ({', '.join(names)}{agrees})"
+
+
+def _loose(found: Explanation, free: Sequence[Free]) -> str:
+    """Free directions, those that go together in one breath."""
+    if not free:
+        return "nothing is free"
+    together: dict[tuple[int, ...], list[Free]] = {}
+    for one in free:
+        together.setdefault(one.along, []).append(one)
+    return "; ".join(_group(found, along, some) for along, some in together.items())
+
+
+def _group(found: Explanation, along: tuple[int, ...], some: list[Free]) -> str:
+    sizes = ", ".join(map(size, some))
+    names = ", ".join(f"{one.direction}{_about(one)}" for one in some)
+    if not along:
+        return f"{names} free, kept as seen, {sizes}"
+    others = dict.fromkeys(found.operations[j].part for j in along)
+    return f"{names} free together with {listed(map(the, others))}, {sizes}"
+
+
+def _about(free: Free) -> str:
+    """The point of a turn, if it is not the origin of the part."""
+    point = free.direction.point
+    if not free.direction.turns or np.abs(point).max() < _OFF_M:
+        return ""
+    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in point)}) mm"
+
+
+def _free(free: Free) -> str:
+    goes = f", with {listed(f'T{j + 1}' for j in free.along)}" if free.along else ""
+    return f"{free.direction}{_about(free)} {size(free)}{goes}"
+
+
+def _hold(hold: Hold) -> str:
+    lost = "" if hold.lost is None else f", lost at {hold.lost + 1}"
+    return f"{hold.relation} {hold.parts[0]} on {hold.parts[1]}, {spelled(hold.word)}{lost}"
+
+
+def _deviation(free: Free) -> float:
+    return float(free.deviation * TO_MM_DEG[3 if free.direction.turns else 0])
+
+
+def _operation_form(found: Explanation, o: Determined) -> dict[str, Any]:
+    return {
+        "operation": o.operation + 1,
+        "part": o.part,
+        "rank": o.rank,
+        "fixed": list(o.fixed),
+        "free": list(_free_forms(o.free, found.goals[o.operation])),
+        "through": [_hold_form(hold) for hold in o.through],
+        "agreeing": [_hold_form(hold) for hold in o.agreeing],
+        "covariance_mm_deg": covariance_form(o.covariance),
+    }
+
+
+def _part_form(part: Standing) -> dict[str, Any]:
+    packed = pose.pack(part.pose)
+    deviations = part.deviations * TO_MM_DEG
+    return {
+        "part": part.part,
+        "placed": part.placed + 1,
+        "odl": spelled(part.odl),
+        "position_mm": (packed[:3] * 1e3).tolist(),
+        "quaternion_wxyz": packed[3:].tolist(),
+        "rank": part.rank,
+        "fixed": list(part.fixed),
+        "free": list(_free_forms(part.free, part.pose)),
+        "deviation_mm": deviations[:3].tolist(),
+        "deviation_deg": deviations[3:].tolist(),
+        "covariance_mm_deg": covariance_form(part.covariance),
+    }
+
+
+def _free_forms(free: Sequence[Free], T: Array) -> Iterator[dict[str, Any]]:
+    """Twists per mm of a shift and per degree of a turn; axes in the frame of the part and in the world."""
+    for one in free:
+        d = one.direction
+        unit = TO_MM_DEG[3 if d.turns else 0]
+        form: dict[str, Any] = {
+            "name": str(d),
+            "twist_mm_deg": (d.twist * TO_MM_DEG / unit).tolist(),
+            "axis": d.axis.tolist(),
+            "axis_world": (T[:3, :3] @ d.axis).tolist(),
+        }
+        if d.turns:
+            form["point_mm"] = (d.point * 1e3).tolist()
+        yield {**form, "deviation_deg" if d.turns else "deviation_mm": _deviation(one), "with": _numbers(one.along)}
+
+
+def _hold_form(hold: Hold) -> dict[str, Any]:
+    return {
+        "relation": hold.relation,
+        "parts": list(hold.parts),
+        "made": hold.made + 1,
+        "lost": None if hold.lost is None else hold.lost + 1,
+        "equation": spelled(hold.word),
+        "operations": _numbers(sorted({term.operation for term in hold.word})),
+    }
+
+
+def _numbers(operations: Iterable[int]) -> list[int]:
+    return [k + 1 for k in operations]

@@ -1,0 +1,105 @@
+"""What the eye sees, stage by stage, one row per operation: picture, range, difference, regions, fitted model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.topology import Assembly
+from apo_bench.depth_camera.distance import struck
+from apo_bench.depth_camera.follow import Event
+from apo_bench.depth_camera.view import View
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.show.eye_one import Seen
+from apo_bench.simulation.sensor.watch import Watched
+
+TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
+APPEARED, VANISHED, OUTLINE = "#1b7837", "#b2182b", "#d95f02"
+AROUND = 20
+"""Pixels around what changed."""
+LARGEST_MM, RESIDUAL_MM = 60.0, 5.0
+
+
+def draw_eye(seen: Seen, out: Path, view: int = 0) -> None:
+    """Draw every operation that was noticed, in one view of the range finder."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    events, assembly = seen.events, seen.shown.demonstration.assembly
+    figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
+    FigureCanvasAgg(figure)
+    rows = figure.subplots(max(1, len(events)), len(TITLES), squeeze=False)
+    for axes, title in zip(rows[0], TITLES, strict=True):
+        axes.set_title(title, fontsize=11)
+    for axes in rows.ravel():
+        axes.set_xticks([])
+        axes.set_yticks([])
+    for row, event in zip(rows, events, strict=False):
+        row[0].set_ylabel(_label(assembly, event), fontsize=9)
+        _draw_row(row, seen.watched, seen.images, event, view)
+    for axes in rows[:, 1:].ravel():
+        _crop(axes, events, view)
+    try:
+        figure.savefig(out, dpi=72)
+    except OSError as error:
+        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+
+
+def _label(assembly: Assembly, event: Event) -> str:
+    moved = ", ".join(sorted(event.moved)) or "nothing"
+    if event.operation is None:
+        return f"{moved}: not expected"
+    if event.found is None:
+        return f"{event.operation + 1}: {moved}, not recognised"
+    return f"{event.operation + 1}: {moved}, {100 * event.found.explained:.0f} % explained"
+
+
+def _crop(axes: Any, events: Sequence[Event], view: int) -> None:
+    """Show only where anything ever changed."""
+    changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
+    if np.any(changed):
+        v, u = np.nonzero(np.any(changed, axis=0))
+        axes.set_xlim(u.min() - AROUND, u.max() + AROUND)
+        axes.set_ylim(v.max() + AROUND, v.min() - AROUND)
+
+
+def _draw_row(row: Any, watched: Watched, images: Sequence[Array], event: Event, view: int) -> None:
+    before, after, regions = images[event.first][view], images[event.last][view], event.regions[view]
+    row[0].imshow(watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
+    row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
+    row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-LARGEST_MM, vmax=LARGEST_MM)
+    row[3].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
+    for mask, color in ((regions.appeared, APPEARED), (regions.vanished, VANISHED)):
+        row[3].imshow(np.where(mask, 1.0, np.nan), cmap=_one_color(color), vmin=0.0, vmax=1.0, alpha=0.8)
+    row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
+    if event.found is not None and event.shape is not None:
+        expected = _expected(watched.finder.views[view], event)
+        seen = regions.appeared & (np.abs(after - expected) < 0.02)
+        drawn = row[4].imshow(
+            np.where(seen, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-RESIDUAL_MM, vmax=RESIDUAL_MM
+        )
+        row[4].contour(np.isfinite(expected), levels=[0.5], colors=OUTLINE, linewidths=1.2)
+        bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)
+        bar.ax.tick_params(labelsize=7)
+        bar.set_label("measured - model [mm]", fontsize=7)
+
+
+def _expected(view: View, event: Event) -> Array:
+    """The range image of the fitted model alone, (height, width), [m]."""
+    assert event.found is not None
+    assert event.shape is not None
+    T = event.found.T
+    origin = pose.apply(pose.inverse(T), view.origin[None])[0]
+    distance, _ = struck(event.shape, origin, view.rays @ T[:3, :3])
+    return distance.reshape(view.height, view.width)
+
+
+def _one_color(color: str) -> Any:
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap([color])

@@ -1,0 +1,193 @@
+"""Pictures of a sample of trials that failed, made by running them again.
+
+A trial is run again only where specification, assets and code are those of its row, by its hash; else the parts are
+drawn where the row says that they ended. So are those of a salted trial whose salt was not given.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.solid import extent
+from apo_bench.io.reading import each_line
+from apo_bench.records.checked import row_of
+from apo_bench.records.key import row_key
+from apo_bench.records.own_code import left_out, own_code
+from apo_bench.records.replay_command import Files
+from apo_bench.records.salt import Salt
+from apo_bench.records.settings import TrialSpec
+from apo_bench.report.failures import FailurePicture, Row
+
+WIDTH, HEIGHT, QUALITY = 640, 480, 82
+NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
+SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
+"""A trial that was run again is the same if these are."""
+
+
+def failure_pictures(
+    chosen: Sequence[Row],
+    folder: Path,
+    files: Files | None = None,
+    salt: Salt | None = None,
+    *,
+    trust_code: bool = False,
+) -> tuple[list[FailurePicture], list[str]]:
+    """The pictures that could be made, and sentences on what could not.
+
+    Args:
+        folder: Of the sweep, whose rows say where parts ended.
+        salt: The one that the trials were drawn with, if any.
+        trust_code: Import code of somebody's own that rows name; else none of it is.
+    """
+    made: list[FailurePicture] = []
+    missed: list[str] = []
+    scenes: dict[tuple[Any, ...], Any] = {}
+    for row in chosen:
+        if not trust_code and own_code(row):
+            missed.append(left_out([row]))
+            continue
+        try:
+            made.append(_made(row, folder, files or {}, scenes, salt))
+        except (InputError, RuntimeError, OSError, ValueError) as error:
+            missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
+            if "no picture can be drawn here" in missed[-1]:
+                break
+    return made, list(dict.fromkeys(missed))
+
+
+def _made(
+    row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any], salt: Salt | None
+) -> FailurePicture:
+    from apo_bench.scenario.file import scenario_names
+    from apo_bench.simulation.scene.render import picture
+    from apo_bench.trial.fingerprint import content_hash, spec_hash
+
+    if row["scenario"] not in files and row["scenario"] not in scenario_names():
+        raise InputError(f"run.json says no file of the scenario '{row['scenario']}'")
+    spec = replace(spec_of(row, files), salt=salt)
+    scene = _scene(spec, scenes)
+    picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    if spec_hash(spec, content) == row.get("spec_hash"):
+        image = _again(row, spec, scene, content)
+        if image is not None:
+            return FailurePicture(row, _jpeg(image), "how the replay ended, run again for this picture")
+    whole = whole_row(folder, row)
+    poses = _poses(whole.get("reached"))
+    if not poses:
+        raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
+    image = picture(scene, poses, WIDTH, HEIGHT, _camera(scene, row, poses))
+    secret = row.get("salt") is not None and salt is None
+    why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
+    return FailurePicture(row, _jpeg(image), f"where the parts ended, as the row says; {why}, so it was not run again")
+
+
+def spec_of(row: Row, files: Files) -> TrialSpec:
+    """The specification of the trial that a row is of."""
+    return TrialSpec(
+        scenario=files.get(row["scenario"], row["scenario"]),
+        level_mm=row["level"],
+        level_deg=row["level_deg"],
+        careless=row["careless"],
+        clearance_mm=row["clearance_mm"],
+        noise=row["noise"],
+        grasp=row["grasp"],
+        arm=row.get("arm", "six_axis"),
+        method=row["method"],
+        seed=row["seed"],
+        timestep_s=row.get("timestep_s", 0.001),
+        relations=row["relations"],
+        eye=row.get("eye", "noise"),
+        fidelity=row.get("fidelity", "full"),
+    )
+
+
+def whole_row(folder: Path, row: Row) -> dict[str, Any]:
+    """The row as it stands in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
+    wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["spec_hash"]).encode())
+    path = folder / "trials.jsonl"
+    for number, line in each_line(path, "table of trials"):
+        if all(part in line for part in wanted):
+            found = row_of(line, f"{path}, line {number}")
+            if row_key(found) == row_key(row):
+                return found
+    return {}
+
+
+def _scene(spec: TrialSpec, scenes: dict[tuple[Any, ...], Any]) -> Any:
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.simulation.scene.scene import build_scene
+
+    key = (spec.scenario, spec.clearance_mm, spec.grasp, spec.arm, spec.timestep_s)
+    if key not in scenes:
+        scenes[key] = build_scene(
+            load_scenario(spec.scenario),
+            clearance_mm=spec.clearance_mm,
+            grasp=spec.grasp,
+            arm=spec.arm,
+            timestep_s=spec.timestep_s,
+        )
+    return scenes[key]
+
+
+def _again(row: Row, spec: TrialSpec, scene: Any, content: str) -> Any:
+    """The last moment of the replay, with the arm; None if it ended in another way."""
+    from apo_bench.simulation.scene.render import picture_with_arm
+    from apo_bench.trial.trial import run_trial
+
+    last: list[Any] = []
+
+    def keep(data: Any) -> None:
+        last[:] = [np.array(data.qpos)]
+
+    done = run_trial(spec, scene, content=content, watch=keep)
+    if not last or any(done.get(name) != row.get(name) for name in SAME):
+        return None
+    poses = _poses(done["reached"]) or {}
+    camera = _camera(scene, row, poses)
+    fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
+    return picture_with_arm(scene, fixed, last[0], WIDTH, HEIGHT, camera)
+
+
+def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:
+    """Part -> (4, 4), world frame, [m], of what a row says in mm."""
+    if not reached:
+        return None
+    return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in reached.items()}
+
+
+def _camera(scene: Any, row: Row, poses: Poses) -> Any:
+    """One that sees what failed: the parts of the operation, else all that were assembled."""
+    from apo_bench.simulation.scene.render import view
+
+    assembly = scene.scenario.assembly
+    k = row.get("failure_operation")
+    asked = assembly.operations if k is None else assembly.operations[k - 1 : k]
+    near = {part for o in asked for part in (*o.moves, *(c.environment.part for c in o.contacts))}
+    parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
+    if not parts:
+        return view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, AZIMUTH_DEG, ELEVATION_DEG)
+    boxes = {part: assembly.solids[part].boxes for part in parts}
+    ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
+    at = np.array([poses[part][:3, 3] for part in parts])
+    low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+    far = NEAREST_M + FARTHER * float(np.linalg.norm(high - low))
+    return view((low + high) / 2, min(far, 1.2), AZIMUTH_DEG, ELEVATION_DEG)
+
+
+def _jpeg(image: Any) -> bytes:
+    import imageio.v3 as imageio
+
+    file = io.BytesIO()
+    imageio.imwrite(file, image, extension=".jpg", quality=QUALITY)
+    return file.getvalue()

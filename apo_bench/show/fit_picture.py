@@ -1,0 +1,72 @@
+"""How well a fit fits: histograms with the fitted densities, and quantiles against quantiles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.fitted import Measured
+from apo_bench.observation.models.residuals import Residuals
+
+SEEN, FITTED = "#9fb8d1", "#a6341b"
+BINS, SHOWN = 40, 0.995
+"""Bins of a histogram, and up to which quantile it is drawn."""
+
+
+def draw_fit(residuals: Residuals, measured: Measured, path: Path) -> None:
+    """Write the picture as PNG: across the ray, along it, turns; above, histograms; below, quantiles."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    inlier, upright = residuals.inlier, residuals.upright
+    shift, turn = measured.shift_mm, measured.turn_deg
+    columns = (
+        ("across the ray [mm]", residuals.across_mm[inlier], shift.cdf_across, shift.limit),
+        ("along the ray, size [mm]", residuals.along_mm[inlier], shift.cdf_along, shift.limit),
+        ("turn [deg]", residuals.angle_deg[upright], turn.cdf_length, turn.limit),
+    )
+    figure = Figure(figsize=(11.0, 6.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2, 3)
+    for column, (name, sizes, cdf, limit) in zip(axes.T, columns, strict=True):
+        _histogram(column[0], sizes, cdf, limit)
+        _quantiles(column[1], sizes, cdf, limit)
+        column[0].set_xlabel(name)
+        column[1].set_xlabel(f"fitted, {name}")
+    axes[0, 0].set_ylabel("density")
+    axes[1, 0].set_ylabel("seen")
+    axes[0, 0].legend(frameon=False)
+    rates = f"{100 * measured.outliers:.1f} % outliers, {100 * measured.missed:.1f} % missed"
+    figure.suptitle(f"{_short(measured.source)}\n{int(inlier.sum())} inliers; {rates}", fontsize=11)
+    figure.savefig(path, dpi=120)
+
+
+def _histogram(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+    top = min(limit, max(float(np.quantile(sizes, SHOWN)) * 1.05, 1e-3 * limit))
+    edges = np.linspace(0.0, top, BINS + 1)
+    axis.hist(sizes, edges, weights=np.full(len(sizes), BINS / (top * len(sizes))), color=SEEN, label="seen")
+    fine = np.linspace(0.0, top, 401)
+    axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=FITTED, label="fitted")
+    axis.set_xlim(0.0, top)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def _quantiles(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+    """Every seen size against the one that the fit has at its rank; on the line they are alike."""
+    grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
+    chance = np.maximum.accumulate(cdf(grid))
+    rank = (np.arange(len(sizes)) + 0.5) / len(sizes)
+    axis.plot([0.0, limit], [0.0, limit], color=FITTED, linewidth=1.0)
+    axis.plot(np.interp(rank, chance, grid), np.sort(sizes), ".", color="#33557a", markersize=3)
+    axis.set_xlim(0.0, limit)
+    axis.set_ylim(0.0, limit)
+    axis.set_aspect("equal")
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 110 else text[:107] + "..."

@@ -1,0 +1,1 @@
+"""The relation graph, drawn as in the paper."""

@@ -1,0 +1,168 @@
+"""Rows for the picture of a relation graph: environment parts below, few crossings, short arrows.
+
+Rows are longest paths from the ground (Sugiyama). An arc that passes a row takes a place of its own in it. No arc
+leads back up: when it was made its environment part rested, and what stands moves together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise, permutations, product
+from math import factorial, prod
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.graph import Arc, Graph, Node
+from apo_bench.geometry.arrays import Array
+
+
+class Passing(NamedTuple):
+    """Where an arc, counted from 0, passes a row."""
+
+    arc: int
+    row: int
+
+
+Item = Node | Passing
+Chain = tuple[Item, ...]
+Rows = tuple[tuple[Item, ...], ...]
+Links = list[tuple[Item, Item]]
+
+NODE_WIDTH = 1.0
+PASSING_WIDTH = 0.5
+SPACE = 0.35
+"""Between neighbours, in widths of a node."""
+LOOSE = 0.01
+"""How much an item without neighbours counts."""
+FEW = 3000
+"""So many orders are all tried; of more, those that differ by the place of one item from the best so far."""
+
+
+class Layers(NamedTuple):
+    """A graph in rows."""
+
+    ground: Node | None
+    """The node below all rows, as wide as the picture: the work table."""
+    rows: Rows
+    """From the lowest to the highest, each from left to right."""
+    chains: tuple[Chain, ...]
+    """The way of each arc from its manipulated to its environment node, the ground left out."""
+
+
+def layered(graph: Graph) -> Layers:
+    """Put every node into a row and order the rows."""
+    ground = _ground(graph)
+    heights = _heights(graph, ground)
+    chains = tuple(_chain(i, arc, heights, ground) for i, arc in enumerate(graph.arcs))
+    rows: list[list[Item]] = [[] for _ in range(1 + max(heights.values(), default=-1))]
+    for node, height in heights.items():
+        rows[height].append(node)
+    for item in dict.fromkeys(item for chain in chains for item in chain):
+        if isinstance(item, Passing):
+            rows[item.row].append(item)
+    return Layers(ground, _ordered(tuple(map(tuple, rows)), links_of(chains)), chains)
+
+
+def links_of(chains: Iterable[Chain]) -> Links:
+    """What stands one above the other in some chain."""
+    return [pair for chain in chains for pair in pairwise(chain)]
+
+
+def abscissas(layers: Layers, rounds: int = 60) -> dict[Item, float]:
+    """Where each item stands from left to right, in widths of a node: near what it is linked with, none overlapping.
+
+    Rows take turns: each moves as little as possible, in squares, from the means of its neighbours; what has none
+    closes up with the others. The leftmost item stands at half its width.
+    """
+    near: dict[Item, list[Item]] = {item: [] for row in layers.rows for item in row}
+    for a, b in links_of(layers.chains):
+        near[a].append(b)
+        near[b].append(a)
+    x: dict[Item, float] = {}
+    offsets = [_offsets(row) for row in layers.rows]
+    for row, offset in zip(layers.rows, offsets, strict=True):
+        x.update(zip(row, offset - offset[-1] / 2, strict=True))
+    for _ in range(rounds):
+        for row, offset in zip(layers.rows, offsets, strict=True):
+            middle = float(np.mean([x[item] for item in row]))
+            wanted = np.array([np.mean([x[other] for other in near[item]] or [middle]) for item in row])
+            weight = np.array([1.0 if near[item] else LOOSE for item in row])
+            x.update(zip(row, _apart(wanted, offset, weight), strict=True))
+    left = min((x[item] - width(item) / 2 for item in x), default=0.0)
+    return {item: float(at - left) for item, at in x.items()}
+
+
+def width(item: Item) -> float:
+    """How much room an item takes, in widths of a node."""
+    return PASSING_WIDTH if isinstance(item, Passing) else NODE_WIDTH
+
+
+def _ground(graph: Graph) -> Node | None:
+    """The part that never moved and that most arcs end on."""
+    resting = [node for node in graph.nodes if node.placed is None]
+    return max(resting, key=lambda node: sum(arc.environment == node for arc in graph.arcs), default=None)
+
+
+def _heights(graph: Graph, ground: Node | None) -> dict[Node, int]:
+    """The longest path of each node down to the ground."""
+    heights = {node: 0 for node in graph.nodes if node != ground}
+    for _ in heights:
+        for arc in graph.arcs:
+            if arc.environment != ground:
+                heights[arc.manipulated] = max(heights[arc.manipulated], heights[arc.environment] + 1)
+    return heights
+
+
+def _chain(i: int, arc: Arc, heights: dict[Node, int], ground: Node | None) -> Chain:
+    end = () if arc.environment == ground else (arc.environment,)
+    below = heights[arc.environment] if end else -1
+    passing = (Passing(i, row) for row in range(heights[arc.manipulated] - 1, below, -1))
+    return (arc.manipulated, *passing, *end)
+
+
+def _ordered(rows: Rows, links: Links) -> Rows:
+    """The order of least cost; of equal ones the first."""
+    if prod(factorial(len(row)) for row in rows) <= FEW:
+        return min(product(*(permutations(row) for row in rows)), key=lambda each: _cost(each, links))
+    best, least = rows, _cost(rows, links)
+    while True:
+        found = min(_neighbours(best), key=lambda each: _cost(each, links))
+        if _cost(found, links) >= least:
+            return best
+        best, least = found, _cost(found, links)
+
+
+def _neighbours(rows: Rows) -> list[Rows]:
+    """Every order in which one item stands elsewhere in its row."""
+    out = []
+    for j, row in enumerate(rows):
+        for item in row:
+            rest = tuple(other for other in row if other != item)
+            out += [(*rows[:j], (*rest[:k], item, *rest[k:]), *rows[j + 1 :]) for k in range(len(row))]
+    return out
+
+
+def _cost(rows: Rows, links: Links) -> tuple[int, float]:
+    """Crossings, then the squared lengths of all links from left to right."""
+    place = {item: (j, k - (len(row) - 1) / 2) for j, row in enumerate(rows) for k, item in enumerate(row)}
+    ends = [(place[a][0], place[a][1], place[b][1]) for a, b in links]
+    crossings = sum(
+        row == other and (top - top_other) * (end - end_other) < 0
+        for i, (row, top, end) in enumerate(ends)
+        for other, top_other, end_other in ends[:i]
+    )
+    return crossings, sum((top - end) ** 2 for _, top, end in ends)
+
+
+def _offsets(row: tuple[Item, ...]) -> Array:
+    """How far right of the first item each one stands at least."""
+    steps = [(width(a) + width(b)) / 2 + SPACE for a, b in pairwise(row)]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _apart(wanted: Array, offset: Array, weight: Array) -> Array:
+    """The places nearest to those that are wanted which keep their order and distance (isotonic regression)."""
+    from scipy.optimize import isotonic_regression
+
+    return np.asarray(isotonic_regression(wanted - offset, weights=weight).x + offset)

@@ -1,0 +1,73 @@
+"""A relation graph in words for people, and as one JSON object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from apo_bench.assembly.graph import Arc, Graph, Node, Residuals
+from apo_bench.assembly.topology import spelled
+
+GRAPH = "apo-bench/graph/1"
+
+
+def graph_title(scenario: str, graph: Graph) -> str:
+    """`pocket_table after operation 6`."""
+    return f"{scenario} after operation {graph.step}"
+
+
+def graph_lines(scenario: str, graph: Graph, residuals: Residuals | None = None, gap_m: float = 0.0) -> list[str]:
+    """Every part at its placements with the ODL, then every arc: when it was made and lost, the faces, the residual."""
+    nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
+    arcs: list[tuple[str, ...]] = [(str(arc), _times(arc), f"[{' '.join(arc.pairs)}]") for arc in graph.arcs]
+    if residuals is not None:
+        arcs = [(*words, _size(r, gap_m)) for words, r in zip(arcs, residuals, strict=True)]
+    return [graph_title(scenario, graph), "", *_columns(nodes), "", *_columns(arcs)]
+
+
+def graph_form(scenario: str, graph: Graph, residuals: Residuals | None = None) -> dict[str, Any]:
+    """What `json` can write: operations numbered from 1, residuals in mm (null where unknown)."""
+    measured: Residuals = [None] * len(graph.arcs) if residuals is None else residuals
+    return {
+        "schema": GRAPH,
+        "scenario": scenario,
+        "step": graph.step,
+        "nodes": [{**_node_form(node), "stands": graph.stands(node)} for node in graph.nodes],
+        "arcs": [_arc_form(arc, r) for arc, r in zip(graph.arcs, measured, strict=True)],
+    }
+
+
+def _times(arc: Arc) -> str:
+    lost = "" if arc.lost is None else f", lost at {arc.lost + 1}"
+    return f"made {arc.made + 1}{lost}"
+
+
+def _size(residual: float | None, gap_m: float) -> str:
+    if residual is None:
+        return "not seen"
+    above = f", above {gap_m * 1e3:g}" if residual > gap_m else ""
+    return f"{residual * 1e3:.3f} mm{above}"
+
+
+def _columns(table: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of equal length, their entries below each other."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in table]
+
+
+def _node_form(node: Node) -> dict[str, Any]:
+    if node.placed is None:
+        return {"part": node.part, "placed": None, "odl": "T0"}
+    return {"part": node.part, "placed": node.placed + 1, "odl": spelled(node.odl)}
+
+
+def _arc_form(arc: Arc, residual: float | None) -> dict[str, Any]:
+    return {
+        "name": arc.name,
+        "manipulated": _node_form(arc.manipulated),
+        "environment": _node_form(arc.environment),
+        "made": arc.made + 1,
+        "lost": None if arc.lost is None else arc.lost + 1,
+        "faces": [[contact.manipulated.face, contact.environment.face] for contact in arc.contacts],
+        "residual_mm": None if residual is None else residual * 1e3,
+    }

@@ -1,0 +1,156 @@
+"""The card of a noise model: formula, frame, parameters, and a histogram of what it really does."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration
+from apo_bench.assembly.placement import placed
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.names import resolve
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.observation.noise_file import noise_of_file, presets, read_noise
+from apo_bench.observation.observing import observe
+from apo_bench.scenario.file import load_scenario
+
+SCENARIO = "stick_in_tower"
+DRAWS = 1000
+"""Observations of that scenario, three operations each, behind a histogram."""
+COLUMNS = ("across the ray", "along the ray", "tilt", "about the ray")
+UNITS = ("mm", "mm", "deg", "deg")
+BINS, WIDTH = 17, 14
+"""Bins of a histogram in text, the outermost with all that is beyond, and the length of its longest bar."""
+
+
+class Drawn(NamedTuple):
+    """Errors that a model made."""
+
+    errors: Array
+    """(m, 4), in the frame of the default camera's ray: across and along in mm, tilt and about the ray in degrees."""
+    stated: Array
+    """(4,), root mean square of the standard deviations that the observations stated, in the same units."""
+    missed: float
+    """Share of operations that were not seen."""
+
+
+def listed() -> Mapping[str, str]:
+    """Name -> what it is, of every model that has a name."""
+    return {name: facts(name).title for name in NOISES} | {
+        name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in presets().items()
+    }
+
+
+def facts(given: Any) -> Facts:
+    """What a model says of itself; of one that says nothing, its docstring."""
+    model = _model(given)
+    own = getattr(model, "FACTS", None)
+    if isinstance(own, Facts):
+        return own
+    said = (inspect.getdoc(model) or "A noise model that says nothing of itself.").split("\n\n")[0]
+    return Facts(" ".join(said.split()), (), "", (), "")
+
+
+def _model(given: Any) -> Any:
+    """What a name stands for: a class, or an object that no level changes, but what is measured at level 1."""
+    measured = noise_of_file(given, Level(1.0, 1.0)) if isinstance(given, str) else None
+    return measured or resolve(given, NOISES, "noise model")
+
+
+def draw(given: Any, level: Level, draws: int = DRAWS) -> Drawn:
+    """Errors of many observations of the nominal example 5.1; operations that were not seen have none."""
+    noise, shown, camera, rng = make_noise(given, level), demonstrated(), Camera(), np.random.default_rng(0)
+    errors, variances, missed = [], [], 0
+    for _ in range(draws):
+        seen = observe(shown, noise, rng)
+        Q = np.zeros((len(seen.goals), 6, 6))
+        Q[:, :3, :3] = Q[:, 3:, 3:] = np.swapaxes(camera.frames(seen.goals), 1, 2) @ seen.goals[:, :3, :3]
+        xi = (Q @ pose.log(pose.inverse(shown.goals) @ seen.goals)[..., None])[..., 0]
+        errors.append(xi[seen.seen])
+        variances.append(np.diagonal(Q @ seen.covariance @ np.swapaxes(Q, 1, 2), axis1=1, axis2=2)[seen.seen])
+        missed += int(np.sum(~seen.seen))
+    scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
+    some = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
+    stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
+    rms = np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale
+    return Drawn(some, rms, missed / (draws * len(shown.goals)))
+
+
+def demonstrated() -> Demonstration:
+    """What a careful human shows: the nominal goals of example 5.1, in the middle of where they may stand."""
+    scenario = load_scenario(SCENARIO)
+    T = pose.at(np.append(scenario.site.center_m, 0.0))
+    goals = T @ scenario.goals
+    final = placed(scenario.assembly, scenario.start, goals)[-1]
+    return Demonstration(scenario.assembly, scenario.start, goals, final, np.zeros((len(goals), 6, 6)))
+
+
+def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
+    """The card of a model in Markdown, with a histogram in text of what was drawn, which `draw` does if nothing was."""
+    drawn = drawn or draw(given, level)
+    if not len(drawn.errors):
+        return f"{described(given)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
+    bars = "\n".join(f"    {line}".rstrip() for line in histogram(drawn))
+    return f"{described(given)}\n{measured(given, drawn, level)}:\n\n{bars}\n"
+
+
+def described(given: Any, heading: int = 1) -> str:
+    """What a model says of itself, without a histogram."""
+    said, name = facts(given), given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
+    parts = [f"{'#' * heading} {name}: {said.title}"]
+    if said.formula:
+        parts.append("\n".join(f"    {line}" for line in said.formula))
+    lines = [f"Frame: {said.frame}."] * bool(said.frame)
+    lines += [f"Parameter {parameter}." for parameter in said.parameters]
+    lines += [f"States: {said.states}."] * bool(said.states)
+    lines += [f"{note}." for note in said.notes]
+    if lines:
+        parts.append("\n".join(f"- {line}" for line in lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def measured(given: Any, drawn: Drawn, level: Level) -> str:
+    """One sentence on what was drawn, without its full stop."""
+    if facts(given).measured:
+        apart = f" in mm and {level.deg:g} times in deg" if level.deg != level.mm else ""
+        where = "as measured" if level == (1.0, 1.0) else f"{level.mm:g} times{apart} what was measured"
+    elif isinstance(_model(given), type):
+        where = f"at {level.mm:g} mm and {level.deg:g} deg"
+    else:
+        where = "at every level alike"
+    missed = f"; {100 * drawn.missed:.1f} % were not seen" if drawn.missed else ""
+    n = f"{len(drawn.errors)} operations of {SCENARIO}"
+    return f"Errors {where}, {n}{missed}"
+
+
+def histogram(drawn: Drawn) -> list[str]:
+    """Bars over bins of half a stated standard deviation, and below them the deviations found and stated."""
+    unit = drawn.errors / np.where(drawn.stated > 0.0, drawn.stated, 1.0)
+    edges = 0.5 * (np.arange(BINS - 1) - (BINS - 2) / 2)
+    counts = np.array([np.bincount(np.digitize(column, edges), minlength=BINS) for column in unit.T])
+    longest = max(1, int(counts.max()))
+    lines = ["stated".rjust(12) + "".join(f"  {name:{WIDTH}}" for name in COLUMNS)]
+    for i in range(BINS):
+        low, high = (edges[i - 1] if i else None), (edges[i] if i < BINS - 1 else None)
+        if low is None:
+            where = f"< {high:.2f}"
+        elif high is None:
+            where = f"> {low:.2f}"
+        else:
+            where = f"{(low + high) / 2:.1f}"
+        bars = ("#" * int(np.ceil(WIDTH * count / longest)) for count in counts[:, i])
+        lines.append(where.rjust(12) + "".join(f"  {bar:{WIDTH}}" for bar in bars))
+    for word, values in (
+        ("deviation", np.sqrt(np.mean(drawn.errors**2, axis=0)) if len(drawn.errors) else np.zeros(4)),
+        ("stated", drawn.stated),
+    ):
+        lines.append(
+            word.rjust(12) + "".join(f"  {f'{v:.3g} {u}':{WIDTH}}" for v, u in zip(values, UNITS, strict=True))
+        )
+    return lines

@@ -1,0 +1,93 @@
+"""What `apo-bench recognise` found, as a table, in sentences and as JSON."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import Any
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.recognition.contacts import Evidence, Recognised
+from apo_bench.trial.recognised import counted
+
+SCHEMA = "apo-bench/recognised/1"
+
+
+def evidence_table(found: Recognised, right: Assembly) -> Any:
+    """One line per contact, with what was measured and what was allowed."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("", "manipulated", "environment"):
+        table.add_column(name)
+    for name in ("seen gap mm", "gap mm", "allowed", "angle deg", "allowed", "overlap"):
+        table.add_column(name, justify="right")
+    table.add_column("")
+    there = {(relation.made, relation.contact) for relation in right.relations()}
+    for e in found.evidence:
+        table.add_row(
+            str(e.made + 1),
+            str(e.contact.manipulated),
+            str(e.contact.environment),
+            f"{_mm(e.seen_gap_m):z.2f}",
+            f"{_mm(e.gap_m):z.2f}",
+            f"{_mm(e.most.gap_m):.2f}",
+            f"{degrees(e.angle_rad):z.2f}",
+            f"{degrees(e.most.angle_rad):.2f}",
+            f"{100 * e.share:.0f} %",
+            "" if (e.made, e.contact) in there else "not in the scenario",
+        )
+    return table
+
+
+def difference_lines(seen: Observation, found: Recognised) -> list[str]:
+    """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
+    right = seen.assembly
+    count = counted(right, found.assembly)
+    missed = [f"missed: {made + 1}: {contact}" for made, contact in _missed(right, found)]
+    total = count["contacts_right"] + count["contacts_missed"]
+    if not missed and not count["contacts_false"]:
+        return [f"all {total} contacts of the scenario were recognised, and no other"]
+    line = f"{count['contacts_right']} of the {total} contacts of the scenario were recognised"
+    return [f"{line}, and {count['contacts_false']} that it does not have", *missed]
+
+
+def recognition_form(name: str, kind: str, seen: Observation, found: Recognised, assumed: bool) -> dict[str, Any]:
+    """Everything, in mm and degrees; operations from 1."""
+    there = {(relation.made, relation.contact) for relation in seen.assembly.relations()}
+    return {
+        "schema": SCHEMA,
+        "scenario": name,
+        "relations": kind,
+        "deviation_assumed": assumed,
+        "contacts": [{**_evidence_form(e), "in_scenario": (e.made, e.contact) in there} for e in found.evidence],
+        "missed": [
+            {"operation": made + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
+            for made, contact in _missed(seen.assembly, found)
+        ],
+        **counted(seen.assembly, found.assembly),
+    }
+
+
+def _evidence_form(e: Evidence) -> dict[str, Any]:
+    return {
+        "operation": e.made + 1,
+        "manipulated": str(e.contact.manipulated),
+        "environment": str(e.contact.environment),
+        "seen_gap_mm": _mm(e.seen_gap_m),
+        "gap_mm": _mm(e.gap_m),
+        "allowed_gap_mm": _mm(e.most.gap_m),
+        "angle_deg": degrees(e.angle_rad),
+        "allowed_angle_deg": degrees(e.most.angle_rad),
+        "overlap": e.share,
+    }
+
+
+def _missed(right: Assembly, found: Recognised) -> list[tuple[int, Contact]]:
+    named = {(e.made, e.contact) for e in found.evidence}
+    return [(r.made, r.contact) for r in right.relations() if (r.made, r.contact) not in named]
+
+
+def _mm(metres: float) -> float:
+    """No -0."""
+    return round(1e3 * metres, 6) + 0.0

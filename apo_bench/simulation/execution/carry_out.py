@@ -1,0 +1,71 @@
+"""One part, with what it carries, from one place to another: pick, lift, carry, attach, release, depart."""
+
+from __future__ import annotations
+
+from apo_bench.simulation.execution.attach import ARRIVED_M, attach, leave, pull_out
+from apo_bench.simulation.execution.fingers import centre, check_grasp, depart, grasp, release
+from apo_bench.simulation.execution.transfer import UP, Grip, Transfer, aim
+from apo_bench.simulation.robot.paths import at_height, moved, smooth
+from apo_bench.simulation.robot.robot import Halt, Robot
+
+LIFT, CARRY, LOWER = 0.25, 0.35, 0.2
+"""Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
+LOST_LOAD = 0.8
+"""A hand that feels less than this part of the weight of a group has lost some of it."""
+
+
+def take(robot: Robot, t: Transfer) -> int:
+    """Pick the part and lift it; returns which of its grips is then in use.
+
+    Raises:
+        Halt: Something went wrong; the stage and code say what.
+    """
+    changes = t.out.left is not None
+    _pick(robot, t, t.grips[0])
+    if t.out.level:
+        pull_out(robot, t, t.grips[0], t.grips[1] if changes else None)
+    _lift(robot, t)
+    return 1 if t.out.level and changes else 0
+
+
+def bring(robot: Robot, t: Transfer, i: int) -> None:
+    """Carry the part that is held by its i-th grip, attach it, let go and depart.
+
+    Raises:
+        Halt: Something went wrong; the stage and code say what.
+    """
+    grip = t.grips[i]
+    _carry(robot, t, grip)
+    left, grip = attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
+    release(robot, t, grip)
+    depart(robot, t)
+    if left > ARRIVED_M:
+        raise Halt("attach", "force_stop")
+    for other in t.centring:
+        centre(robot, t, other)
+
+
+def _pick(robot: Robot, t: Transfer, grip: Grip) -> None:
+    robot.stage = "pick"
+    grasp(robot, t, grip, t.T_world_start @ grip.T_part_tip)
+
+
+def _lift(robot: Robot, t: Transfer) -> None:
+    robot.stage = "lift"
+    if t.carried:
+        robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.02))
+    leave(robot, t)
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), LIFT))
+
+
+def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
+    robot.stage = "carry"
+    before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
+    if t.into.level:
+        before = moved(before, UP, t.floats)
+    robot.go(at_height(before, max(t.safe, before[2, 3])), CARRY)
+    robot.follow(smooth(robot.T, before, LOWER))
+    robot.wait(0.1)
+    check_grasp(robot, grip)
+    if t.carried and robot.scene.grasp == "friction" and robot.load() < LOST_LOAD * t.weight_n:
+        raise Halt("carry", "lost_grasp", " or ".join(t.carried))

@@ -1,0 +1,173 @@
+"""The robot repeats a plan: open loop in the poses, closed loop only in force. The same controller for every method."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from apo_bench.assembly.goals import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step
+from apo_bench.geometry.arrays import Array
+from apo_bench.prediction.stability import unstable
+from apo_bench.records.outcomes import sentence
+from apo_bench.simulation.execution.carry_out import bring, take
+from apo_bench.simulation.execution.prepare import Move, moves, unreachable
+from apo_bench.simulation.execution.replay_cache import Branches, marks
+from apo_bench.simulation.robot.robot import Halt, Robot, Watch
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import sleeping, snapshot
+
+SETTLE_S = 0.5
+"""At the end, everything is left alone this long."""
+REST_M_S, REST_RAD_S = 5e-5, 1e-3
+"""Slower than this, all parts rest and the next operation may begin; a stick that rocks in its slot takes a while."""
+LOOK_S, PATIENCE_S = 0.04, 1.5
+SHORTEST_STEP_S = 1.0
+"""Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
+STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
+"""What has moved so long, [s], rocks: steps are taken in so many parts. Of 19 states that rocked on for ever in whole
+steps quarters end 17, halves 10, and all of these in turn every one."""
+
+
+def replay(
+    plan: Plan,
+    scene: Scene,
+    watch: Watch | None = None,
+    parts_at: Poses | None = None,
+    fidelity: str = "full",
+    branches: Branches | None = None,
+    searches: bool = False,
+    most_s: float = math.inf,
+) -> ReplayResult:
+    """Carry out a plan.
+
+    Args:
+        watch: Called with the `MjData` about every 20 ms of simulated time.
+        parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
+        fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out, and what rests
+            untouched is not stepped.
+        branches: What replays of this scene have in common; changes nothing but the time it takes.
+        searches: The robot feels for a hole where a motion into it is stopped by force.
+        most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
+    """
+    start = plan.start if parts_at is None else parts_at
+    too_long = len(plan.schedule) * SHORTEST_STEP_S > most_s
+    todo = () if too_long else moves(plan, scene, searches)
+    refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
+    branches = Branches() if branches is None or watch is not None else branches
+    way = marks(scene, start, fidelity, todo)
+    ended = None if refused or not way or most_s < math.inf else branches.ended(way[-1])
+    if ended is not None:
+        return ended
+    robot, after = Robot(scene, start, watch, fidelity), list[Snapshot | None]([None] * len(plan.assembly))
+    timeline = list[tuple[Step, float]]()
+    with sleeping(scene.work, fidelity == "contact"):
+        outcome = refused or _carry_out(plan, robot, todo, after, timeline, branches, way, most_s)
+        final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
+    result = ReplayResult(
+        reached=Reached(after=tuple(after), final=final),
+        outcome=outcome,
+        peak_force_n=robot.peak_force_n,
+        sim_seconds=float(robot.data.time),
+        timeline=tuple(timeline),
+    )
+    if way and not refused and outcome.code != "time_limit":
+        branches.end(way[-1], result)
+    return result
+
+
+def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
+    """What is wrong with the plan before anything moves."""
+    for upto, goals in _stages(plan):
+        k = unstable(plan.assembly.first(upto), plan.start, goals[:upto])
+        if k is not None:
+            return _outcome(plan, "plan", "unstable_goal", k)
+    for move in todo:
+        code = unreachable(scene, move.transfer)
+        if code:
+            return _outcome(plan, "plan", code, move.step.operation)
+    return None
+
+
+def _stages(plan: Plan) -> list[tuple[int, Array]]:
+    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
+    goals, done, found = np.array(plan.goals), 0, []
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+        if not step.undo:
+            goals[step.operation], done = target, step.operation + 1
+        if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
+            found.append((done, np.array(goals)))
+    return found
+
+
+def _carry_out(
+    plan: Plan,
+    robot: Robot,
+    todo: tuple[Move, ...],
+    after: list[Snapshot | None],
+    timeline: list[tuple[Step, float]],
+    branches: Branches,
+    way: list[bytes],
+    most_s: float,
+) -> Outcome:
+    done, kept = branches.resume(way, robot)
+    if kept is None:
+        robot.wait(0.05)
+    else:
+        after[:], timeline[:] = kept.after, kept.timeline
+    for i, (step, t) in list(enumerate(todo))[done // 2 :]:
+        if robot.data.time > most_s:
+            return _late(plan, "pick", step)
+        try:
+            if kept is None or done <= 2 * i:
+                grip = take(robot, t)
+                branches.keep(way[2 * i], robot, grip, after, timeline)
+            else:
+                grip = kept.grip
+            bring(robot, t, grip)
+            _until_rest(robot)
+        except Halt as halt:
+            if halt.code == "force_stop" and not step.undo:
+                after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
+            return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
+        after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
+        timeline.append((step, float(robot.data.time)))
+        branches.keep(way[2 * i + 1], robot, 0, after, timeline)
+    return Outcome("done", "ok", None, sentence("ok"))
+
+
+def _until_rest(robot: Robot) -> None:
+    """The arm stands by until nothing moves at two looks in a row, with bounded patience; then the judge looks.
+
+    Meanwhile nothing sleeps: a stick in its slot that is put to sleep and wakes in turn would rock on. What still moves
+    after a while is followed in parts of a step: where two boxes lie on each other in nearly one plane, the engine
+    finds four points of contact at one depth and a single one at another, and steps of one length can keep a stick
+    rocking between the two.
+    """
+    moving = np.array([np.arange(v, v + 6) for v in robot.scene.work.dof.values()])
+    quiet = 0
+    with sleeping(robot.scene.work, False):
+        for i in range(round(PATIENCE_S / LOOK_S)):
+            speed = np.abs(robot.data.qvel[moving]).max(axis=0)
+            quiet = quiet + 1 if speed[:3].max() < REST_M_S and speed[3:].max() < REST_RAD_S else 0
+            if quiet == 2:
+                return
+            robot.wait(LOOK_S, parts=next(parts for since, parts in STEPS if i * LOOK_S >= since))
+
+
+def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
+    try:
+        robot.wait(SETTLE_S)
+        _until_rest(robot)
+    except Halt as halt:
+        if halt.code == "unstable_simulation":
+            return None
+    return snapshot(robot.scene.work, robot.data, plan.start)
+
+
+def _late(plan: Plan, stage: str, step: Step) -> Outcome:
+    return _outcome(plan, stage, "time_limit", step.operation)
+
+
+def _outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:
+    return Outcome(stage, code, k, sentence(code, part=part or plan.assembly.operations[k].main, operation=k))

@@ -1,0 +1,71 @@
+"""The fingers: take a part, let go of it, take it elsewhere, centre it."""
+
+from __future__ import annotations
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.execution.transfer import Grip, Transfer, hover
+from apo_bench.simulation.robot.paths import at_height, moved, smooth
+from apo_bench.simulation.robot.robot import Halt, Robot
+
+FREE, NEAR = 1.4, 0.55
+"""Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
+DEPART_M = 0.09
+OPEN_TO_PICK_M, OPEN_TO_RELEASE_M = 0.012, 0.008
+"""How far each finger stands off before it closes, and when it has let go."""
+LOST_M = 0.002
+"""Fingers that close this far beyond the part's surface hold nothing."""
+
+
+def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
+    """Come down to the part with open fingers, and close them."""
+    above = at_height(at, hover(at))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), NEAR))
+    robot.go(at_height(above, robot.T[2, 3]), FREE, turn_speed=3.0)
+    robot.handle(t.part)
+    robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
+    robot.follow(smooth(robot.T, at, NEAR))
+    robot.wait(0.05)
+    robot.hold(t.part, *t.carried)
+    if robot.scene.grasp == "weld":
+        robot.weld(t.part, True)
+    else:
+        robot.fingers(grip.half_width - robot.arm.squeeze_m, 0.25)
+    check_grasp(robot, grip)
+
+
+def release(robot: Robot, t: Transfer, grip: Grip) -> None:
+    robot.stage = "release"
+    if robot.scene.grasp == "weld":
+        robot.weld(t.part, False)
+    robot.fingers(min(grip.half_width + OPEN_TO_RELEASE_M, robot.arm.opening_m), 0.25)
+    robot.hold()
+
+
+def depart(robot: Robot, t: Transfer) -> None:
+    robot.stage = "depart"
+    robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], DEPART_M), NEAR))
+    robot.handle(None)
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), FREE))
+
+
+def change(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
+    """Let go, and take the part at another place."""
+    stage = robot.stage
+    robot.wait(0.05)
+    release(robot, t, grip)
+    depart(robot, t)
+    robot.stage = stage
+    grasp(robot, t, second, at)
+
+
+def centre(robot: Robot, t: Transfer, grip: Grip) -> None:
+    """Close the fingers on the part where it should stand, and open them again."""
+    robot.stage = "release"
+    grasp(robot, t, grip, t.T_world_goal @ grip.T_part_tip)
+    release(robot, t, grip)
+    depart(robot, t)
+
+
+def check_grasp(robot: Robot, grip: Grip) -> None:
+    if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - LOST_M:
+        raise Halt(robot.stage, "lost_grasp")

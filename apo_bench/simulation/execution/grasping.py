@@ -1,0 +1,215 @@
+"""Where to hold a part, chosen from the planned poses so that the gripper strikes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.intrusion import depths, upright
+from apo_bench.geometry.solid import Box, Solid
+from apo_bench.scenario.scenario import Grasp
+from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.scene.scene import Scene
+
+STAND_OFF_M = 0.012
+"""How far each finger stands off the part before it closes or after it has let go."""
+MARGINS_M = (0.004, 0.003, 0.002)
+"""Room around the gripper, as much as there is."""
+GRID_M = 0.003
+"""Candidates along a part, and looks along a stroke, are this far apart."""
+END_M = 0.018
+"""No grasp is nearer to the end of a long part: the pads still lie on it."""
+MOST_LEFT_M = 0.1
+"""A grip is changed so near to the goal that the part already lies in what it was put into."""
+HEIGHT = 0.65
+"""Height of the tip over the part's lowest point, as a part of its height."""
+
+
+class Obstacle(NamedTuple):
+    """A part that rests while another is moved."""
+
+    boxes: tuple[Box, ...]
+    T: Array
+
+
+class Place(NamedTuple):
+    """The part at rest, and what stands around it."""
+
+    T: Array
+    around: tuple[Obstacle, ...]
+
+
+class Stroke(NamedTuple):
+    """A straight way of the part to `T`."""
+
+    T: Array
+    way: Array
+    """Unit vector, (3,), world."""
+    travel: float
+    around: tuple[Obstacle, ...]
+
+
+class Grips(NamedTuple):
+    """One grasp for a whole stroke, or two with a change of grip `left` before its end."""
+
+    first: Grasp
+    left: float | None = None
+    second: Grasp | None = None
+
+
+def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
+    """Every part but these, where it is believed to be."""
+    return tuple(Obstacle(solid.boxes, poses[part]) for part, solid in solids.items() if part not in without)
+
+
+def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place]) -> Grasp:
+    """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
+    if _clear(scene, part, [preferred], places, MARGINS_M[-1]):
+        return preferred
+    return _first_clear(scene, part, _candidates(scene, part, places[0].T), places) or preferred
+
+
+def clear_across(scene: Scene, part: str, across: Array, place: Place) -> Grasp | None:
+    """The first clear grasp that closes along a direction of the part, or None."""
+    able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ across) > 0.99]
+    return _first_clear(scene, part, able, [place])
+
+
+def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place], stroke: Stroke) -> Grips:
+    """The grasp for a stroke; if the gripper would strike something on the way, one to begin and one to end with.
+
+    Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
+
+    Args:
+        places: Where the part is picked up or put down besides, clear for the grasp that is used there.
+    """
+    ends = (*places, Place(stroke.T, stroke.around))
+    least = MARGINS_M[-1]
+    if _clear(scene, part, [preferred], ends, least) and not _nearest(scene, part, preferred, stroke, least):
+        return Grips(preferred)
+    everything = _candidates(scene, part, places[0].T)
+    for margin in MARGINS_M:
+        able = [
+            (_nearest(scene, part, grasp, stroke, margin), grasp)
+            for grasp in _clear(scene, part, everything, places, margin)
+        ]
+        whole = _clear(scene, part, [grasp for left, grasp in able if left == 0.0], ends, margin)
+        if whole:
+            return Grips(whole[0])
+        found = _pair(scene, part, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
+        if found is not None:
+            return found
+    return Grips(preferred)
+
+
+def tip_frame(grasp: Grasp, T_part: Array) -> Array:
+    """The tip in the part's frame, (4, 4): looking down where the part stands like this, closing along `across`."""
+    ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0])
+    T = np.eye(4)
+    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = grasp.across, np.cross(ahead, grasp.across), ahead, grasp.point
+    return T
+
+
+def half_width(solid: Solid, grasp: Grasp) -> float:
+    """Half the nominal part's width between the fingers, [m]."""
+    low, high = solid.bounds
+    return float(np.abs(grasp.across) @ (high - low)) / 2
+
+
+def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
+    """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
+    goal = Place(stroke.T, stroke.around)
+    last = _clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin)
+    for left, first in able:
+        change = Place(_back(stroke, left), stroke.around)
+        if 0.0 < left < MOST_LEFT_M and _clear(scene, part, [first], [change], margin):
+            near = Stroke(stroke.T, stroke.way, left, stroke.around)
+            for second in _clear(scene, part, last, [change], margin):
+                if _nearest(scene, part, second, near, margin) == 0.0:
+                    return Grips(first, left, second)
+    return None
+
+
+def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
+    """Across either level axis, the narrower one first, from the middle outwards."""
+    solid = scene.scenario.assembly.solids[part]
+    low, high = solid.bounds
+    size, middle = high - low, (high + low) / 2
+    up = int(np.abs(T[2, :3]).argmax())
+    rise = np.sign(T[2, up]) * (HEIGHT - 0.5) * size[up] * np.eye(3)[up]
+    level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
+    found = []
+    for axis, along in (level, level[::-1]):
+        reach = max(0.0, size[along] / 2 - END_M)
+        offsets = np.arange(-reach, reach + 1e-9, GRID_M) if reach > GRID_M else np.zeros(1)
+        if size[axis] / 2 + STAND_OFF_M / 2 <= scene.arm.opening_m:
+            for offset in sorted(offsets, key=abs):
+                found.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
+    return found
+
+
+def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place]) -> Grasp | None:
+    """The first of those around which there is most room at every place, or None."""
+    for margin in MARGINS_M:
+        clear = _clear(scene, part, grasps, places, margin)
+        if clear:
+            return clear[0]
+    return None
+
+
+def _clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place], margin: float) -> list[Grasp]:
+    """Those at which the open gripper, about to close or having let go, strikes nothing at any place."""
+    kept = []
+    for across, those in groupby(grasps, key=lambda grasp: tuple(grasp.across)):
+        same = list(those)
+        width = half_width(scene.scenario.assembly.solids[part], same[0])
+        opening = min(width + STAND_OFF_M, scene.arm.opening_m)
+        points = np.array([grasp.point for grasp in same])
+        struck = np.zeros(len(same), dtype=np.bool_)
+        for place in places:
+            R = (place.T @ tip_frame(Grasp(np.zeros(3), np.array(across)), place.T))[:3, :3]
+            at = points @ place.T[:3, :3].T + place.T[:3, 3]
+            struck |= _depth(scene, opening, R, at, place.around, margin) > 0.0
+        kept += [grasp for grasp, hit in zip(same, struck, strict=True) if not hit]
+    return kept
+
+
+def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
+    """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
+    width = half_width(scene.scenario.assembly.solids[part], grasp)
+    lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / GRID_M) + 1))
+    tip = stroke.T @ tip_frame(grasp, stroke.T)
+    at = tip[:3, 3] - lefts[:, None] * stroke.way
+    struck = _depth(scene, width, tip[:3, :3], at, stroke.around, margin) > 0.0
+    if not struck.any():
+        return 0.0
+    return float(lefts[max(0, int(np.argmax(struck)) - 1)])
+
+
+def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
+    """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
+
+    What its way does not come by counts as far away.
+    """
+    boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
+    low, high = upright(boxes, R, np.zeros(3))
+    low, high = low + at.min(axis=0), high + at.max(axis=0)
+    met = [each for each in around if _overlap(low, high, *upright(each.boxes, each.T[:3, :3], each.T[:3, 3]))]
+    return np.max([np.full(len(at), -1.0), *(depths(boxes, R, at, each.boxes, each.T) for each in met)], axis=0)
+
+
+def _overlap(low: Array, high: Array, bottom: Array, top: Array) -> bool:
+    """Whether two upright boxes have more than their sides in common."""
+    return bool((low < top).all() and (high > bottom).all())
+
+
+def _back(stroke: Stroke, left: float) -> Array:
+    """The part `left` before the end of a stroke."""
+    T = np.array(stroke.T)
+    T[:3, 3] -= left * stroke.way
+    return T

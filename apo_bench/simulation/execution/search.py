@@ -1,0 +1,109 @@
+"""Feeling for a hole where an insertion is stopped: spirals under a light push at several yaws, then giving way.
+
+The robot knows what it commands and the force on the part in its hand; it never reads where a part is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
+from apo_bench.simulation.execution.transfer import Grip, Transfer
+from apo_bench.simulation.robot.paths import moved, smooth, steady
+from apo_bench.simulation.robot.robot import Guard, Robot
+
+YAWS_DEG, YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
+"""Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
+BACK_M, BACK, BRING = 0.0005, 0.005, 0.03
+"""Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
+DEEP_M = 0.001
+"""What goes so much deeper than where it was stopped has found the hole."""
+SEARCHES = 3
+"""A motion is searched for so many times at most, in one transfer up to twice as often."""
+PIECE_M, NOTHING_M = 0.01, 1e-6
+"""Giving way, the tip goes on in pieces of this length; less than the second is nothing."""
+
+
+def press_in(
+    robot: Robot, t: Transfer, grip: Grip, end: Array, speed: float, guard: Guard, near: float
+) -> tuple[float, Array | None]:
+    """A guarded motion of the tip that may search where it is stopped farther than `near` [m] from its end.
+
+    Returns:
+        What is left of it, [m], and what brings the poses that were meant to those that were found, (4, 4), world; None
+        if nothing was searched for or found.
+    """
+    left, found, meant, aside = robot.follow(steady(robot.T, end, speed), guard), None, end, 0.0
+    if t.front is None:
+        return left, None
+    T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
+    for _ in range(SEARCHES):
+        if left <= near or aside >= RADIUS_M:
+            break
+        stopped = moved(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
+        more = search(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
+        if more is None:
+            break
+        guard = Guard(more[:3, :3] @ guard.way, guard.newton)
+        more = moved(more, ease_in(robot, more @ end, guard), 1.0)
+        found, end = after(found, more), more @ end
+        left = float((end - robot.T)[:3, 3] @ guard.way)
+        aside = float(np.linalg.norm((end - meant)[:3, 3]))
+    return left, found
+
+
+def after(found: Array | None, T: Array) -> Array:
+    """A pose that was meant, as it has to be after a search."""
+    return T if found is None else found @ T
+
+
+def search(robot: Robot, stopped: Array, front: Array, guard: Guard, press: float, radius: float) -> Array | None:
+    """Look for the hole across a motion that was stopped; the tip is where it was stopped again if there is none.
+
+    Args:
+        stopped: The tip pose on the line that was meant, as deep as it came.
+        front: The point about which the part is turned, (3,), world, [m].
+        press: The push under which spirals go across, [N].
+        radius: How far off the hole may be, [m].
+
+    Returns:
+        What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
+    """
+    off = moved(stopped, guard.way, -BACK_M)
+    for yaw in (0.0, *YAWS_DEG):
+        turn = _turned(yaw, front)
+        _bring(robot, turn @ off, guard.way)
+        turned, far = Guard(turn[:3, :3] @ guard.way, guard.newton), min(radius, YAWED_RADIUS_M) if yaw else radius
+        spiral = Spiral(turned, press, far, BACK_M + DEEP_M, robot.step_s)
+        robot.servo(spiral)
+        if spiral.found:
+            return moved(turn, spiral.aside, 1.0)
+    _bring(robot, off, guard.way)
+    robot.follow(smooth(robot.T, stopped, BACK), guard)
+    return None
+
+
+def ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
+    """Go on as deep as a tip pose, giving way across; returns how far aside of it that led, (3,), world, [m]."""
+    while (left := float((end - robot.T)[:3, 3] @ guard.way)) > NOTHING_M:
+        easing = Easing(guard, min(left, PIECE_M), robot.step_s)
+        robot.servo(easing)
+        if easing.stopped:
+            break
+    off = (robot.T - end)[:3, 3]
+    return np.asarray(off - (off @ guard.way) * guard.way)
+
+
+def _bring(robot: Robot, T: Array, way: Array) -> None:
+    """Back first, so that nothing is touched on the way."""
+    robot.follow(smooth(robot.T, moved(robot.T, way, -BACK_M), BACK))
+    robot.follow(smooth(robot.T, T, BRING))
+
+
+def _turned(yaw_deg: float, about: Array) -> Array:
+    """The turn about the vertical through a point, (4, 4), world."""
+    T = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw_deg))
+    T[:3, 3] = about - T[:3, :3] @ about
+    return T

@@ -1,0 +1,135 @@
+"""What the controller needs to know to move one part, with what it carries, from one place to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.insertion.macros import Name
+from apo_bench.insertion.surroundings import WALL_MARGIN_M
+from apo_bench.simulation.robot.paths import at_height, moved
+
+UP = np.array([0.0, 0.0, 1.0])
+SAFE_M = 0.15
+"""Least height of the tip at which parts are carried over the others."""
+HOVER_M = 0.11
+"""So far above a grasp the hand comes to a stand."""
+ASIDE_M = 0.006
+"""A slide begins this far from the side it shall touch; what touches at its side is moved off as far before it is
+lifted, since in the hand it drifts into its neighbour."""
+
+
+class Grip(NamedTuple):
+    """How the gripper holds the part."""
+
+    T_part_tip: Array
+    half_width: float
+    """Half the part's width between the fingers, [m]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A straight way of the part, in the direction in which the part is attached."""
+
+    way: Array
+    """Unit vector of the motion towards the goal, (3,), world."""
+    travel: float
+    left: float | None = None
+    """How far before its end the grip changes, [m]; None if it does not."""
+
+    @property
+    def level(self) -> bool:
+        return bool(abs(self.way[2]) < 0.5)
+
+
+class Motion(NamedTuple):
+    """A macro of the plan, as the robot carries it out."""
+
+    name: Name
+    way: Array
+    """Unit vector, (3,), world."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """What the controller needs to move one part; every pose in the world."""
+
+    part: str
+    carried: tuple[str, ...]
+    T_world_start: Array
+    T_world_goal: Array
+    grips: tuple[Grip, ...]
+    """In the order of their use; the next one at each change of grip."""
+    out: Line
+    """The way out of where it is, as it was once attached there: it is gone backwards."""
+    into: Line
+    centring: tuple[Grip, ...]
+    """After it was put down, the fingers close and open again here: closing, they centre the part between them."""
+    departs: tuple[Motion, ...]
+    """The macros by which it leaves its contacts, apart from being lifted."""
+    macros: tuple[Motion, ...]
+    """The macros by which it comes into its contacts; the first of them goes along `into`."""
+    over: float
+    """Height of the tip at which the empty hand passes over everything that stands, [m]."""
+    safe: float
+    """Height of the tip at which the part is carried over everything that stands, [m]."""
+    slow: float
+    """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
+    weight_n: float
+    """Of the part and what it carries, [N]."""
+    place_n: float
+    """Guard of a motion onto a support, [N]."""
+    insert_n: float
+    """Guard of an insertion, below the force at which a neighbour would slide, [N]."""
+    slide_n: float
+    """Guard of a slide, below the force at which what is touched would slide, [N]."""
+    clearance: float
+    """What lay free falls by this onto the floor of its slot, [m]."""
+    front: Array | None = None
+    """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
+    where a hole is not searched for."""
+
+    @property
+    def depth(self) -> float:
+        """How deep a motion from above goes between walls, [m]."""
+        return self.slow - WALL_MARGIN_M
+
+    @property
+    def sides(self) -> tuple[Array, ...]:
+        """Directions in which the part is slid onto another one at its side, (3,) each."""
+        return tuple(macro.way for macro in self.macros if macro.name == "slide-to-contact")
+
+    @property
+    def away(self) -> tuple[Array, ...]:
+        """Directions in which the part is first moved off another one at its side, (3,) each."""
+        return () if self.out.level else tuple(macro.way for macro in self.departs if abs(macro.way[2]) < 0.5)
+
+    @property
+    def floats(self) -> float:
+        """How far up a part must be to be free all round: seen at rest it lay on the floor of its slot, [m]."""
+        return 0.5 * self.clearance
+
+
+def aim(t: Transfer) -> Array:
+    """Where the part first comes down: at its goal, or aside of what it shall touch."""
+    return moved(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
+
+
+def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Tip poses that must be in reach for the transfer to be possible: where the part is taken, and where it is put."""
+    first, last = t.grips[0].T_part_tip, t.grips[-1].T_part_tip
+    carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
+    pick, goal = t.T_world_start @ first, t.T_world_goal @ last
+    free = moved(t.T_world_start @ carrying, t.out.way, -t.out.travel)
+    before = moved(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
+    above, over = (at_height(T, max(t.safe, T[2, 3])) for T in (free, before))
+    return (at_height(pick, hover(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
+
+
+def hover(grasp: Array) -> float:
+    return float(grasp[2, 3]) + HOVER_M

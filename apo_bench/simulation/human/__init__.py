@@ -1,0 +1,1 @@
+"""The hands of the human who demonstrates."""

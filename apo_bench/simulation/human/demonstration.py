@@ -1,0 +1,85 @@
+"""The human's demonstration, simulated: what the hands did, read off when each part rested."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Layout, Reached, Snapshot
+from apo_bench.assembly.placement import placed
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.judging.verdict import judge
+from apo_bench.records.outcomes import sentence
+from apo_bench.scenario.human_error import careless_covariance, spread
+from apo_bench.scenario.scenario import Carelessness
+from apo_bench.simulation.human.acts import act
+from apo_bench.simulation.human.hands import Hands, Watch
+from apo_bench.simulation.human.perform import REST_S, perform
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import snapshot, unstable
+
+
+def demonstrate(
+    scene: Scene, layout: Layout, careless: float, rng: np.random.Generator, watch: Watch | None = None
+) -> Demonstration:
+    """Assemble by hand, with an error of `careless` times the scenario's carelessness.
+
+    The error is put into the operation that the scenario names, and parts that are put against a displaced one follow
+    it. At the last operation the other hand corrects all of them; those small motions show in `final`, not in the
+    goals, since nobody looked at these parts again.
+
+    Args:
+        careless: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
+        rng: Drawn from in the same way whatever `careless` is, so that hands of one seed differ in size only.
+        watch: Looks on; the demonstration is the same with and without it.
+    """
+    scenario = scene.scenario
+    error = spread(scenario, layout, _draw(scenario.careless, careless, rng))
+    stages = (layout.start, *placed(scenario.assembly, layout.start, layout.goals))
+    hands = Hands(scene.shown, layout.start, watch)
+    hands.wait(0.05)
+    goals, after = [], []
+    for k, operation in enumerate(scenario.assembly.operations):
+        target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
+        late = error.left if k == len(scenario.assembly) - 1 else ()
+        perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
+        after.append(snapshot(scene.shown, hands.data, layout.start))
+        goals.append(after[-1].poses[operation.main])
+    hands.wait(REST_S)
+    final = snapshot(scene.shown, hands.data, layout.start)
+    why = "the simulation became unstable" if unstable(hands.data) else _wrong(scene, layout, after, final)
+    return Demonstration(
+        assembly=scenario.assembly,
+        start=layout.start,
+        goals=np.array(goals),
+        final=final.poses,
+        careless=careless_covariance(scenario, careless),
+        code="demonstration_failed" if why else "ok",
+        why=why,
+    )
+
+
+def _draw(how: Carelessness | None, careless: float, rng: np.random.Generator) -> Array:
+    """The offset of the careless operation, (3,) [m], in the part's own frame."""
+    sign, size = rng.choice([-1.0, 1.0]), rng.uniform(0.0, 1.0)
+    if how is None:
+        return np.zeros(3)
+    return careless * sign * (how.low_m + size * (how.high_m - how.low_m)) * how.axis
+
+
+def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> str:
+    """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
+    verdict = judge(
+        scene.scenario.assembly,
+        Reached(after=tuple(after), final=final),
+        layout.goals,
+        scene.scenario.thresholds,
+        scene.clearance_mm,
+    )
+    found = verdict.demonstrated
+    fault = next((fault for fault, there in found.conditions.items() if there and fault != "pushed"), None)
+    if fault is None:
+        return ""
+    bad = next((c for c in found.contacts if not c.strict), None)
+    where = f" ({bad.contact}, operation {bad.operation + 1})" if bad and fault in ("gap", "overlap") else ""
+    return sentence(fault) + where

@@ -1,0 +1,47 @@
+"""The arm somewhere else at once, with what it holds: a stretch of a motion on which nothing is near, left out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.scene.world import World, part_pose, place
+
+TINY_S = 1e-4
+"""Speeds of the tip are differences over this time."""
+
+
+def leap(
+    world: World,
+    data: Any,
+    forward: Any,
+    joints: tuple[Array, Array],
+    by: Array,
+    velocity: Array,
+    held: tuple[str, ...],
+) -> None:
+    """Move the arm, and what it holds as it lies in the hand, as one rigid body.
+
+    Args:
+        forward: Joint angles -> pose of the tip, (4, 4).
+        joints: Addresses of the arm's joints in `qpos` and in `qvel`.
+        by: (joints,), how far each joint goes, [rad].
+        velocity: (joints,), how fast it is then, [rad/s].
+    """
+    at, dof = joints
+    before = forward(data.qpos[at])
+    q = data.qpos[at] + by
+    after, later = forward(q), forward(q + TINY_S * velocity)
+    data.qpos[at], data.qvel[dof] = q, velocity
+    way = after @ pose.inverse(before)
+    speed = (later[:3, 3] - after[:3, 3]) / TINY_S
+    spin = after[:3, :3] @ pose.log(pose.inverse(after) @ later)[3:] / TINY_S
+    for part in held:
+        T = way @ part_pose(world, data, part)
+        place(world, data, part, T)
+        v = world.dof[part]
+        data.qvel[v : v + 3] = speed + np.cross(spin, T[:3, 3] - after[:3, 3])
+        data.qvel[v + 3 : v + 6] = T[:3, :3].T @ spin

@@ -1,0 +1,54 @@
+"""Joint angles along a line: inverse kinematics at knots, a cubic spline through them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.paths import Line
+from apo_bench.simulation.scene.arm import Kinematics
+
+KNOT_M, KNOT_RAD = 0.03, 0.15
+"""Inverse kinematics is solved at least this densely along a line."""
+FAR_M, FAR_RAD = 0.1, 0.5
+"""So densely where only the joint angles at the end are asked for."""
+
+
+def along(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | None:
+    """Joint angles, (k, joints), at places along a line; None where the arm does not reach.
+
+    Args:
+        s: (k,), in ascending order, from 0 to 1.
+        q: (joints,), at the first of the places, [rad].
+    """
+    if len(s) == 1:
+        return np.asarray(q)[None]
+    count = max(4, int(np.ceil((s[-1] - s[0]) * _steps(line, KNOT_M, KNOT_RAD))) + 1)
+    at = np.linspace(s[0], s[-1], count)
+    found = _angles(kinematics, line, at, q)
+    return None if found is None else np.asarray(CubicSpline(at, found)(s))
+
+
+def at_end(kinematics: Kinematics, line: Line, begin: float, end: float, q: Array) -> Array | None:
+    """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
+    count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, FAR_M, FAR_RAD))))
+    found = _angles(kinematics, line, np.linspace(begin, end, count), q)
+    return None if found is None else np.asarray(found[-1])
+
+
+def _steps(line: Line, far: float, turn: float) -> float:
+    """How many steps of these lengths, [m] and [rad], a line takes."""
+    return max(
+        float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3])) / far, float(np.linalg.norm(line.turn)) / turn
+    )
+
+
+def _angles(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | None:
+    path = [np.asarray(q)]
+    for i, T in enumerate(line.poses(s[1:])):
+        found = kinematics.inverse(T, 2 * path[-1] - path[-2] if i else path[-1])
+        if found is None:
+            return None
+        path.append(found)
+    return np.array(path)

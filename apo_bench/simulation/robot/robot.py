@@ -1,0 +1,327 @@
+"""The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
+
+The controller knows what it commanded, its own joint and finger positions and the force on the part in its hand. It
+never reads where a part is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.fast_forward import leap
+from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.near import Moving, clear, near_spans
+from apo_bench.simulation.robot.paths import Line, moved, smooth, unwound
+from apo_bench.simulation.robot.reach import along, at_end
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import fresh, part_pose, timestep, unfelt, unstable
+
+TICK_S = 0.02
+"""How often the arm looks for trouble and a film takes a picture."""
+COLLISION_N = 20.0
+"""An arm that strikes a part it does not hold harder than this has made a protective stop."""
+SHIFT_M = 0.001
+"""How far the tip is shifted in thought to see how the joints turn."""
+
+Watch = Callable[[Any], None]
+
+
+class Halt(Exception):
+    """The robot gives up; caught by `replay`, which makes an `Outcome` of it."""
+
+    def __init__(self, stage: str, code: str, part: str = "") -> None:
+        super().__init__(stage, code, part)
+        self.stage, self.code = stage, code
+        self.part = part
+        """Which part it is about, if not the one that is moved."""
+
+
+class Guard(NamedTuple):
+    """Stop when the held part is pushed back along `way` by more than `newton`."""
+
+    way: Array
+    newton: float
+
+
+class Robot:
+    """One arm during one replay."""
+
+    def __init__(self, scene: Scene, start: Poses, watch: Watch | None = None, fidelity: str = "full") -> None:
+        self.scene, self.watch, self.fidelity = scene, watch, fidelity
+        self.left_out_s = 0.0
+        """How much of the time passed without being simulated."""
+        self.model, self.arm = scene.work.model, scene.arm
+        self.stage = "plan"
+        self._held: tuple[str, ...] = ()
+        self._handled: int | None = None
+        self.peak_force_n = 0.0
+        self._find_joints()
+        self._net = np.zeros((3, self.model.nsensordata))
+        self.data: Any = fresh(scene.work, start)
+        self.data.qpos[self._qpos] = self.arm.home
+        self.data.qpos[self._fingers] = self.arm.opening_m
+        mujoco.mj_forward(self.model, self.data)
+        self.q: Array = np.array(self.arm.home)
+        self.T: Array = scene.kinematics.forward(self.q)
+        self._rest = self.T
+        self.data.ctrl[self._drives] = self.q
+        self.data.ctrl[self._grip] = self.arm.opening_m
+        self._names = (*scene.work.free, *scene.work.fixed)
+        self._forces = self.data.sensordata
+        self._on_arm = self._forces.reshape(-1, 3)[len(scene.work.free) :]
+
+    def follow(self, line: Line, guard: Guard | None = None) -> float:
+        """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.
+
+        Raises:
+            Halt: The line leaves the arm's reach, or something went wrong on the way.
+        """
+        if np.abs(line.start - line.end).max() < 1e-7:
+            return 0.0
+        n = max(1, round(line.seconds / self.step_s))
+        s, done = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)]), 0
+        for begin, end in self._spans(line, s):
+            q = self.q
+            if begin > done:
+                q = self._reached(at_end(self.scene.kinematics, line, s[done], s[begin], q))
+            path = self._reached(along(self.scene.kinematics, line, s[begin : end + 1], q))
+            velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
+            if begin > done:
+                self._leap(q, velocity[0], begin - done)
+            if self._run((path + self._lead * velocity)[1:], guard) < end - begin:
+                self._hold_where_it_is()
+                return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
+            self.q, done = path[-1], end
+        self.T = line.end
+        return 0.0
+
+    def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
+        """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
+        for T in unwound(self._rest, self.T, end):
+            self.follow(smooth(self.T, T, speed, turn_speed))
+
+    def servo(self, law: Callable[[Array], Array | None]) -> None:
+        """Shift the tip a little, step by step, as the force on the part in the hand has it.
+
+        Args:
+            law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip shall be off
+                where it began, (3,) world, [m], or None to end.
+
+        Raises:
+            Halt: The arm does not reach around there, or something went wrong on the way.
+        """
+        q, T, offset, passed = self.q, self.T, np.zeros(3), 0
+        moves = np.array([self._across(q, T, axis) for axis in np.eye(3)])
+        while (asked := law(self.force())) is not None:
+            offset, passed = asked, passed + 1
+            self.data.ctrl[self._drives] = q + offset @ moves
+            mujoco.mj_step(self.model, self.data)
+            self._feel()
+            if passed % self._every == 0:
+                self._look()
+        self.q, self.T = q + offset @ moves, moved(T, offset, 1.0)
+
+    def _across(self, q: Array, T: Array, axis: Array) -> Array:
+        """How the joints turn while the tip is shifted, (joints,), [rad/m]; as good as exact over some millimetres."""
+        inverse = self.scene.kinematics.inverse
+        ends = [self._reached(inverse(moved(T, axis, by), q)) for by in (-SHIFT_M, SHIFT_M)]
+        return np.asarray((ends[1] - ends[0]) / (2 * SHIFT_M))
+
+    def wait(self, seconds: float, parts: int = 1) -> None:
+        """Stand still; each physics step may be taken in so many parts."""
+        self.data.ctrl[self._drives] = self.q
+        steps = round(seconds / self.step_s)
+        for done in range(0, steps, self._every):
+            n = min(self._every, steps - done)
+            with timestep(self.model, self.step_s / parts), unfelt(self.model):
+                mujoco.mj_step(self.model, self.data, parts * n - 1)
+            with timestep(self.model, self.step_s / parts):
+                mujoco.mj_step(self.model, self.data)
+            if n == self._every:
+                self._look()
+
+    def fingers(self, to: float, seconds: float = 0.25) -> None:
+        """Command both fingers to an opening [m] and wait; beyond the part's surface the force limit rules."""
+        if self.fidelity == "contact" and not self._held and self._may_open(to):
+            self.data.qpos[self._fingers], self.data.ctrl[self._grip] = to, to
+            return self._pass(seconds)
+        start = float(self.data.ctrl[self._grip])
+        ticks = max(1, round(seconds / TICK_S))
+        for i in range(1, ticks + 1):
+            self.data.ctrl[self._grip] = start + (to - start) * min(1.0, i / (0.6 * ticks))
+            self.wait(TICK_S)
+
+    def opening(self) -> float:
+        """What the fingers measure, [m] per finger."""
+        return float(self.data.qpos[self._fingers].min())
+
+    def force(self) -> Array:
+        """The net force of everything but the gripper on what is in the hand, (3,) world, [N].
+
+        What the parts of a group exert on each other cancels.
+        """
+        return np.asarray(self._net @ self._forces)
+
+    def memory(self) -> tuple[Any, ...]:
+        """What the controller knows, apart from the physics; for `remember`."""
+        return (self.q, self.T, self.stage, self._held, self._handled, self.peak_force_n, self.left_out_s)
+
+    def remember(self, memory: tuple[Any, ...]) -> None:
+        """Go on from where a `memory` was made, once the physics are where they were then."""
+        self.q, self.T, self.stage, held, self._handled, self.peak_force_n, self.left_out_s = memory
+        self.hold(*held)
+
+    def load(self) -> float:
+        """The weight that the gripper feels, [N]: of the held part and of what really hangs on it."""
+        return -float(self._on_arm[:, 2].sum())
+
+    def hold(self, *parts: str) -> None:
+        """Say which parts are in the hand: the held one and what it carries, or none."""
+        free = self.scene.work.free
+        self._held = parts
+        self._net = np.zeros((3, self.model.nsensordata))
+        for i in map(free.index, parts):
+            self._net[:, 3 * (len(free) + i) : 3 * (len(free) + i) + 3] += np.eye(3)
+            self._net[:, 3 * i : 3 * i + 3] -= np.eye(3)
+
+    def weld(self, part: str, on: bool) -> None:
+        """The ideal gripper: hold the part exactly as it now is, or let go."""
+        weld = self.model.equality(f"grasp_{part}").id
+        if on:
+            body, mount = self.data.body(f"{part}/"), self.data.body(f"arm/{self.arm.mount}")
+            T = pose.inverse(_frame(mount)) @ _frame(body)
+            q = np.zeros(4)
+            mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
+            self.model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *q, 1)
+        self.data.eq_active[weld] = int(on)
+
+    def _spans(self, line: Line, s: Array) -> list[tuple[int, int]]:
+        """Which steps of a line are simulated: all of them, or those where something is near; at last the end."""
+        n = len(s) - 1
+        if self.fidelity == "full":
+            return [(0, n)]
+        spans = near_spans(self.scene, self.data, self._moving(self.opening()), self._held, line, s)
+        return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
+
+    def _moving(self, opening: float) -> list[Moving]:
+        """The hand and what it holds, as they move with the tip."""
+        tip = pose.inverse(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
+        held = [Moving(self.scene.boxes[p], tip @ part_pose(self.scene.work, self.data, p)) for p in self._held]
+        return [Moving(gripper_boxes(self.scene.kinematics, self.arm, round(opening, 4)), np.eye(4)), *held]
+
+    def _leap(self, q: Array, velocity: Array, steps: int) -> None:
+        """Leave out steps on which nothing is near."""
+        joints, forward = (self._qpos, self._dof), self.scene.kinematics.forward
+        leap(self.scene.work, self.data, forward, joints, q - self.q, velocity, self._held)
+        self._pass(steps * self.step_s)
+
+    def _may_open(self, to: float) -> bool:
+        """Whether nothing is near the empty hand, neither as it is nor with its fingers somewhere else."""
+        return clear(self.scene, self.data, self._moving(max(to, self.opening())), (), self.T)
+
+    def _pass(self, seconds: float) -> None:
+        self.data.time += seconds
+        self.left_out_s += seconds
+
+    def _reached(self, q: Array | None) -> Array:
+        if q is None:
+            raise Halt(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
+        return q
+
+    def _run(self, targets: Array, guard: Guard | None) -> int:
+        """Step through joint targets (n, joints), one physics step each; returns how many were run."""
+        model, data, step, every = self.model, self.data, mujoco.mj_step, self._every
+        rows = np.repeat(data.ctrl[None], len(targets), axis=0)
+        rows[:, self._drives] = targets
+        ctrl = data.ctrl
+        if guard is None:
+            self._run_free(rows)
+            return len(targets)
+        for i, row in enumerate(rows, start=1):
+            ctrl[:] = row
+            step(model, data)
+            if self._pushed_back(guard):
+                self._look()
+                return i
+            if i % every == 0:
+                self._look()
+        return len(targets)
+
+    def _run_free(self, rows: Array) -> None:
+        """Step through commands (n, controls) that no guard watches: forces are felt once a tick, when it looks."""
+        model, data, step, ctrl = self.model, self.data, mujoco.mj_step, self.data.ctrl
+        for i in range(0, len(rows), self._every):
+            tick = rows[i : i + self._every]
+            with unfelt(model):
+                for row in tick[:-1]:
+                    ctrl[:] = row
+                    step(model, data)
+            ctrl[:] = tick[-1]
+            step(model, data)
+            if len(tick) == self._every:
+                self._look()
+
+    def _look(self) -> None:
+        """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""
+        if unstable(self.data):
+            raise Halt(self.stage, "unstable_simulation")
+        self._feel()
+        struck, force = self._hardest_blow()
+        if force > COLLISION_N:
+            raise Halt(self.stage, "collision", struck)
+        if self.watch is not None:
+            self.watch(self.data)
+
+    def _feel(self) -> list[float]:
+        """The force on the part in the hand, remembered if it is the largest so far."""
+        x, y, z = f = (self._net @ self._forces).tolist()
+        self.peak_force_n = max(self.peak_force_n, math.sqrt(x * x + y * y + z * z))
+        return f
+
+    def _pushed_back(self, guard: Guard) -> bool:
+        (x, y, z), (a, b, c) = self._feel(), guard.way.tolist()
+        return -(x * a + y * b + z * c) > guard.newton
+
+    def _hardest_blow(self) -> tuple[str, float]:
+        """The part that the arm strikes hardest without handling it, and the force, [N]."""
+        squares = (self._on_arm * self._on_arm).sum(axis=1)
+        if self._handled is not None:
+            squares[self._handled] = 0.0
+        i = int(squares.argmax())
+        return self._names[i], math.sqrt(squares[i])
+
+    def handle(self, part: str | None) -> None:
+        """Say which part the fingers may touch."""
+        self._handled = None if part is None else self.scene.work.free.index(part)
+
+    def _hold_where_it_is(self) -> None:
+        """After a guard: the measured joint positions become the command, which takes the pressure away."""
+        self.q = np.array(self.data.qpos[self._qpos])
+        self.T = self.scene.kinematics.forward(self.q)
+        self.wait(0.05)
+
+    def _find_joints(self) -> None:
+        model = self.model
+        joints = [model.joint(f"arm/{name}").id for name in self.arm.joints]
+        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self.step_s = float(model.opt.timestep)
+        self._drives = [model.actuator(f"arm/{name}").id for name in self.arm.joints]
+        self._grip = model.actuator(f"arm/{self.arm.grip}").id
+        self._fingers = np.array([model.jnt_qposadr[model.joint(f"arm/{name}").id] for name in self.arm.fingers])
+        gain, bias = model.actuator_gainprm[self._drives, 0], model.actuator_biasprm[self._drives, 2]
+        self._lead = (model.dof_damping[model.jnt_dofadr[joints]] - bias) / gain
+        self._every = max(1, round(TICK_S / model.opt.timestep))
+
+
+def _frame(body: Any) -> Array:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = body.xmat.reshape(3, 3), body.xpos
+    return T

@@ -1,0 +1,1 @@
+"""The scene: room, parts and arm as MuJoCo models, and pictures of them."""

@@ -1,0 +1,200 @@
+"""Pictures: of a state, of what is believed, and films of a replay. Nothing here is needed to simulate."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.scene.graphics import need_window, renderer
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import World, fresh, place
+
+Image = NDArray[np.uint8]
+Camera = Any
+"""The name of a camera of the room, or a `mujoco.MjvCamera`."""
+VIDEO_ENDINGS = (".mp4", ".gif")
+
+
+def picture(
+    scene: Scene,
+    poses: Poses,
+    width: int = 640,
+    height: int = 480,
+    camera: Camera = "overview",
+    more: Callable[[Any], None] | None = None,
+) -> Image:
+    """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
+
+    Args:
+        camera: `overview`, `close`, `top`, or a `view`.
+        more: Draws more into MuJoCo's abstract scene, such as `Marks`.
+    """
+    return _drawn(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
+
+
+def picture_with_arm(
+    scene: Scene,
+    poses: Poses,
+    state: Array | None = None,
+    width: int = 640,
+    height: int = 480,
+    camera: Camera = "overview",
+) -> Image:
+    """The same with the arm, at home with its fingers open, (height, width, 3).
+
+    Args:
+        state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.
+    """
+    data = _at(scene.work, scene, poses)
+    for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
+        data.joint(f"arm/{joint}").qpos = q
+    for finger in scene.arm.fingers:
+        data.joint(f"arm/{finger}").qpos = scene.arm.opening_m
+    if state is not None:
+        data.qpos[:] = state
+    mujoco.mj_forward(scene.work.model, data)
+    return _drawn(scene.work, data, width, height, camera)
+
+
+def view(look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0) -> Camera:
+    """A camera that looks at a point of the world, (3,), [m]."""
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance = look_at, distance_m
+    camera.azimuth, camera.elevation = azimuth_deg, elevation_deg
+    return camera
+
+
+class Film:
+    """Takes pictures of a replay: pass it as `watch`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        fps: float = 20.0,
+        width: int = 640,
+        height: int = 480,
+        camera: Camera | None = None,
+        speed: float = 2.0,
+        shadows: bool = False,
+    ) -> None:
+        """A film to be shown at `fps` pictures a second, `speed` times as fast as the replay was.
+
+        Args:
+            camera: By default one that looks at the middle of the assembly.
+            shadows: Nicer, and some times slower to draw without a graphics card.
+        """
+        middle = np.array([*scene.scenario.site.center_m, 0.08])
+        self.fps, self.camera = fps, camera or view(middle, 0.85, 128.0, -24.0)
+        self.frames: list[Image] = []
+        self._renderer = renderer(scene.work.model, width, height)
+        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
+        self._close = weakref.finalize(self, _release, self._renderer)
+        self._every, self._next = speed / fps, 0.0
+
+    def __call__(self, data: Any) -> None:
+        if data.time >= self._next:
+            self.frames.append(self.shot(data))
+            self._next = data.time + self._every - 1e-9
+
+    def shot(self, data: Any) -> Image:
+        """One picture of the present state, not kept."""
+        self._renderer.update_scene(data, camera=self.camera)
+        return np.array(self._renderer.render())
+
+    def save(self, path: str | Path) -> None:
+        """Write the film, by its ending as MP4 or GIF.
+
+        Raises:
+            InputError: Another ending.
+        """
+        save_film(self.frames, path, self.fps)
+
+    def close(self) -> None:
+        """Give the renderer back; done by itself when the film is no longer used."""
+        self._close()
+
+
+def save_film(frames: Iterable[Image], path: str | Path, fps: float) -> None:
+    """Write pictures as a film, MP4 or GIF by the ending.
+
+    Raises:
+        InputError: Another ending, or a place that cannot be written.
+    """
+    import imageio.v3 as imageio
+
+    path = Path(path)
+    if path.suffix.lower() not in VIDEO_ENDINGS:
+        raise InputError(f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.")
+    how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
+    if path.suffix.lower() == ".mp4":
+        how = {"fps": fps, "macro_block_size": 8}
+    try:
+        imageio.imwrite(path, np.array(list(frames)), **how)
+    except OSError as error:
+        raise InputError(f"the film '{path}' cannot be written: {error}.") from error
+
+
+class Viewer:
+    """Shows a replay in MuJoCo's window, in real time: pass it as `watch`. On macOS run under `mjpython`."""
+
+    def __init__(self, scene: Scene) -> None:
+        """A viewer whose window opens when the replay begins.
+
+        Raises:
+            InputError: No window can be opened.
+        """
+        need_window()
+        self._scene = scene
+        self._window: Any = None
+
+    def __call__(self, data: Any) -> None:
+        import time
+
+        import mujoco.viewer
+
+        if self._window is None:
+            self._window = mujoco.viewer.launch_passive(self._scene.work.model, data)
+            self._behind = time.perf_counter() - data.time
+        self._window.sync()
+        time.sleep(max(0.0, data.time + self._behind - time.perf_counter()))
+
+    def close(self) -> None:
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+
+def _drawn(
+    world: World, data: Any, width: int, height: int, camera: Camera, more: Callable[[Any], None] | None = None
+) -> Image:
+    with renderer(world.model, width, height) as draws:
+        draws.update_scene(data, camera=camera)
+        if more is not None:
+            more(draws.scene)
+        return np.array(draws.render())
+
+
+def _at(world: World, scene: Scene, poses: Poses) -> Any:
+    data = fresh(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
+    for part in world.free:
+        place(world, data, part, poses.get(part, scene.scenario.start[part]))
+    data.mocap_pos[:, 2] = -1.0
+    mujoco.mj_forward(world.model, data)
+    return data
+
+
+def _release(renderer: Any) -> None:
+    """Close a renderer in its own context: in another's it would free that one's pictures."""
+    context = renderer._gl_context
+    if context is not None:
+        context.make_current()
+    renderer.close()

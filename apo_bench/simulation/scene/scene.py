@@ -1,0 +1,201 @@
+"""Compose the room, the parts and the arm into MuJoCo models, once per scenario, clearance and grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, final
+from xml.etree import ElementTree
+
+import mujoco
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.solid import Box
+from apo_bench.parts import read_part
+from apo_bench.resources import folder
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
+from apo_bench.simulation.scene.graphics import import_mjcf
+from apo_bench.simulation.scene.physics import Physics, physics
+from apo_bench.simulation.scene.world import World, world
+
+GRASPS = ("friction", "weld")
+Grasp = Literal["friction", "weld"]
+HANDS = ("hand0", "hand1")
+HAND_WELD = {"solref": (0.01, 1.0), "solimp": (0.95, 0.99, 0.001, 0.5, 2.0)}
+"""Soft like a hand: a part held by it yields a little and is not torn through its neighbours."""
+ARM_WELD = {"solref": (0.004, 1.0), "solimp": (0.98, 0.999, 0.0005, 0.5, 2.0)}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything compiled: reusable for any number of trials, which leave nothing behind in it."""
+
+    scenario: Scenario
+    clearance_mm: float
+    grasp: Grasp
+    arm: Arm
+    physics: Physics
+    boxes: Mapping[str, tuple[Box, ...]]
+    """Part -> its boxes as it is made, with clearance."""
+    shown: World
+    """Parts and hands: where the human demonstrates."""
+    work: World
+    """Parts and arm: where the robot replays."""
+    kinematics: Kinematics
+
+
+def build_scene(
+    scenario: Scenario,
+    *,
+    clearance_mm: float | None = None,
+    grasp: str = "friction",
+    arm: str | Arm = "six_axis",
+    timestep_s: float = 0.001,
+) -> Scene:
+    """Compile a scenario.
+
+    Raises:
+        InputError: Unknown grasp or arm, a clearance that a part cannot have, an unchecked time step.
+    """
+    if grasp not in GRASPS:
+        raise InputError(unknown("grasp", grasp, GRASPS))
+    clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
+    found, settings = find_arm(arm), physics(timestep_s)
+    return Scene(
+        scenario=scenario,
+        clearance_mm=clearance,
+        grasp="weld" if grasp == "weld" else "friction",
+        arm=found,
+        physics=settings,
+        boxes={name: physical_boxes(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
+        shown=_compiled(scenario, _compose(scenario, clearance, settings, None, grasp)),
+        work=_compiled(scenario, _compose(scenario, clearance, settings, found, grasp)),
+        kinematics=Kinematics(found),
+    )
+
+
+def scene_xml(
+    scenario: Scenario,
+    *,
+    clearance_mm: float | None = None,
+    grasp: str = "friction",
+    arm: str | Arm = "six_axis",
+    timestep_s: float = 0.001,
+) -> str:
+    """The replay scene as one MJCF text that opens in MuJoCo's viewer, every part at its start."""
+    return build_scene(scenario, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s).work.xml
+
+
+def _compiled(scenario: Scenario, xml: str) -> World:
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return world(model, xml, _movable(scenario), _fixed(scenario))
+
+
+def _movable(scenario: Scenario) -> tuple[str, ...]:
+    return tuple(part for part in scenario.assembly.solids if part not in scenario.assembly.fixed)
+
+
+def _fixed(scenario: Scenario) -> tuple[str, ...]:
+    return tuple(part for part in scenario.assembly.solids if part in scenario.assembly.fixed)
+
+
+def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm | None, grasp: str) -> str:
+    mjcf = import_mjcf()
+    room = mjcf.from_path(str(folder("assets") / "room.xml"))
+    room.model = scenario.name
+    _set_physics(room, settings)
+    start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
+    bodies = {
+        part: _add_part(mjcf, room, scenario, part, start[part], clearance_mm, settings)
+        for part in scenario.assembly.solids
+    }
+    movable = {part: body for part, body in bodies.items() if part not in scenario.assembly.fixed}
+    if arm is None:
+        _add_hands(room, movable)
+    else:
+        _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
+    return _with_force_sensors(room.to_xml_string(), scenario, arm)
+
+
+def _set_physics(room: Any, s: Physics) -> None:
+    option = room.option
+    option.timestep, option.integrator, option.cone = s.timestep_s, "implicitfast", "elliptic"
+    option.impratio, option.solver, option.tolerance, option.iterations = (
+        s.impratio,
+        "Newton",
+        s.tolerance,
+        s.iterations,
+    )
+
+
+def _set_contact(model: Any, s: Physics) -> None:
+    """Contact parameters of a file about to be attached: PyMJCF's default classes do not inherit from the room's."""
+    geom = model.default.geom
+    geom.solref, geom.solimp, geom.condim = s.solref, s.solimp, s.condim
+
+
+def _add_part(
+    mjcf: Any, room: Any, scenario: Scenario, part: str, T: Array, clearance_mm: float, settings: Physics
+) -> Any:
+    """Attach a part's file at T, its fit faces receded; returns the body that has the mass (its frame has none)."""
+    file, solid = read_part(scenario.part_files[part]), scenario.assembly.solids[part]
+    if [box.name for box in file.boxes] != [box.name for box in solid.boxes]:
+        raise InputError(f"{file.path}: the boxes are others than those of part '{part}'; load the scenario again.")
+    model = mjcf.from_xml_string(file.xml)
+    model.model = part
+    _set_contact(model, settings)
+    for box in physical_boxes(solid, clearance_mm * 1e-3):
+        geom = model.find("geom", box.name)
+        geom.pos, geom.size = box.center, box.half
+    if part in scenario.colors:
+        for geom in model.find_all("geom"):
+            geom.rgba = (*scenario.colors[part], 1.0)
+    frame = room.attach(model)
+    frame.pos = T[:3, 3]
+    frame.xyaxes = (*T[:3, 0], *T[:3, 1])
+    if part not in scenario.assembly.fixed:
+        frame.add("freejoint")
+    return model.worldbody.body[0]
+
+
+def _add_hands(room: Any, movable: Mapping[str, Any]) -> None:
+    for i, hand in enumerate(HANDS):
+        mocap = room.worldbody.add("body", name=hand, mocap=True, pos=(0.0, 0.5 + 0.1 * i, 0.3))
+        mocap.add("geom", type="sphere", size=(0.012,), contype=0, conaffinity=0, rgba=(0.90, 0.70, 0.60, 0.7))
+        for part, body in movable.items():
+            room.equality.add("weld", name=f"{hand}_{part}", body1=mocap, body2=body, active=False, **HAND_WELD)
+
+
+def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings: Physics) -> None:
+    model = mjcf.from_path(str(arm.mjcf))
+    model.model = "arm"
+    _set_contact(model, settings)
+    room.attach(model).pos = arm.base
+    mount = model.find("body", arm.mount)
+    for part, body in welded.items():
+        room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **ARM_WELD)
+
+
+def _with_force_sensors(xml: str, scenario: Scenario, arm: Arm | None) -> str:
+    """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
+
+    PyMJCF's schema does not know contact sensors, so they are written into the finished text.
+    """
+    if arm is None:
+        return xml
+    root = ElementTree.fromstring(xml)
+    sensors = ElementTree.SubElement(root, "sensor")
+    net = {"num": "1", "data": "force", "reduce": "netforce"}
+    for part in _movable(scenario):
+        ElementTree.SubElement(sensors, "contact", {"name": f"all_{part}", "subtree1": f"{part}/", **net})
+    for part in (*_movable(scenario), *_fixed(scenario)):
+        names = {"name": f"arm_{part}", "subtree1": f"{part}/", "subtree2": "arm/"}
+        ElementTree.SubElement(sensors, "contact", {**names, **net})
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,177 @@
+"""A compiled model and where its parts are in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Poses, Snapshot
+from apo_bench.geometry.arrays import Array
+
+Ints = NDArray[np.int64]
+SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class World:
+    """Shared by every trial of a scene; a trial owns only its `MjData`."""
+
+    model: Any
+    """`mujoco.MjModel`. Trials change its weld targets before they switch a weld on, nothing else."""
+    xml: str
+    free: tuple[str, ...]
+    """Movable parts, in the order of the scenario."""
+    fixed: tuple[str, ...]
+    body: dict[str, int]
+    """Part -> body id."""
+    qpos: dict[str, int]
+    dof: dict[str, int]
+    geom_part: Ints
+    """Per geom: index into free + fixed, -1 for everything else (arm, hands)."""
+
+
+def world(model: Any, xml: str, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
+    """Look up every part of a compiled scene."""
+    parts = free + fixed
+    body = {part: model.body(f"{part}/").id for part in parts}
+    root = {body_id: i for i, body_id in enumerate(body.values())}
+    geom_part = np.array([_owner(model, int(b), root) for b in model.geom_bodyid])
+    joints = {part: int(model.body(f"{part}/").jntadr[0]) for part in free}
+    return World(
+        model=model,
+        xml=xml,
+        free=free,
+        fixed=fixed,
+        body=body,
+        qpos={part: int(model.jnt_qposadr[j]) for part, j in joints.items()},
+        dof={part: int(model.jnt_dofadr[j]) for part, j in joints.items()},
+        geom_part=geom_part,
+    )
+
+
+def place(world: World, data: Any, part: str, T: Array) -> None:
+    """Put a movable part somewhere, at rest."""
+    q = np.zeros(4)
+    mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
+    a, v = world.qpos[part], world.dof[part]
+    data.qpos[a : a + 3], data.qpos[a + 3 : a + 7] = T[:3, 3], q
+    data.qvel[v : v + 6] = 0.0
+
+
+def fresh(world: World, start: Poses) -> Any:
+    """New `MjData` with every movable part at its start and every fixed part at its place."""
+    for part in world.fixed:
+        body = world.body[part]
+        world.model.body_pos[body] = start[part][:3, 3]
+        mujoco.mju_mat2Quat(world.model.body_quat[body], np.ascontiguousarray(start[part][:3, :3]).ravel())
+    data = mujoco.MjData(world.model)
+    for part in world.free:
+        place(world, data, part, start[part])
+    mujoco.mj_forward(world.model, data)
+    return data
+
+
+def part_pose(world: World, data: Any, part: str) -> Array:
+    """The pose of a movable part, (4, 4), straight from its joint."""
+    a = world.qpos[part]
+    T, R = np.eye(4), np.zeros(9)
+    mujoco.mju_quat2Mat(R, data.qpos[a + 3 : a + 7])
+    T[:3, :3], T[:3, 3] = R.reshape(3, 3), data.qpos[a : a + 3]
+    return T
+
+
+def unstable(data: Any) -> bool:
+    """Whether MuJoCo has warned of anything, or a number is no longer finite."""
+    return bool(data.warning.number.any() or not np.isfinite(data.qpos).all())
+
+
+@contextmanager
+def sleeping(world: World, allowed: bool) -> Iterator[None]:
+    """Whether parts that rest and that nothing moves against are left as they are, for a while."""
+    options = world.model.opt
+    before = int(options.enableflags)
+    options.enableflags = before | SLEEP if allowed else before & ~SLEEP
+    try:
+        yield
+    finally:
+        options.enableflags = before
+
+
+@contextmanager
+def timestep(model: Any, seconds: float) -> Iterator[None]:
+    """Steps of another length, for a while."""
+    before = float(model.opt.timestep)
+    model.opt.timestep = seconds
+    try:
+        yield
+    finally:
+        model.opt.timestep = before
+
+
+@contextmanager
+def unfelt(model: Any) -> Iterator[None]:
+    """Steps after which no sensor is asked: they need not be computed for a while."""
+    before = int(model.opt.disableflags)
+    model.opt.disableflags = before | NO_SENSORS
+    try:
+        yield
+    finally:
+        model.opt.disableflags = before
+
+
+def awaken(world: World, data: Any) -> None:
+    """Bring all that follows from the positions up to date, contacts of parts that were left alone too."""
+    with sleeping(world, False):
+        mujoco.mj_fwdPosition(world.model, data)
+
+
+def snapshot(world: World, data: Any, start: Poses) -> Snapshot:
+    """What the judge may see of the present state."""
+    awaken(world, data)
+    poses = {part: part_pose(world, data, part) for part in world.free}
+    poses.update({part: start[part] for part in world.fixed})
+    speeds = [data.qvel[v : v + 3] for v in world.dof.values()]
+    spins = [data.qvel[v + 3 : v + 6] for v in world.dof.values()]
+    return Snapshot(
+        poses=poses,
+        penetration_m=_penetration(world, data),
+        speed_m_s=float(max(np.linalg.norm(v) for v in speeds)),
+        spin_rad_s=float(max(np.linalg.norm(w) for w in spins)),
+        released=_released(world, data),
+    )
+
+
+def _penetration(world: World, data: Any) -> float:
+    a, b = _contact_parts(world, data)
+    between = (a >= 0) & (b >= 0) & (a != b)
+    return float(max(0.0, -np.min(data.contact.dist[between], initial=0.0)))
+
+
+def _released(world: World, data: Any) -> bool:
+    """No weld is on and nothing but parts touches a part."""
+    a, b = _contact_parts(world, data)
+    welds = world.model.eq_type == int(mujoco.mjtEq.mjEQ_WELD)
+    return not bool(data.eq_active[welds].any() or ((a >= 0) != (b >= 0)).any())
+
+
+def _contact_parts(world: World, data: Any) -> tuple[Ints, Ints]:
+    if data.ncon == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    geoms = data.contact.geom
+    return world.geom_part[geoms[:, 0]], world.geom_part[geoms[:, 1]]
+
+
+def _owner(model: Any, body: int, root: dict[int, int]) -> int:
+    while body > 0:
+        if body in root:
+            return root[body]
+        body = int(model.body_parentid[body])
+    return -1

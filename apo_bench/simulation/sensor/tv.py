@@ -1,0 +1,78 @@
+"""The TV camera: grey pictures of low resolution, and whether the scene is quiet after something changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import final
+
+import numpy as np
+
+from apo_bench.depth_camera.range_finder import MIDDLE_M
+from apo_bench.depth_camera.view import View, looking
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.sensor.rays import Strike
+
+LIGHT = np.array([0.25, -0.35, 1.0]) / np.linalg.norm([0.25, -0.35, 1.0])
+"""Where the light comes from: that of the room."""
+AMBIENT = 0.4
+LUMA = np.array([0.299, 0.587, 0.114])
+BACKGROUND = 0.9
+
+
+@lru_cache(maxsize=1)
+def front_view() -> View:
+    """Obliquely from the front, 160 x 120: a pixel is 6 mm wide, and a motion of some millimetres changes few."""
+    return View(looking((0.85, -0.35, 0.75), MIDDLE_M), 160, 120, 45.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TvCamera:
+    """How it sees, and when it calls something a change."""
+
+    view: View = field(default_factory=front_view)
+    noise: float = 2.0 / 255.0
+    """Standard deviation of the brightness of a pixel, where white is 1."""
+    changed: float = 12.0 / 255.0
+    """A pixel differs if its brightness does by more: four standard deviations of a difference."""
+    share: float = 0.0004
+    """A picture differs if more than this share of its pixels does: seven, where noise alone makes less than one."""
+    quiet_s: float = 0.15
+    """The scene is quiet if pictures have not differed for so long."""
+    late_s: float = 0.1
+    """A motion that begins slowly is seen so much later at most."""
+    period_s: float = 0.05
+    """Between two pictures."""
+
+    def brightness(self, strike: Strike, rgba: Array) -> Array:
+        """The picture without noise, (n,): Lambert's law, one light, the colours of the geoms.
+
+        Args:
+            rgba: (geoms, 4).
+        """
+        lit = AMBIENT + (1.0 - AMBIENT) * np.maximum(strike.normal @ LIGHT, 0.0)
+        grey = np.append(rgba[:, :3] @ LUMA, BACKGROUND)[strike.geom]
+        return np.where(strike.geom < 0, BACKGROUND, grey * lit)
+
+
+@final
+class Change:
+    """Compares pictures one after the other: is the scene quiet?"""
+
+    def __init__(self, camera: TvCamera) -> None:
+        self._camera = camera
+        self._reference: Array | None = None
+        self._since = 0.0
+
+    def quiet(self, picture: Array, time_s: float) -> bool:
+        """Take one more picture; whether nothing has changed for `quiet_s`.
+
+        Pictures are compared with the one at the last change, so that slow motions add up until they are seen.
+        """
+        if self._reference is None or self._differs(picture, self._reference):
+            self._reference, self._since = picture, time_s
+        return time_s - self._since >= self._camera.quiet_s - 1e-9
+
+    def _differs(self, picture: Array, reference: Array) -> bool:
+        return bool(np.mean(np.abs(picture - reference) > self._camera.changed) > self._camera.share)

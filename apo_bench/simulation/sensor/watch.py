@@ -1,0 +1,95 @@
+"""Watch a demonstration while it runs: the TV camera says when it is quiet, and then the range finder fires."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.scene.world import World
+from apo_bench.simulation.sensor.rays import Sight
+from apo_bench.simulation.sensor.tv import Change, TvCamera
+
+STILL = 5e-5
+"""Where no coordinate has changed by more, [m] or of a quaternion, the picture is the same."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """What the range finder saw without any error: before everything, and in every quiet spell."""
+
+    finder: RangeFinder
+    images: tuple[RangeImage, ...]
+    times_s: tuple[float, ...]
+    """Simulated time of each firing."""
+    pictures: tuple[Array, ...]
+    """What the TV camera saw then, without noise, (height, width), black 0 to white 1."""
+
+
+@final
+class Watcher:
+    """Pass it to `demonstrate` as `watch`: it is called with the `MjData` at every picture and changes nothing."""
+
+    def __init__(
+        self,
+        world: World,
+        rng: np.random.Generator,
+        camera: TvCamera | None = None,
+        finder: RangeFinder | None = None,
+    ) -> None:
+        """A watcher of one demonstration.
+
+        Args:
+            rng: The noise of the TV camera.
+        """
+        self.camera, self.finder = camera or TvCamera(), finder or RangeFinder()
+        self.period_s = self.camera.period_s
+        self._sight, self._rgba = Sight(world), np.array(world.model.geom_rgba, dtype=np.float64)
+        self._rng, self._change = rng, Change(self.camera)
+        self._spell: list[tuple[float, Array]] = []
+        self._images: list[RangeImage] = []
+        self._times: list[float] = []
+        self._pictures: list[Array] = []
+        self._drawn: tuple[Array, Array] | None = None
+
+    def __call__(self, data: Any) -> None:
+        now = float(data.time)
+        if not self._images:
+            self._fire(now, data.qpos)
+        if self._change.quiet(self._picture(data.qpos), now):
+            self._spell.append((now, np.array(data.qpos)))
+        elif self._spell:
+            self._keep(now - self.camera.late_s)
+
+    def watched(self) -> Watched:
+        """What was kept, when the demonstration is over."""
+        self._keep(np.inf)
+        return Watched(self.finder, tuple(self._images), tuple(self._times), tuple(self._pictures))
+
+    def _picture(self, qpos: Array) -> Array:
+        """The next picture of the TV camera; where nothing moved only its noise is new."""
+        if self._drawn is None or np.abs(qpos - self._drawn[0]).max() > STILL:
+            self._drawn = np.array(qpos), self._grey(qpos)
+        grey = self._drawn[1]
+        return np.asarray(grey + self.camera.noise * self._rng.standard_normal(len(grey)))
+
+    def _grey(self, qpos: Array) -> Array:
+        self._sight.look(qpos)
+        return self.camera.brightness(self._sight.strike(self.camera.view), self._rgba)
+
+    def _keep(self, until_s: float) -> None:
+        """Of the firings of a quiet spell that is over, the last one before a motion could have begun counts."""
+        before = [firing for firing in self._spell if firing[0] <= until_s + 1e-9]
+        if before:
+            self._fire(*before[-1])
+        self._spell.clear()
+
+    def _fire(self, time_s: float, qpos: Array) -> None:
+        view = self.camera.view
+        self._pictures.append(self._grey(qpos).reshape(view.height, view.width))
+        self._images.append(self._sight.range_image(self.finder))
+        self._times.append(time_s)

@@ -1,0 +1,120 @@
+"""A baseline: put the parts where they were seen, let go, and take the poses at which physics brings them to rest.
+
+Operation by operation, as the goals come: the main part is put where it was seen, lifted by `LIFT_M`, with what it
+carries; then everything moves under gravity and contact, in the same soft contacts as replays, until it rests. The
+pose of the main part is the corrected goal, and all parts stay where they came to rest. For the first `SOFT_S` the
+parts move as in syrup, so that those that were put inside each other part slowly instead of leaping.
+
+Physics knows neither which faces should touch nor how uncertain a pose is, so contacts and covariances are not looked
+at. Fit faces recede by the play that the observation states, or by `CLEARANCE_M`; all parts have one density.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.solid import Solid
+from apo_bench.records.outcomes import sentence
+from apo_bench.simulation.scene.physics import Physics, physics
+from apo_bench.simulation.scene.world import World, fresh, part_pose, place, unstable, world
+
+LIFT_M = 0.0
+"""How far above where it was seen a part is let go, tuned by `python benchmarks/tune.py`."""
+CLEARANCE_M = 0.25e-3
+"""Play per side of fit faces where none is stated, since parts without any cannot be put together."""
+DENSITY, FRICTION = 600.0, 0.8
+"""[kg/m^3] and coefficient of sliding, of wood, as in the part files."""
+SOFT_S, LONGEST_S, REST_S = 0.3, 1.5, 0.05
+"""How long parts move as in syrup; when an operation ends at the latest; how long rest must last."""
+SYRUP = 200.0
+"""Damping while parts move as in syrup, [1/s]: a part falls at 5 cm/s."""
+SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
+"""Speed below which a part rests, [m/s, rad/s]."""
+SLOW.flags.writeable = False
+
+
+def settle(seen: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
+    """Where the parts come to rest, (n, 4, 4), world frame, [m].
+
+    Returns:
+        Bare goals, to be measured by whoever asked; a `Correction` with the status `not_seen` and unknown gaps where an
+        operation was not seen; what was seen, from the operation on at which the simulation became unstable.
+    """
+    if not seen.seen.all():
+        missing = int(np.argmin(seen.seen))
+        return Correction(seen.goals, "not_seen", sentence("not_seen", operation=missing), (), np.nan, np.nan, 0)
+    goals = np.array(seen.goals)
+    if not len(goals):
+        return goals
+    scene = _world(seen)
+    data = fresh(scene, seen.start)
+    for k, operation in enumerate(seen.assembly.operations):
+        _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ seen.goals[k])
+        _rest(scene, data)
+        if unstable(data):
+            break
+        goals[k] = part_pose(scene, data, operation.main)
+    return goals
+
+
+def _put(scene: World, data: mujoco.MjData, moves: tuple[str, ...], T: Array) -> None:
+    """The main part at T, at rest, and what it carries along with it."""
+    before = pose.inverse(part_pose(scene, data, moves[0]))
+    for part in moves:
+        place(scene, data, part, T @ before @ part_pose(scene, data, part))
+
+
+def _rest(scene: World, data: mujoco.MjData) -> None:
+    """Step until no part has moved for a while."""
+    model, began, quiet = scene.model, data.time, 0.0
+    dof = np.array(list(scene.dof.values()))[:, None] + np.arange(6)
+    mujoco.mj_forward(model, data)
+    inertia = np.array([[model.body_mass[b]] * 3 + [*model.body_inertia[b]] for b in map(scene.body.get, scene.free)])
+    while data.time - began < LONGEST_S and quiet < REST_S and not unstable(data):
+        soft = data.time - began < SOFT_S
+        model.dof_damping[dof] = SYRUP * inertia if soft else 0.0
+        mujoco.mj_step(model, data)
+        still = not soft and bool((np.abs(data.qvel[dof]) < SLOW).all())
+        quiet = quiet + model.opt.timestep if still else 0.0
+
+
+def _world(seen: Observation) -> World:
+    """The parts of an assembly as boxes, and nothing else; parts that no operation moves are fixed."""
+    moved = {part for operation in seen.assembly.operations for part in operation.moves}
+    free = tuple(part for part in seen.assembly.solids if part in moved)
+    fixed = tuple(part for part in seen.assembly.solids if part not in moved)
+    xml = _xml(seen.assembly.solids, free, seen.play_m or CLEARANCE_M, physics())
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return world(model, xml, free, fixed)
+
+
+def _xml(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float, s: Physics) -> str:
+    root = ElementTree.Element("mujoco")
+    option = {"timestep": s.timestep_s, "impratio": s.impratio, "tolerance": s.tolerance, "iterations": s.iterations}
+    kinds = {"integrator": "implicitfast", "cone": "elliptic", "solver": "Newton"}
+    ElementTree.SubElement(root, "option", {key: str(value) for key, value in option.items()} | kinds)
+    geom = {"solref": s.solref, "solimp": s.solimp, "friction": (FRICTION, 0.005, 0.0001)}
+    plain = {"type": "box", "density": str(DENSITY), "condim": str(s.condim)}
+    default = ElementTree.SubElement(root, "default")
+    ElementTree.SubElement(default, "geom", plain | {key: _spelled(value) for key, value in geom.items()})
+    room = ElementTree.SubElement(root, "worldbody")
+    for part, solid in solids.items():
+        body = ElementTree.SubElement(room, "body", {"name": f"{part}/"})
+        if part in free:
+            ElementTree.SubElement(body, "freejoint")
+        for box in physical_boxes(solid, clearance_m):
+            ElementTree.SubElement(body, "geom", {"pos": _spelled(box.center), "size": _spelled(box.half)})
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _spelled(numbers: object) -> str:
+    return " ".join(repr(float(x)) for x in np.asarray(numbers, dtype=np.float64))

@@ -1,0 +1,1 @@
+"""Rates, paired comparisons, curves, power: numbers out of rows."""

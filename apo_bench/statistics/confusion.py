@@ -1,0 +1,83 @@
+"""Prediction against physics: how often a plan said beforehand what then happened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+from apo_bench.statistics.rates import rank
+
+ALL = "all"
+"""Stands for every scenario, or every method."""
+
+
+@final
+@dataclass(frozen=True)
+class Confusion:
+    """Counts over every clearance, carelessness and level of a sweep.
+
+    Fitted means a success that was made as demonstrated: that is what a plan foretells.
+    """
+
+    scenario: str
+    method: str
+    fit_fitted: int
+    """Predicted to fit, and it did."""
+    fit_failed: int
+    fail_fitted: int
+    fail_failed: int
+    same_operation: int
+    """Of `fail_failed`: the robot stopped at the operation that was predicted."""
+    stopped: int
+    """Of `fail_failed`: the robot stopped at an operation at all; of others the judge says only that they are wrong."""
+    not_executed: int
+    """The method gave no plan, so nothing was predicted."""
+    excluded: int
+    """The demonstration itself was not right."""
+
+    @property
+    def executed(self) -> int:
+        return self.fit_fitted + self.fit_failed + self.fail_fitted + self.fail_failed
+
+    @property
+    def right(self) -> int:
+        return self.fit_fitted + self.fail_failed
+
+    @property
+    def agreement(self) -> float | None:
+        """Share of the executed trials that ended as predicted; None if there are none."""
+        return self.right / self.executed if self.executed else None
+
+
+def confusions(rows: Iterable[Mapping[str, Any]]) -> tuple[Confusion, ...]:
+    """One per scenario and method, sorted as `tally` sorts, and one of them all at the end."""
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row["scenario"], row["method"]), []).append(row)
+    order = sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))
+    everything = [row for key in order for row in groups[key]]
+    return (*(_counted(*key, groups[key]) for key in order), _counted(ALL, ALL, everything))
+
+
+def _counted(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Confusion:
+    excluded = [row for row in rows if row["success"] is None]
+    executed = [row for row in rows if row["predicted"] is not None and row["success"] is not None]
+    caught = [row for row in executed if row["predicted"]["fails"] and not row["as_demonstrated"]]
+    stopped = [row for row in caught if row["failure_operation"] is not None]
+
+    def count(fails: bool, fitted: bool) -> int:
+        return sum((row["predicted"]["fails"], row["as_demonstrated"]) == (fails, fitted) for row in executed)
+
+    return Confusion(
+        scenario=scenario,
+        method=method,
+        fit_fitted=count(False, True),
+        fit_failed=count(False, False),
+        fail_fitted=count(True, True),
+        fail_failed=len(caught),
+        same_operation=sum(row["predicted"]["operation"] == row["failure_operation"] for row in stopped),
+        stopped=len(stopped),
+        not_executed=len(rows) - len(excluded) - len(executed),
+        excluded=len(excluded),
+    )

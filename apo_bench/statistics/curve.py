@@ -1,0 +1,82 @@
+"""Success over level: what a method does at the same seeds as the noise grows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.settings import RANGE
+from apo_bench.statistics.rates import Place, by_place, order
+
+
+class Setting(NamedTuple):
+    """What the trials of a curve have in common: all but level and seed."""
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    relations: str
+    careless: float
+    method: str
+    grasp: str = "friction"
+    fidelity: str = "full"
+
+    def reference(self, method: str) -> Setting:
+        """The setting that this one is compared with: `none` asks for no relations."""
+        other = self._replace(method=method)
+        return other if knows_relations(method) else other._replace(relations="given")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The results of one setting, one row per seed and one column per level."""
+
+    setting: Setting
+    levels: Array
+    """(k,), rising, in mm (and the same number of degrees where poses are drawn)."""
+    seeds: tuple[int, ...]
+    success: Array
+    """(n, k): 1 right, 0 wrong, NaN where there is no result."""
+
+    def at(self, levels: Array) -> Array:
+        """(n, ...) the columns of some of the levels."""
+        return np.asarray(self.success[:, np.searchsorted(self.levels, levels)])
+
+
+def curves(rows: Iterable[Mapping[str, Any]]) -> tuple[Curve, ...]:
+    """One per setting that has two levels or more, sorted as `tally` sorts; the oracle meets no level.
+
+    Where poses are drawn a level is as many degrees as mm; trials with another pair of the two are on no curve.
+
+    Raises:
+        InputError: A trial is there twice.
+    """
+    groups: dict[Setting, dict[float, dict[int, bool]]] = {}
+    cells = by_place(rows)
+    for place in sorted(cells, key=order):
+        results = {seed: row["success"] for seed, row in cells[place].items() if row["success"] is not None}
+        if (
+            results
+            and not knows_truth(place.method)
+            and place.level_deg == (0.0 if place.noise == RANGE else place.level)
+        ):
+            groups.setdefault(setting_of(place), {})[place.level] = results
+    return tuple(_curve(setting, found) for setting, found in groups.items() if len(found) > 1)
+
+
+def setting_of(place: Place) -> Setting:
+    """The setting of a cell."""
+    return Setting(*(getattr(place, name) for name in Setting._fields))
+
+
+def _curve(setting: Setting, found: Mapping[float, Mapping[int, bool]]) -> Curve:
+    levels = np.array(sorted(found))
+    seeds = tuple(sorted(set().union(*found.values())))
+    columns = [[float(found[level].get(seed, np.nan)) for seed in seeds] for level in levels.tolist()]
+    return Curve(setting, levels, seeds, np.array(columns).T)

@@ -1,0 +1,47 @@
+"""What replays take: operations beyond doing each once, simulated time, and how far finished parts were pushed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import fmean, median
+from typing import Any, final
+
+from apo_bench.statistics.rates import rank
+
+
+@final
+@dataclass(frozen=True)
+class Effort:
+    """Over every level and carelessness of a sweep, of the trials that were a success."""
+
+    scenario: str
+    method: str
+    trials: int
+    extra_operations: float
+    """Mean."""
+    sim_seconds: float
+    """Median."""
+    pushed_mm: float
+    """Largest."""
+
+
+def efforts(rows: Iterable[Mapping[str, Any]]) -> tuple[Effort, ...]:
+    """One per scenario and method that had a success, sorted as `tally` sorts."""
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        if row["success"]:
+            groups.setdefault((row["scenario"], row["method"]), []).append(row)
+    order = sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))
+    return tuple(_effort(*key, groups[key]) for key in order)
+
+
+def _effort(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Effort:
+    return Effort(
+        scenario=scenario,
+        method=method,
+        trials=len(rows),
+        extra_operations=fmean(row["extra_operations"] for row in rows),
+        sim_seconds=median(row["sim_seconds"] for row in rows),
+        pushed_mm=max((row["pushed_mm"] or 0.0 for row in rows), default=0.0),
+    )

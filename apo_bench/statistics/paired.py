@@ -1,0 +1,181 @@
+"""Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.statistics.adjust import DEFAULT, adjusted
+from apo_bench.statistics.mcnemar import mcnemar
+from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
+
+Counts = Array | int
+
+REFERENCES = ("paper", "none")
+EDGE = 1e-9
+"""Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
+
+
+@final
+@dataclass(frozen=True)
+class Paired:
+    """A method against another one, in one cell."""
+
+    place: Place
+    """Of the method."""
+    reference: str
+    pairs: int
+    """Seeds of which both have a result."""
+    only_method: int
+    """Seeds at which the method alone was right."""
+    only_reference: int
+    both: int
+    """Seeds at which both were right."""
+    p: float | None
+    """McNemar's exact p-value; None without a pair."""
+    p_adjusted: float | None
+    """The same, adjusted for all comparisons that were made together."""
+    planned: int
+    """Seeds at which both had a plan."""
+    free_mm: float | None
+    """Mean of the differences of the errors in directions that contacts leave free, method minus reference."""
+    free_interval: Interval | None
+    """Student's t interval of that mean; None with fewer than two pairs."""
+
+    @property
+    def difference(self) -> float | None:
+        """Success rate of the method minus that of the reference; None without a pair."""
+        return (self.only_method - self.only_reference) / self.pairs if self.pairs else None
+
+    @property
+    def interval(self) -> Interval:
+        """Tango's 95 % interval of the difference."""
+        return tango(self.only_method, self.only_reference, self.pairs)
+
+    @property
+    def neither(self) -> int:
+        """Seeds at which both failed."""
+        return self.pairs - self.both - self.only_method - self.only_reference
+
+    @property
+    def recovered(self) -> Rate:
+        """Of the seeds at which the reference failed, those at which the method was right."""
+        return Rate(self.only_method, self.only_method + self.neither)
+
+    @property
+    def harmed(self) -> Rate:
+        """Of the seeds at which the reference was right, those at which the method failed."""
+        return Rate(self.only_reference, self.only_reference + self.both)
+
+
+def paired(
+    rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES, adjust: str = DEFAULT
+) -> tuple[Paired, ...]:
+    """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
+
+    `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
+    The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
+
+    Args:
+        adjust: One of `ADJUSTMENTS`.
+
+    Raises:
+        InputError: A trial is there twice, or there is no such adjustment.
+    """
+    counted = {place: _counted(seeds) for place, seeds in by_place(rows).items()}
+    cells = {place: counted[place] for place in sorted(counted, key=order) if counted[place]}
+    found = [
+        _paired(place, reference, cells[place], cells[place_of_reference(place, reference)])
+        for place in cells
+        for reference in references
+        if place.method != reference and not knows_truth(place.method) and place_of_reference(place, reference) in cells
+    ]
+    p = {_comparison(pair): pair.p for pair in found if pair.p is not None}
+    raised = adjusted(p, adjust)
+    return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in found)
+
+
+def place_of_reference(place: Place, reference: str) -> Place:
+    """The cell that a cell is compared with."""
+    other = place._replace(method=reference)
+    return other if knows_relations(reference) else other._replace(relations="given")
+
+
+def _counted(seeds: Mapping[int, Mapping[str, Any]]) -> dict[int, Mapping[str, Any]]:
+    return {seed: row for seed, row in seeds.items() if row["success"] is not None}
+
+
+def _comparison(pair: Paired) -> frozenset[Place]:
+    return frozenset((pair.place, place_of_reference(pair.place, pair.reference)))
+
+
+@lru_cache(maxsize=65536)
+def tango(b: int, c: int, n: int) -> Interval:
+    """The score interval of a difference of paired proportions, (b - c) / n, at 95 %.
+
+    The differences at which Tango's score statistic is within the normal quantile; sensible where no pair is
+    discordant, when it is 0 -+ z^2 / (n + z^2). After T. Tango, Equivalence test and confidence interval for the
+    difference in proportions for the paired-sample design, Statistics in Medicine 17 (1998), 891-908.
+
+    Args:
+        b: Pairs in which the first alone succeeded.
+        c: Pairs in which the second alone succeeded.
+        n: All pairs; without one nothing is known: -1 to 1.
+    """
+    from scipy.optimize import brentq
+    from scipy.stats import norm
+
+    if n == 0:
+        return Interval(-1.0, 1.0)
+    z, d = float(norm.ppf((1 + CONFIDENCE) / 2)), (b - c) / n
+    low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + EDGE, d - EDGE)
+    high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + EDGE, 1 - EDGE)
+    return Interval(float(low), float(high))
+
+
+def score(b: Counts, c: Counts, n: Counts, delta: Array | float) -> Array:
+    """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
+    B = -b - c + (2 * n - b + c) * delta
+    q = (np.sqrt(np.maximum(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
+    return np.asarray((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
+
+
+def _paired(
+    place: Place, reference: str, ours: Mapping[int, Mapping[str, Any]], theirs: Mapping[int, Mapping[str, Any]]
+) -> Paired:
+    pairs = [(ours[seed], theirs[seed]) for seed in sorted(set(ours) & set(theirs))]
+    free = [(a["planned_error_free_mm"], b["planned_error_free_mm"]) for a, b in pairs]
+    apart = [a - b for a, b in free if a is not None and b is not None]
+    only_method = sum(a["success"] and not b["success"] for a, b in pairs)
+    only_reference = sum(b["success"] and not a["success"] for a, b in pairs)
+    return Paired(
+        place=place,
+        reference=reference,
+        pairs=len(pairs),
+        only_method=only_method,
+        only_reference=only_reference,
+        both=sum(a["success"] and b["success"] for a, b in pairs),
+        p=mcnemar(only_method, only_reference) if pairs else None,
+        p_adjusted=None,
+        planned=len(apart),
+        free_mm=sum(apart) / len(apart) if apart else None,
+        free_interval=_student(apart),
+    )
+
+
+def _student(x: Sequence[float]) -> Interval | None:
+    """Student's t interval of a mean at 95 %."""
+    from scipy.stats import t
+
+    if len(x) < 2:
+        return None
+    half = float(t.ppf((1 + CONFIDENCE) / 2, len(x) - 1) * np.std(x, ddof=1) / math.sqrt(len(x)))
+    mean = float(np.mean(x))
+    return Interval(mean - half, mean + half)

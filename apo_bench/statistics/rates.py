@@ -1,0 +1,207 @@
+"""Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp
+and fidelity."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any, NamedTuple, final
+
+from apo_bench.errors import InputError
+from apo_bench.records.method import parsed
+from apo_bench.records.salt import one_salt
+
+CONFIDENCE = 0.95
+NOT_EXECUTED = ("observe", "correct", "worker")
+"""Stages of failures at which no plan was carried out to its end: there was none, or its process died."""
+
+
+class Place(NamedTuple):
+    """What the trials of a cell have in common: all but the seed."""
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    relations: str
+    careless: float
+    level: float
+    level_deg: float
+    method: str
+    grasp: str = "friction"
+    fidelity: str = "full"
+
+
+class Interval(NamedTuple):
+    """A two-sided confidence interval."""
+
+    low: float
+    high: float
+
+
+class Rate(NamedTuple):
+    """So many successes among so many trials."""
+
+    successes: int
+    trials: int
+
+    @property
+    def rate(self) -> float | None:
+        """None without a trial."""
+        return self.successes / self.trials if self.trials else None
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's at 95 %."""
+        return wilson(self.successes, self.trials)
+
+
+@final
+@dataclass(frozen=True)
+class Cell:
+    """What came out where only seeds differ."""
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    relations: str
+    careless: float
+    level: float
+    level_deg: float
+    method: str
+    grasp: str
+    fidelity: str
+    trials: int
+    """Trials that count: those whose demonstration was right."""
+    successes: int
+    """The finished assembly is right."""
+    demonstrated: int
+    """Successes of which every contact was also made when and where it was shown."""
+    loose_successes: int
+    not_executed: int
+    """Failures of which no plan was carried out: nothing was corrected, or the worker died. They count as failures."""
+    excluded: int
+    """Trials left out of every method alike, since the demonstration itself was not right."""
+    failures: Mapping[str, int]
+    """`stage: code` -> how many, most frequent first."""
+
+    @property
+    def rate(self) -> float | None:
+        """Success rate; None without a trial that counts."""
+        return self.successes / self.trials if self.trials else None
+
+    @property
+    def tightness(self) -> float | None:
+        """Clearance per side over level, mm per mm: small is tight; None where poses are seen exactly."""
+        return self.clearance_mm / self.level if self.level > 0 else None
+
+    @property
+    def demonstrated_rate(self) -> float | None:
+        return self.demonstrated / self.trials if self.trials else None
+
+    @property
+    def loose_rate(self) -> float | None:
+        return self.loose_successes / self.trials if self.trials else None
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's 95 % interval of the success rate."""
+        return wilson(self.successes, self.trials)
+
+    @property
+    def executed(self) -> Rate:
+        """Success among the trials whose plan was carried out."""
+        return Rate(self.successes, self.trials - self.not_executed)
+
+
+@lru_cache(maxsize=65536)
+def wilson(successes: int, trials: int) -> Interval:
+    """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
+    from scipy.stats import binomtest
+
+    if trials == 0:
+        return Interval(0.0, 1.0)
+    found = binomtest(successes, trials).proportion_ci(confidence_level=CONFIDENCE, method="wilson")
+    return Interval(float(found.low), float(found.high))
+
+
+def rank(method: str) -> int:
+    """The ceiling first, then what has no correction, then `contact`, the paper's two ways, and all others.
+
+    A method with `+search` ranks like the method.
+    """
+    first = ("oracle", "none", "search", "contact", "paper", "paper-track")
+    plain = method if method in first else parsed(method).plan
+    return first.index(plain) if plain in first else len(first)
+
+
+def rank_relations(relations: str) -> tuple[int, str]:
+    """Right relations first."""
+    return int(relations != "given"), relations
+
+
+def place_of(row: Mapping[str, Any]) -> Place | None:
+    """The cell of a row; None for a measured demonstration, which has no level."""
+    if row["level"] is None:
+        return None
+    return Place(*[row[name] for name in Place._fields[:-1]] + [row.get("fidelity", "full")])
+
+
+def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping[str, Any]]]:
+    """Cell -> seed -> row.
+
+    Raises:
+        InputError: A trial is there twice; counted twice it would make intervals narrower than they are. Or the rows
+            were drawn with several salts: their trials differ, whatever their seeds.
+    """
+    cells: dict[Place, dict[int, Mapping[str, Any]]] = {}
+    rows = list(rows)
+    one_salt(rows)
+    for row in rows:
+        place = place_of(row)
+        if place is None:
+            continue
+        seeds = cells.setdefault(place, {})
+        if row["seed"] in seeds:
+            raise InputError(
+                f"the rows hold a trial twice ({place.scenario}, {place.method}, level {place.level:g}, seed "
+                f"{row['seed']}); every trial counts once, so leave one of the two out."
+            )
+        seeds[row["seed"]] = row
+    return cells
+
+
+def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
+    """Count rows into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
+
+    Rows of a measured demonstration have no level and belong to no cell.
+
+    Raises:
+        InputError: A trial is there twice.
+    """
+    groups = by_place(rows)
+    return tuple(_cell(key, list(groups[key].values())) for key in sorted(groups, key=order))
+
+
+def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
+    counted = [row for row in rows if row["success"] is not None]
+    failed = [row for row in counted if not row["success"]]
+    why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in failed)
+    return Cell(
+        **key._asdict(),
+        trials=len(counted),
+        successes=len(counted) - len(failed),
+        demonstrated=sum(row["as_demonstrated"] for row in counted),
+        loose_successes=sum(row["loose_success"] for row in counted),
+        not_executed=sum(row["failure_stage"] in NOT_EXECUTED for row in failed),
+        excluded=len(rows) - len(counted),
+        failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
+    )
+
+
+def order(k: Place) -> tuple[Any, ...]:
+    """How cells are sorted: by what is asked, then by method (`oracle` first), then by level."""
+    where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
+    return (*where, k.grasp, k.fidelity != "full", rank(k.method), k.method, k.level, k.level_deg)

@@ -1,0 +1,118 @@
+"""Settings: what the methods and levels of one table or panel have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+from apo_bench.records.method import as_seen, knows_relations, knows_truth
+from apo_bench.records.settings import RANGE, USUAL
+from apo_bench.statistics.rate_text import level_label
+from apo_bench.statistics.rates import Place, rank_relations
+
+Item = TypeVar("Item")
+
+
+class Setting(NamedTuple):
+    """One table or panel: everything but method, level and seed."""
+
+    scenario: str
+    clearance_mm: float
+    noise: str
+    relations: str
+    careless: float
+    grasp: str
+    fidelity: str
+
+    def holds(self, cell: Place) -> bool:
+        """Whether a cell belongs here.
+
+        The oracle meets neither noise nor carelessness, and it and `none` are not told any relations.
+        """
+        ceiling = knows_truth(cell.method)
+        return (
+            (cell.scenario, cell.clearance_mm, cell.grasp, cell.fidelity)
+            == (self.scenario, self.clearance_mm, self.grasp, self.fidelity)
+            and (ceiling or (cell.noise, cell.careless) == (self.noise, self.careless))
+            and (not knows_relations(cell.method) or cell.relations == self.relations)
+        )
+
+    def title(self) -> str:
+        """`stick_in_tower, careless human`, and whatever is not as usual."""
+        return ", ".join([self.scenario, *self.conditions()])
+
+    def conditions(self) -> list[str]:
+        """All but the scenario, as a person says it."""
+        human = {0.0: "careful human", 1.0: "careless human"}.get(self.careless, f"carelessness {self.careless:g}")
+        said = [human, f"{self.clearance_mm:g} mm clearance"]
+        if self.noise != USUAL:
+            said.append("range finder" if self.noise == RANGE else f"{self.noise} noise")
+        if self.relations != "given":
+            said.append(f"relations {self.relations}")
+        if self.grasp != "friction":
+            said.append(f"{self.grasp} grasp")
+        if self.fidelity != "full":
+            said.append(f"fidelity {self.fidelity}")
+        return said
+
+
+def at(item: Any) -> Place:
+    """The place of a cell; of anything that has one, that."""
+    place = getattr(item, "place", None)
+    return place if place is not None else Place(*(getattr(item, name) for name in Place._fields))
+
+
+def settings(cells: Iterable[Any]) -> list[Setting]:
+    """Those that hold the cells, sorted by scenario first; the oracle alone makes one only if nothing else is there."""
+    places = [at(cell) for cell in cells]
+    found = {setting_of(p) for p in places if knows_relations(p.method)}
+    told_right = {s._replace(relations="given") for s in found}
+    found |= {setting_of(p) for p in places if as_seen(p.method) and setting_of(p) not in told_right}
+    covered = {_site(s) for s in found}
+    found |= {setting_of(p) for p in places if knows_truth(p.method) and _site(p) not in covered}
+    return sorted(found, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
+
+
+def members(found: Sequence[Setting], items: Iterable[Item]) -> dict[Setting, list[Item]]:
+    """The cells, or whatever has a place, of every setting, in their order; of several oracles the one most tried."""
+    near: dict[tuple[Any, ...], list[Item]] = {}
+    for item in items:
+        near.setdefault(_site(at(item)), []).append(item)
+    grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(at(item))] for s in found}
+    return {s: _one_ceiling(inside) for s, inside in grouped.items()}
+
+
+def levels_of(items: Iterable[Any]) -> list[tuple[float, float]]:
+    """Levels in mm and degrees of all but the oracle, sorted."""
+    return sorted({level_of(item) for item in items if not knows_truth(at(item).method)})
+
+
+def level_of(item: Any) -> tuple[float, float]:
+    """In mm and degrees."""
+    place = at(item)
+    return place.level, place.level_deg
+
+
+def level_words(level: tuple[float, float], noise: str) -> str:
+    """`0.5`, or `0.5 mm, 1 deg` where they differ."""
+    return f"{level[0]:g}" if noise == RANGE else level_label(*level, noise)
+
+
+def level_unit(noise: str) -> str:
+    """What a level is, as an axis says it."""
+    return "level: mm per ray" if noise == RANGE else "level: mm and degrees per axis"
+
+
+def setting_of(p: Place) -> Setting:
+    """The setting that a place belongs to by itself."""
+    return Setting(p.scenario, p.clearance_mm, p.noise, p.relations, p.careless, p.grasp, p.fidelity)
+
+
+def _site(x: Place | Setting) -> tuple[Any, ...]:
+    return x.scenario, x.clearance_mm, x.grasp, x.fidelity
+
+
+def _one_ceiling(inside: list[Item]) -> list[Item]:
+    ceilings = [item for item in inside if at(item).method == "oracle"]
+    best = max(ceilings, key=lambda item: getattr(item, "trials", 0), default=None)
+    return [item for item in inside if item is best or at(item).method != "oracle"]

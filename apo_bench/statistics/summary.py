@@ -1,0 +1,49 @@
+"""All that a report says in numbers about who succeeds, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+from apo_bench.statistics.adjust import DEFAULT
+from apo_bench.statistics.area import Area, AreaDifference, area_differences, areas
+from apo_bench.statistics.curve import curves
+from apo_bench.statistics.half_level import HalfLevel, half_levels
+from apo_bench.statistics.paired import REFERENCES, Paired, paired
+from apo_bench.statistics.rates import Cell, tally
+
+
+@final
+@dataclass(frozen=True)
+class Summary:
+    """Each sorted as `tally` sorts; nothing of it depends on chance or on the order of rows."""
+
+    cells: tuple[Cell, ...]
+    pairs: tuple[Paired, ...]
+    half_levels: tuple[HalfLevel, ...]
+    areas: tuple[Area, ...]
+    area_differences: tuple[AreaDifference, ...]
+
+
+def summary(
+    rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES, adjust: str = DEFAULT
+) -> Summary:
+    """Rates, pairs, half levels and areas of rows.
+
+    Args:
+        references: The methods that every other one is compared with.
+        adjust: How p-values are adjusted for many comparisons: one of `ADJUSTMENTS`.
+
+    Raises:
+        InputError: A trial is there twice, or there is no such adjustment.
+    """
+    given = list(rows)
+    found = curves(given)
+    return Summary(
+        cells=tally(given),
+        pairs=paired(given, references, adjust),
+        half_levels=half_levels(found),
+        areas=areas(found),
+        area_differences=area_differences(found, references),
+    )

@@ -1,0 +1,1 @@
+"""Many trials: which there are, who runs them, where their rows go."""

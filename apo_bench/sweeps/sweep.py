@@ -1,0 +1,196 @@
+"""Many trials: spread over processes or machines, each row written as its trial ends, resumed where it was left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from apo_bench.correction.own_code.own import check_correctors
+from apo_bench.errors import InputError, unknown
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.relations import make_relations
+from apo_bench.records.limits import CORRECTOR_LIMIT_S, Limits
+from apo_bench.records.method import parsed
+from apo_bench.records.relations import RECOGNISED
+from apo_bench.records.row import Row
+from apo_bench.records.run_file import run_record
+from apo_bench.records.run_folder import Journal
+from apo_bench.records.salt import salt_of_sweep
+from apo_bench.records.settings import level_pair
+from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.scene.arm import Arm, find_arm
+from apo_bench.simulation.scene.physics import physics
+from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
+from apo_bench.sweeps.local.pool import check_limit, spread
+from apo_bench.sweeps.progress import progress
+from apo_bench.sweeps.stopping import Check, listening
+from apo_bench.sweeps.worker import Emit, Timing, Worker, in_time
+from apo_bench.trial.code_version import code_files
+from apo_bench.trial.fingerprint import content_hash, content_pieces, noise_content, own_content, spec_hash
+from apo_bench.trial.methods import with_simulated
+
+LARGEST_WORKERS = 256
+BACKENDS = ("local", "ray")
+
+
+def sweep(
+    grids: SweepSpec | Sequence[SweepSpec],
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    limit_s: float = 600.0,
+    corrector_limit_s: float = CORRECTOR_LIMIT_S,
+    backend: str = "local",
+    address: str | None = None,
+    command: str = "",
+    salt_file: str | Path | None = None,
+) -> list[Row]:
+    """Run every trial of a sweep that has no row yet.
+
+    The rows depend on neither the number of workers, nor where they run, nor the order in which trials end.
+
+    Args:
+        grids: One, or several whose trials are united.
+        out: The folder of the rows; made if it is not there, continued if it holds rows of the same sweep.
+        workers: Processes; they are spawned, so a script that calls this needs the usual
+            `if __name__ == "__main__":`. None stands for this process with `local`: then no trial has a limit, but
+            its corrector has. With `ray`, None stands for all that the cluster has.
+        limit_s: Wall time that a trial may take in a worker; what takes longer is a failed row.
+        corrector_limit_s: Of that, what a corrector named as `module:name` may take.
+        backend: `local`, or `ray` for a cluster.
+        address: Of a cluster that runs already.
+        command: What to note in `run.json` as the command line.
+        salt_file: Holds the salt of the trials, and is made if it is not there; None for trials that everybody can
+            draw.
+
+    Returns:
+        All rows of the folder, in the order in which they ended.
+
+    Raises:
+        InputError: A setting that is not allowed, or a folder with trials of another sweep.
+        RuntimeError: A trial could not be run, or a row could not be written.
+        KeyboardInterrupt: After Ctrl-C or a signal, when the rows of the trials that had ended were written.
+    """
+    grids = (grids,) if isinstance(grids, SweepSpec) else tuple(grids)
+    _check_spread(workers, limit_s, backend, address)
+    here = workers is None and backend == "local"
+    loaded, arm = _checked(grids, corrector_limit_s)
+    content = {given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}
+    terms = Terms(content, versions(), corrector_limit_s)
+    files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
+    salt = None if salt_file is None else salt_of_sweep(salt_file, out)
+    limits = Limits(None if here else limit_s, corrector_limit_s)
+    made_of = _content(grids, loaded, arm)
+    run = run_record(described(grids, loaded), made_of, code_files(), terms.versions, files, command, salt, limits)
+    with listening() as check, Journal(Path(out), run) as journal:
+        work = _left(units(grids, loaded, salt), loaded, terms, journal, check)
+        with progress(sum(len(unit.trials) for unit in work)) as tell:
+
+            def emit(row: Row, timing: Timing) -> None:
+                kept = row if here else in_time(row, timing, limit_s)
+                journal.append(kept, timing)
+                tell(kept)
+
+            if backend == "ray":
+                from apo_bench.sweeps.ray.backend import spread as spread_on_ray
+
+                spread_on_ray(work, terms, workers=workers, limit_s=limit_s, emit=emit, check=check, address=address)
+            elif workers is None:
+                _here(work, terms, emit, check)
+            else:
+                spread(work, terms, workers=workers, limit_s=limit_s, emit=emit, check=check)
+        return journal.rows()
+
+
+def _here(work: Sequence[Unit], terms: Terms, emit: Emit, check: Check) -> None:
+    """Run the work in this process."""
+    worker = Worker(0, terms)
+    try:
+        for unit in work:
+            worker.run(unit, emit, began=lambda spec: check())
+    finally:
+        worker.close()
+    check()
+
+
+def _left(
+    work: Iterable[Unit], loaded: Mapping[str, Scenario], terms: Terms, journal: Journal, check: Check
+) -> list[Unit]:
+    """The trials that have no row yet; the rows that there are must be what those trials would give."""
+    left, hashes = [], {}
+    for unit in work:
+        check()
+        trials = []
+        for trial in unit.trials:
+            row_hash = journal.finished.get(trial_key(trial, loaded[trial.scenario].name))
+            if row_hash is None:
+                trials.append(trial)
+                continue
+            cell = (trial.scenario, *(getattr(trial, name) for name in _CELL))
+            if cell not in hashes:
+                hashes[cell] = spec_hash(trial, terms.content[trial.scenario])
+            if row_hash != hashes[cell]:
+                raise InputError(
+                    f"'{journal.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                    f"{trial.seed}, that was made with other code or settings; choose another folder."
+                )
+        if trials:
+            left.append(Unit(tuple(trials)))
+    return left
+
+
+_CELL = ("clearance_mm", "careless", "level_mm", "level_deg", "noise", "relations", "grasp", "eye")
+
+
+def _check_spread(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
+    if workers is not None and not 1 <= workers <= LARGEST_WORKERS:
+        raise InputError(f"{workers} workers were given; a whole number from 1 to {LARGEST_WORKERS} is allowed.")
+    check_limit(limit_s)
+    if backend not in BACKENDS:
+        raise InputError(unknown("backend", backend, BACKENDS))
+    if address is not None and backend != "ray":
+        raise InputError(f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.")
+    if backend == "ray":
+        from apo_bench.sweeps.ray.backend import check_ray
+
+        check_ray(address)
+
+
+def _checked(grids: Sequence[SweepSpec], corrector_limit_s: float) -> tuple[Mapping[str, Scenario], Arm]:
+    """Everything that has a name, found before a folder is made or a process started."""
+    check_grids(grids)
+    loaded = load_all(grids)
+    for grid in grids:
+        largest = max(max(level_pair(level)) for level in grid.levels)
+        for noise in grid.noises:
+            make_noise(noise, Level(largest, largest))
+    for relations in {relations: None for grid in grids for relations in grid.relations}:
+        if relations not in RECOGNISED:
+            make_relations(relations)
+    check_correctors((with_simulated(parsed(method).plan) for method in _methods(grids)), corrector_limit_s)
+    physics(grids[0].timestep_s)
+    return loaded, find_arm(grids[0].arm)
+
+
+def _content(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario], arm: Arm) -> dict[str, Any]:
+    """What the trials are made of besides the package, piece by piece, so that a change can be named."""
+    pieces: dict[str, Any] = {}
+    for given, scenario in loaded.items():
+        made_of = content_pieces(scenario, given, arm.mjcf)
+        pieces |= {f"{scenario.name}, {piece}": hashed for piece, hashed in made_of.items()}
+    noises = {noise: None for grid in grids for noise in grid.noises}
+    relations = {relations: None for grid in grids for relations in grid.relations}
+    return {
+        **pieces,
+        **noise_content(*noises),
+        **own_content("relations", *relations),
+        **own_content("method", *_methods(grids)),
+        **own_content("arm", grids[0].arm),
+    }
+
+
+def _methods(grids: Sequence[SweepSpec]) -> tuple[str, ...]:
+    return tuple({method: None for grid in grids for method in grid.methods})

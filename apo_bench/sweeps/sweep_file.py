@@ -1,0 +1,122 @@
+"""Sweep files: grids as TOML; every complaint names file, key and remedy.
+
+    scenarios = ["stick_in_tower", "carried_bridge"]
+    levels = [0.5, 1, 2]
+    methods = ["none", "paper", "contact"]
+    trials = 40
+
+    [[also]]                  # a further grid: what it does not say is as above
+    methods = ["oracle"]
+    levels = [0]
+
+Lengths in mm, angles in degrees; paths as on the command line, from the current folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from apo_bench.errors import InputError
+from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.records.settings import LARGEST_CARELESS, LARGEST_CLEARANCE_MM, LARGEST_LEVEL, LARGEST_SEED
+from apo_bench.sweeps.grid import LARGEST_TRIALS, SweepSpec
+
+TEXTS = ("scenarios", "noises", "methods", "grasps", "relations", "eyes")
+NUMBERS = {"levels": LARGEST_LEVEL, "careless": LARGEST_CARELESS, "clearances_mm": LARGEST_CLEARANCE_MM}
+"""And the largest that is allowed; the smallest is 0."""
+COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": (0, LARGEST_SEED)}
+SHARED = ("arm", "timestep_ms", "fidelity")
+"""One for the whole sweep: they stand at the top of the file only."""
+MOST_ENTRIES = 1000
+KEYS = (*TEXTS, *NUMBERS, *COUNTS)
+
+
+def is_sweep_file(given: str) -> bool:
+    """Whether what was given in place of scenarios is a sweep file: TOML that is no scenario file.
+
+    Raises:
+        InputError: It is TOML that cannot be read.
+    """
+    if not given.lower().endswith(".toml"):
+        return False
+    keys = read_toml(given, "sweep or scenario file").value
+    return "scenarios" in keys or not {"parts", "operations"} & set(keys)
+
+
+def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> tuple[SweepSpec, ...]:
+    """The grids of a sweep file: the top one, and one for each `[[also]]`.
+
+    Args:
+        overrides: Key of the file -> what to take instead, in every grid.
+
+    Raises:
+        InputError: Anything in the file that is not as described.
+    """
+    top = read_toml(path, "sweep file").fields(("scenarios",), (*KEYS[1:], *SHARED, "also"))
+    tables = [entry.fields((), KEYS) for entry in _tables(top["also"])] if "also" in top else []
+    first = {key: _value(key, node) for key, node in top.items() if key != "also"}
+    further = [first | {key: _value(key, node) for key, node in table.items()} for table in tables]
+    names = [str(path), *(f"{path}, also {i}" for i in range(1, len(tables) + 1))]
+    return tuple(
+        _grid(name, {**said, **(overrides or {})}) for name, said in zip(names, (first, *further), strict=True)
+    )
+
+
+def _tables(node: Node) -> Sequence[Node]:
+    if not isinstance(node.value, list) or not all(isinstance(entry, dict) for entry in node.value):
+        raise InputError(f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.")
+    return _few(node.items("also"), node)
+
+
+def _grid(name: str, said: Mapping[str, Any]) -> SweepSpec:
+    in_mm = {key: value for key, value in said.items() if key != "timestep_ms"}
+    step = {"timestep_s": said["timestep_ms"] * 1e-3} if "timestep_ms" in said else {}
+    try:
+        return SweepSpec(**in_mm, **step)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def _value(key: str, node: Node) -> Any:
+    if key in TEXTS:
+        return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
+    if key in NUMBERS:
+        read = _level if key == "levels" else partial(Node.number, low=0.0, high=NUMBERS[key])
+        return tuple(read(entry) for entry in _entries(node, key, "numbers"))
+    if key in COUNTS:
+        return _count(node, *COUNTS[key])
+    return node.number(0.0, above=True) if key == "timestep_ms" else node.text()
+
+
+def _entries(node: Node, key: str, of: str) -> Sequence[Node]:
+    if not isinstance(node.value, list):
+        node.fail(f"a list of {of} is needed", f"write {key} = [...]")
+    if not node.value:
+        node.fail(f"a list of {of} is needed", "an empty grid has no trials, so name at least one or leave the key out")
+    return _few([Node(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)], node)
+
+
+def _few(entries: Sequence[Node], node: Node) -> Sequence[Node]:
+    if len(entries) > MOST_ENTRIES:
+        raise InputError(
+            f"{node.file}, {node.key}: at most {MOST_ENTRIES} entries are allowed, {len(entries)} were given."
+        )
+    return entries
+
+
+def _level(node: Node) -> float | tuple[float, float]:
+    """A number, or a pair of mm and degrees."""
+    if not isinstance(node.value, list):
+        return node.number(0.0, LARGEST_LEVEL)
+    mm, deg = map(float, node.numbers(2))
+    return mm, deg
+
+
+def _count(node: Node, low: int, high: int) -> int:
+    if not isinstance(node.value, int) or isinstance(node.value, bool) or not low <= node.value <= high:
+        node.fail(f"a whole number from {low} to {high} is needed")
+    return int(node.value)

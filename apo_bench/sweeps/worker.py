@@ -1,0 +1,194 @@
+"""What a worker does, in whatever process on whatever machine: units of work become rows."""
+
+from __future__ import annotations
+
+import platform
+import re
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any, final
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.correction.correctors import Misbehaved
+from apo_bench.correction.own_code.own import Lost, OwnCorrectors
+from apo_bench.errors import InputError
+from apo_bench.records.checked import unwritable
+from apo_bench.records.key import KEY
+from apo_bench.records.method import parsed
+from apo_bench.records.outcomes import sentence
+from apo_bench.records.row import Row
+from apo_bench.records.settings import TrialSpec
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.replay_cache import Branches
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.grid import Unit
+from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.row import head, result
+from apo_bench.trial.stages import Ending, Shown, show
+from apo_bench.trial.trial import run_trial
+
+Timing = dict[str, Any]
+"""One line of `timing.jsonl`: what no specification determines."""
+Emit = Callable[[Row, Timing], None]
+"""Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
+ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
+
+
+@final
+class Worker:
+    """Runs units of work; compiles each scene once, and imports each corrector of one's own once."""
+
+    def __init__(self, number: int, terms: Terms) -> None:
+        """Args:
+        number: Tells workers apart in `timing.jsonl`.
+
+        Raises:
+            InputError: Packages of other versions are installed here.
+        """
+        terms.check_versions()
+        self.number = number
+        self._terms = terms
+        self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
+        self._own = OwnCorrectors(terms.corrector_limit_s)
+
+    def run(
+        self,
+        unit: Unit,
+        emit: Emit,
+        stopped: Callable[[], bool] = lambda: False,
+        began: Callable[[TrialSpec], None] = lambda spec: None,
+    ) -> None:
+        """Run the trials of a unit in their order, and emit each row with its timing.
+
+        Demonstrations and the beginnings of replays are shared.
+
+        Args:
+            stopped: Asked between trials; what is not begun then is left.
+            began: Told of each trial when its scene is compiled and its corrector imported: from here on its time
+                counts.
+
+        Raises:
+            InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
+        """
+        demonstrations: dict[tuple[float, str], Shown] = {}
+        branches = Branches()
+        for spec in unit.trials:
+            if stopped():
+                return
+            start = time.perf_counter()
+            scene, content = self._scene(spec)
+            method = self._method(parsed(spec.method).plan)
+            ready = time.perf_counter()
+            began(spec)
+            key = (spec.careless, spec.eye)
+            if key not in demonstrations:
+                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+            shown = time.perf_counter()
+            row = row_of(spec, scene, demonstrations[key], content, method=method, branches=branches)
+            spent = (ready - start, shown - ready, time.perf_counter() - shown)
+            emit(row, timing(row, self.number, *spent))
+
+    def close(self) -> None:
+        """End the processes of correctors."""
+        self._own.close()
+
+    def _method(self, name: str) -> Any:
+        """The corrector; if it could be imported when the sweep began and cannot now, that is its own failure."""
+        try:
+            return self._own.find(name)
+        except InputError as error:
+            return partial(_raise, Misbehaved(str(error)))
+
+    def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:
+        key = (spec.scenario, spec.clearance_mm, spec.grasp)
+        if key not in self._scenes:
+            scene = build_scene(
+                load_scenario(spec.scenario),
+                clearance_mm=spec.clearance_mm,
+                grasp=spec.grasp,
+                arm=spec.arm,
+                timestep_s=spec.timestep_s,
+            )
+            content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+            self._terms.check_content(spec.scenario, content)
+            self._scenes[key] = (scene, content)
+        return self._scenes[key]
+
+
+def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
+    """The row of a trial, also of one whose corrector misbehaved.
+
+    What code of somebody's own returned may be what no row can hold; that is its failure too.
+
+    Args:
+        more: As `run_trial` takes it.
+
+    Raises:
+        InputError: The request cannot be honoured.
+    """
+    try:
+        row = run_trial(spec, scene, shown=shown, content=content, **more)
+        wrong = unwritable(row) if ":" in spec.method else ""
+        said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
+    except Lost as error:
+        return lost(spec, content, error.code, "corrector")
+    except Misbehaved as error:
+        wrong = said = str(error)
+    return misbehaved(spec, content, shown.demonstration.code, said) if wrong else row
+
+
+def lost(spec: TrialSpec, content: str, code: str, what: str = "trial") -> Row:
+    """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
+
+    Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
+
+    Args:
+        content: From the terms of the sweep: `terms.content[spec.scenario]`.
+        code: `worker_died` or `time_limit`.
+        what: Whose process died or whose limit it was: `trial` or `corrector`.
+    """
+    return _failed(spec, content, None, Ending("worker", code, None, sentence(code, what=what)))
+
+
+def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
+    """The row, or the failed row of a trial that took longer than the limit and ended before anyone looked."""
+    took_s = (timing["demonstrate_s"] or 0.0) + (timing["trial_s"] or 0.0)
+    if took_s <= limit_s or row["failure_stage"] == "worker":
+        return row
+    late = Ending("worker", "time_limit", None, sentence("time_limit"))
+    return row | {"demonstration": None} | result(late, success=False)
+
+
+def misbehaved(spec: TrialSpec, content: str, demonstration: str, said: str) -> Row:
+    """The failed row of a trial whose corrector raised an error or returned what it must not.
+
+    Args:
+        said: What it did; addresses of objects, which differ from run to run, are left out.
+    """
+    said = ADDRESS.sub("0x...", said.encode(errors="replace").decode())
+    return _failed(spec, content, demonstration, Ending("correct", "raised", None, said))
+
+
+def timing(
+    row: Row, worker: int, compile_s: float | None, demonstrate_s: float | None, trial_s: float | None
+) -> Timing:
+    """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
+    return {
+        **{key: row[key] for key in KEY},
+        "compile_s": compile_s,
+        "demonstrate_s": demonstrate_s,
+        "trial_s": trial_s,
+        "host": platform.node(),
+        "worker": worker,
+    }
+
+
+def _raise(error: Exception, seen: Observation) -> None:
+    raise error
+
+
+def _failed(spec: TrialSpec, content: str, demonstration: str | None, end: Ending) -> Row:
+    first = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
+    return first | {"demonstration": demonstration} | result(end, success=False)

@@ -1,0 +1,1 @@
+"""One trial: its stages, its row, its fingerprint."""

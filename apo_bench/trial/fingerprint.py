@@ -1,0 +1,143 @@
+"""Hashes that say whether two rows were made of the same things."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from dataclasses import asdict, fields, is_dataclass
+from functools import cache
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench import __version__
+from apo_bench.files import json_forms as files
+from apo_bench.io.reading import read_bytes
+from apo_bench.observation.noise_file import noise_path
+from apo_bench.records.relations import WRONG
+from apo_bench.records.settings import ROW, TrialSpec
+from apo_bench.records.short_names import RESIDUALS
+from apo_bench.resources import folder
+from apo_bench.scenario.file import scenario_names
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.trial.code_version import code_files
+
+SCHEMAS = (ROW, files.DEMONSTRATION, files.OBSERVATION, files.PLAN)
+
+
+def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> str:
+    """16 hexadecimal digits over all that shapes a trial besides its specification.
+
+    The pieces of `content_pieces`, the code of the package, its version and that of every schema.
+
+    Args:
+        given: What `load_scenario` was given.
+    """
+    said = [content_pieces(scenario, given, arm_file), dict(code_files()), __version__, SCHEMAS]
+    return _hash(json.dumps(said, sort_keys=True).encode())
+
+
+def content_pieces(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> dict[str, str]:
+    """What a trial of a scenario is made of -> 16 hexadecimal digits.
+
+    The scenario (its file's bytes, or its numbers if it never was a file), the files of its parts, the arm and the
+    room, the judge's thresholds.
+    """
+    pieces = {
+        "scenario": _scenario_bytes(scenario, given),
+        **{f"part {part}": read_bytes(path, "part file") for part, path in sorted(scenario.part_files.items())},
+        "room": (folder("assets") / "room.xml").read_bytes(),
+        "arm": Path(arm_file).read_bytes(),
+        "thresholds": json.dumps(asdict(scenario.thresholds), sort_keys=True).encode(),
+    }
+    return {name: _hash(piece) for name, piece in pieces.items()}
+
+
+def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
+    """16 hexadecimal digits over the content and every setting but method, seed and the scenario's path.
+
+    A noise model that is a file, and noise, relations or an arm of one's own, count by what stands in the file as well;
+    a salt counts by its hash.
+
+    Rows with the same hash differ in method and seed alone, so they may be counted together or paired.
+
+    Args:
+        content: From `content_hash`.
+        observation: The text of the observation's file, when it was not drawn.
+    """
+    settings = {k: v for k, v in asdict(spec).items() if k not in ("method", "seed", "scenario", "salt")}
+    if spec.salt is not None:
+        settings["salt"] = spec.salt.hash
+    brought = {**noise_content(spec.noise), **own_content("relations", spec.relations), **own_content("arm", spec.arm)}
+    return _hash(json.dumps([content, settings, observation, *brought.values()], sort_keys=True).encode())
+
+
+def noise_content(*names: str) -> dict[str, str]:
+    """Of the noise models that are files or of one's own: `noise NAME` -> 16 hexadecimal digits over the file."""
+    files = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
+    return {name: _hash(read_bytes(path, "noise file")) for name, path in files.items()} | own_content("noise", *names)
+
+
+def own_content(kind: str, *names: str) -> dict[str, str]:
+    """Of what is given as `module:name`: `KIND NAME` -> 16 hexadecimal digits over the file of the module.
+
+    What that module imports in turn does not count.
+    """
+    not_modules = (RESIDUALS, *(f"{wrong}:" for wrong in WRONG))
+    own = [name for name in names if ":" in name and not name.startswith(not_modules)]
+    return {f"{kind} {name}": hashed for name in own if (hashed := _module_hash(name.partition(":")[0])) is not None}
+
+
+@cache
+def _module_hash(module: str) -> str | None:
+    """Over the source file of a module as it was when it was first asked for; None if it has none."""
+    found = _located(module)
+    path = Path(found.origin) if found is not None and found.has_location and found.origin else None
+    return _hash(path.read_bytes()) if path is not None and path.is_file() else None
+
+
+def _located(module: str) -> ModuleSpec | None:
+    """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
+    found, path = None, None
+    for end in range(1, module.count(".") + 2):
+        name = ".".join(module.split(".")[:end])
+        try:
+            specs = (finder.find_spec(name, path) for finder in sys.meta_path)
+            found = next((spec for spec in specs if spec is not None), None)
+            path = None if found is None else found.submodule_search_locations
+        except (ImportError, ValueError, KeyError, AttributeError):
+            return None
+        if found is None or (path is None and name != module):
+            return None
+    return found
+
+
+def _hash(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()[:16]
+
+
+def _scenario_bytes(scenario: Scenario, given: str | Path | Scenario) -> bytes:
+    if isinstance(given, Scenario):
+        return json.dumps(_plain(scenario), sort_keys=True).encode()
+    path = folder("scenarios") / f"{given}.toml" if given in scenario_names() else Path(given)
+    return read_bytes(path, "scenario file")
+
+
+def _plain(value: Any) -> Any:
+    """Nested dataclasses, mappings, sets and arrays as what `json` can write; file paths, already hashed, left out."""
+    if is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, Path):
+        return None
+    if isinstance(value, (frozenset, set)):
+        return sorted(value)
+    if hasattr(value, "items"):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(v) for v in value]
+    return value

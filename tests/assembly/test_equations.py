@@ -1,0 +1,238 @@
+"""The contact equations: zero at the truth, and the Jacobian against central differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench.assembly.equations import equations, gap
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
+from apo_bench.correction.solvers.newton import CUT_OFF, LENGTH_M, displacement, least_step
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+PARTS = ("a", "b", "c", "s", "idle")
+
+
+def random_scene(seed: int) -> scenes.Scene:
+    """Cuboids, operations that carry one another, contacts of any faces, start poses and goals anywhere."""
+    rng = np.random.default_rng(seed)
+    solids = [scenes.cuboid(part, rng.uniform(10, 60, 3)) for part in PARTS]
+    operations = []
+    for _ in range(7):
+        main, *others = (str(part) for part in rng.permutation(PARTS[:4]))
+        carries = tuple(others[: rng.integers(0, 3)])
+        moved = (main, *carries)
+        rest = [part for part in PARTS if part not in moved]
+        contacts = tuple(
+            Contact(PartFace(str(rng.choice(moved)), face), PartFace(str(rng.choice(rest)), other))
+            for face, other in rng.choice(["px", "ny", "pz", "nz"], (rng.integers(0, 3), 2))
+        )
+        operations.append(Operation(main, contacts, carries))
+    start = {part: pose.exp(rng.standard_normal(6) * 0.5) for part in PARTS}
+    assembly = Assembly({solid.name: solid for solid in solids}, tuple(operations), frozenset({"idle"}))
+    return scenes.Scene(assembly, start, pose.exp(rng.standard_normal((7, 6)) * 0.5))
+
+
+def long_words() -> scenes.Scene:
+    """ODLs of length 3 and 5; T3 occurs twice in the equation of the last contact, whose arc joins s and a."""
+    touch = scenes.touch
+    operations = (
+        Operation("s", touch("s", "idle", "nz-pz")),
+        Operation("a", touch("a", "s", "px-nx")),
+        Operation("a", touch("s", "idle", "py-ny"), carries=("s",)),
+        Operation("b", touch("b", "s", "nz-pz")),
+        Operation("b", touch("s", "idle", "nz-pz") + touch("s", "a", "px-nx"), carries=("s",)),
+        Operation("b", touch("s", "a", "py-ny"), carries=("s",)),
+    )
+    solids = {part: scenes.block(part) for part in ("a", "b", "s", "idle")}
+    rng = np.random.default_rng(5)
+    start = {part: pose.exp(rng.standard_normal(6)) for part in solids}
+    return scenes.Scene(Assembly(solids, operations, frozenset({"idle"})), start, pose.exp(rng.standard_normal((6, 6))))
+
+
+def differences(scene: scenes.Scene, by: float = 1e-6) -> tuple[Array, Array]:
+    """The analytic Jacobian and the one of central differences, by body twists of every goal."""
+    system = equations(scene.assembly, scene.start, scene.goals)
+    _, J = system.linearised(scene.goals)
+    numeric = np.zeros_like(J)
+    for k in range(len(scene.goals)):
+        for i in range(6):
+            side = []
+            for sign in (1.0, -1.0):
+                goals = scene.goals.copy()
+                goals[k] = goals[k] @ pose.exp(sign * by * np.eye(6)[i])
+                side.append(system.residual(goals))
+            numeric[:, 6 * k + i] = (side[0] - side[1]) / (2 * by)
+    return J, numeric
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=25, deadline=None)
+def test_jacobian_of_random_assemblies(seed: int) -> None:
+    J, numeric = differences(random_scene(seed))
+    assert np.abs(J - numeric).max(initial=0.0) <= 1e-6 * max(1.0, np.abs(J).max(initial=0.0))
+
+
+@pytest.mark.parametrize("build", [long_words, *scenes.ALL.values()])
+def test_jacobian_of_examples(build) -> None:
+    scene = build()
+    noisy = scenes.Scene(scene.assembly, scene.start, scenes.noisy(scene.goals, np.random.default_rng(0), 5.0, 5.0))
+    J, numeric = differences(noisy)
+    assert np.abs(J - numeric).max() <= 1e-6 * np.abs(J).max()
+
+
+def test_long_words_are_long() -> None:
+    scene = long_words()
+    system = equations(scene.assembly, scene.start, scene.goals)
+    lengths = {int((word < len(system.start) + len(scene.goals)).sum()) for word in system.letters}
+    assert {2, 4, 6} <= lengths
+    twice = [word for word in system.letters if np.count_nonzero(word == len(system.start) + 2) == 2]
+    assert twice
+
+
+@pytest.mark.parametrize("build", scenes.ALL.values())
+def test_no_gap_at_the_truth(build) -> None:
+    scene = build()
+    assert gap(scene.assembly, scene.start, scene.goals) < 1e-15
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) -> None:
+    scene = random_scene(seed)
+    e = equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
+    history, row = placed(scene.assembly, scene.start, scene.goals), 0
+    for contact, made, _ in scene.assembly.relations():
+        m, b = contact
+        T, n = history[made][m.part], scene.assembly.face(m).plane
+        face, on = scene.assembly.face(b), history[made][b.part]
+        smaller_first = scenes_area(face) <= scenes_area(scene.assembly.face(m)) * (1 + 1e-9)
+        corners = pose.apply(on, face.outline) if smaller_first else pose.apply(T, scene.assembly.face(m).outline)
+        if not smaller_first:
+            normal = on[:3, :3] @ face.normal
+            corners = corners - np.outer((corners - pose.apply(on, face.outline)[0]) @ normal, normal)
+        expected = pose.apply(pose.inverse(T), corners) @ n[:3] + n[3]
+        assert_allclose(e[row : row + 4], expected, atol=1e-12)
+        row += 4
+    assert row == len(e)
+
+
+def scenes_area(face) -> float:
+    return overlap(face, np.eye(4), face, np.eye(4)).area
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=10, deadline=None)
+def test_the_world_frame_does_not_matter(seed: int) -> None:
+    scene = random_scene(seed)
+    moved = scenes.turned(scene, pose.exp(np.random.default_rng(seed).standard_normal(6)))
+    e, J = equations(scene.assembly, scene.start, scene.goals).linearised(scene.goals)
+    e_moved, J_moved = equations(moved.assembly, moved.start, moved.goals).linearised(moved.goals)
+    assert_allclose(e_moved, e, atol=1e-12)
+    assert_allclose(J_moved, J, atol=1e-12)
+
+
+def test_the_vertices_stay_while_the_goals_move() -> None:
+    scene = scenes.stick_on_castles()
+    system = equations(scene.assembly, scene.start, scene.goals)
+    moved = scene.goals.copy()
+    moved[0] = moved[0] @ scenes.mm(0, 0, 7)
+    assert_allclose(np.unique(np.abs(system.residual(moved)).round(9)), [0.0, 0.007])
+
+
+def test_gap_is_positive_and_penetration_negative() -> None:
+    scene = scenes.stick_on_castles()
+    system = equations(scene.assembly, scene.start, scene.goals)
+    for height, sign in ((2.0, 1.0), (-2.0, -1.0)):
+        moved = scene.goals.copy()
+        moved[0] = moved[0] @ scenes.mm(0, 0, height)
+        assert_allclose(system.residual(moved)[:4], sign * 0.002)
+
+
+def test_only_equations_with_a_free_motion_parameter_take_part() -> None:
+    scene = scenes.pockets()
+    freed = equations(scene.assembly, scene.start, scene.goals, {0, 1, 2, 4, 5})
+    assert len(freed) == 92 - 4  # the fixture put aside by the fourth operation
+    assert freed.variables(6) == (5, 4, 2, 1, 0)
+    assert len(equations(scene.assembly, scene.start, scene.goals, set())) == 0
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_equations_of_some_contacts_are_some_of_the_equations(seed: int) -> None:
+    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    system = equations(scene.assembly, scene.start, scene.goals)
+    assert system.made.tolist() == [relation.made for relation in scene.assembly.relations()]
+    moved = scenes.noisy(scene.goals, rng, 5.0, 5.0)
+    e, J = system.linearised(moved)
+    kept = rng.random(len(system.made)) < 0.5
+    some = system.among(kept)
+    assert_array_equal(some.residual(moved), e[kept[system.contact]])
+    assert_array_equal(some.linearised(moved)[1], J[kept[system.contact]])
+    assert_array_equal(some.gaps(moved), system.gaps(moved)[kept])
+    expected = [np.abs(e[system.contact == c]).max() for c in range(len(system.made))]
+    assert_array_equal(system.gaps(moved), expected)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_equations_contain_what_their_derivative_depends_on(seed: int) -> None:
+    scene = random_scene(seed)
+    system = equations(scene.assembly, scene.start, scene.goals)
+    _, J = system.linearised(scene.goals)
+    for k in range(len(scene.goals)):
+        rows = system.containing({k})[system.contact]
+        assert not J[~rows, 6 * k : 6 * k + 6].any()
+        assert len(equations(scene.assembly, scene.start, scene.goals, {k})) == np.count_nonzero(rows)
+
+
+@pytest.mark.parametrize(
+    ("name", "free", "rank"),
+    [
+        ("stick_on_castles", None, 13),
+        ("bridge", None, 11),
+        ("pockets", (0, 1, 2, 4, 5), 25),
+        ("stick_in_tower", None, 13),
+    ],
+)
+def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) -> None:
+    scene = scenes.ALL[name]()
+    columns = range(len(scene.goals)) if free is None else free
+    e, J = equations(scene.assembly, scene.start, scene.goals, free).linearised(scene.goals)
+    chosen = J.reshape(len(e), -1, 6)[:, list(columns)].reshape(len(e), -1)
+    scaled = chosen / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(columns))
+    assert [least_step(scaled, e, cut)[1] for cut in (CUT_OFF, 1e-7)] == [rank, rank]
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
+def test_least_step_is_the_pseudo_inverse(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    J, e = rng.standard_normal((8, 3)) @ rng.standard_normal((3, 6)), rng.standard_normal(8)
+    step, rank = least_step(J, e, 1e-9)
+    assert rank == 3
+    assert_allclose(step, -np.linalg.pinv(J, rcond=1e-9) @ e, atol=1e-9)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
+def test_displacement_is_the_product_of_the_appendix(seed: int) -> None:
+    x, y, z, a, b, g = q = np.random.default_rng(seed).uniform(-3, 3, 6)
+    P = pose.at((x, y, z))
+    Rx, Ry, Rz = (pose.at((0, 0, 0), np.degrees(angle) * np.eye(3)[i]) for i, angle in enumerate((a, b, g)))
+    assert_allclose(displacement(q[None])[0], P @ Rx @ Ry @ Rz, atol=1e-12)
+
+
+def test_displacement_starts_out_as_the_body_twist() -> None:
+    for i in range(6):
+        q = 1e-7 * np.eye(6)[i]
+        assert_allclose(displacement(q[None])[0], pose.exp(q), atol=1e-13)

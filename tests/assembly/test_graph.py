@@ -1,0 +1,147 @@
+"""The relation graph: nodes, arcs and ODLs of the paper's examples, after every step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.equations import gap
+from apo_bench.assembly.graph import Graph, arc_residuals, relation_graph
+from apo_bench.assembly.topology import product, simplified, spelled
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from tests import scenes
+
+FIG_7 = {
+    1: "table: T0 | cube1 (1): T1",
+    2: "table: T0 | cube1 (1): T1 | cube2 (2): T2",
+    3: "table: T0 | cube1 (1): T1 | cube2 (2): T2 | cube3 (3): T3",
+    4: "table: T0 | cube1 (1): T1 | cube2 (2): T2 | cube3 (3): T3 | cube1 (4): T4",
+    5: "table: T0 | cube1 (1): T1 | cube2 (2): T2 | cube3 (3): T3 | cube1 (4): T4 | stick (5): T5",
+    6: "table: T0 | cube1 (1): T1 | cube2 (2): T2 | cube3 (3): T3 | cube1 (4): T4 | "
+    "stick (6): T6 | cube2 (6): T6 T5^-1 T2 | cube3 (6): T6 T5^-1 T3",
+}
+"""The nodes after each step of the task in Fig. 6."""
+
+FIG_6_ARCS = {
+    "R1 cube1 -> table": ("T1", "T0", 1, 4),
+    "R2 cube2 -> table": ("T2", "T0", 2, 6),
+    "R3 cube3 -> table": ("T3", "T0", 3, 6),
+    "R4 cube3 -> cube1": ("T3", "T1", 3, 4),
+    "R5 cube1 -> table": ("T4", "T0", 4, None),
+    "R6 stick -> cube2": ("T6", "T6 T5^-1 T2", 5, None),
+    "R7 stick -> cube3": ("T6", "T6 T5^-1 T3", 5, None),
+    "R8 cube2 -> table": ("T6 T5^-1 T2", "T0", 6, None),
+    "R9 cube3 -> table": ("T6 T5^-1 T3", "T0", 6, None),
+}
+"""ODLs of both ends, made at, lost at: Section 3.3.2 with R5 as the text lacks it."""
+
+
+def odl(graph: Graph, arc: int) -> tuple[str, str]:
+    ends = graph.arcs[arc].manipulated, graph.arcs[arc].environment
+    a, b = ("T0" if node.placed is None else spelled(node.odl) for node in ends)
+    return a, b
+
+
+@pytest.mark.parametrize("step", FIG_7)
+def test_the_nodes_of_fig_7(step: int) -> None:
+    graph = relation_graph(scenes.pockets().assembly, step)
+    assert (graph.step, " | ".join(map(str, graph.nodes))) == (step, FIG_7[step])
+
+
+def test_the_arcs_of_fig_7() -> None:
+    graph = relation_graph(scenes.pockets().assembly)
+    found = {
+        str(arc): (*odl(graph, i), arc.made + 1, None if arc.lost is None else arc.lost + 1)
+        for i, arc in enumerate(graph.arcs)
+    }
+    assert found == FIG_6_ARCS
+    assert graph.arcs[7].pairs == ("nz-A_fl", "px-A_px", "nx-A_nx", "py-A_py", "ny-A_ny")
+
+
+def test_an_arc_disappears_when_it_does() -> None:
+    assembly = scenes.pockets().assembly
+    lost = {k: [arc.name for arc in relation_graph(assembly, k).arcs if arc.lost is not None] for k in range(1, 7)}
+    assert lost == {1: [], 2: [], 3: [], 4: ["R1", "R4"], 5: ["R1", "R4"], 6: ["R1", "R2", "R3", "R4"]}
+
+
+def test_only_the_latest_node_of_a_part_stands() -> None:
+    graph = relation_graph(scenes.pockets().assembly)
+    gone = [str(node) for node in graph.nodes if not graph.stands(node)]
+    assert gone == ["cube1 (1): T1", "cube2 (2): T2", "cube3 (3): T3"]
+
+
+def test_the_vanished_fixture_keeps_its_place() -> None:
+    graph = relation_graph(scenes.fixture().assembly)
+    assert [str(arc) for arc in graph.arcs] == [
+        "R1 castle1 -> table", "R2 cube -> table", "R3 castle2 -> table", "R4 castle2 -> cube",
+        "R5 cube -> table", "R6 stick -> castle1", "R7 stick -> castle2",
+    ]  # fmt: skip
+    assert odl(graph, 3) == ("T3", "T2")
+    assert (graph.arcs[3].made, graph.arcs[3].lost) == (2, 3)
+
+
+def test_a_carried_part_has_its_history() -> None:
+    graph = relation_graph(scenes.subassembly_on_castles().assembly)
+    stick = "T5 T3^-1 T4"
+    pairs = [("T1", "T0"), ("T2", "T0"), ("T3", "T1"), (stick, "T5"), (stick, "T1"), (stick, "T2")]
+    assert [odl(graph, i) for i in range(6)] == pairs
+    assert {k + 1 for k in graph.arcs[4].operations} == {1, 3, 4, 5}
+    assert {k + 1 for k in graph.arcs[3].operations} == {3, 4}
+
+
+def test_a_node_that_nothing_hangs_on_goes() -> None:
+    """The stick of Fig. 6 stood at T5 with contacts that moved along with it."""
+    assert "stick (5): T5" in map(str, relation_graph(scenes.pockets().assembly, 5).nodes)
+    assert "stick (5): T5" not in map(str, relation_graph(scenes.pockets().assembly, 6).nodes)
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_every_arc_is_in_the_graph_with_its_equations(name: str) -> None:
+    """Ends are nodes; an arc that stands joins what stands; the operations are those of the ODLs when it was made."""
+    assembly = scenes.ALL[name]().assembly
+    for step in range(1, len(assembly) + 1):
+        graph = relation_graph(assembly, step)
+        made = {arc.name: relation_graph(assembly, arc.made + 1) for arc in graph.arcs}
+        for i, arc in enumerate(graph.arcs):
+            assert {arc.manipulated, arc.environment} <= set(graph.nodes)
+            if arc.lost is None:
+                assert graph.stands(arc.manipulated)
+                assert graph.stands(arc.environment)
+            assert arc.operations == made[arc.name].arcs[i].operations
+        assert sum(len(arc.contacts) for arc in graph.arcs) == len(assembly.first(step).relations())
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_arcs_hold_at_the_truth_and_the_worst_is_the_gap(name: str) -> None:
+    scene = scenes.ALL[name]()
+    seen = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
+    for step in range(1, len(scene.goals) + 1):
+        graph, done = relation_graph(scene.assembly, step), scene.assembly.first(step)
+        assert max(arc_residuals(scene.assembly, scene.start, scene.goals, graph)) < 1e-12
+        worst = max(arc_residuals(scene.assembly, scene.start, seen, graph))
+        assert worst == pytest.approx(gap(done, scene.start, seen[:step]), rel=1e-9)
+
+
+def test_a_residual_is_that_of_its_own_arc() -> None:
+    """Castle 2 of example 5.1 put 3 mm aside: nothing but the stick's walls in it can tell."""
+    scene = scenes.stick_in_tower()
+    goals = np.array(scene.goals)
+    goals[1] = goals[1] @ pose.at((0, 3e-3, 0))
+    found = arc_residuals(scene.assembly, scene.start, goals, relation_graph(scene.assembly))
+    assert [round(r * 1e3, 6) for r in found] == [0, 0, 0, 3]
+
+
+def test_a_standing_arc_joins_what_its_equations_said_when_it_was_made() -> None:
+    scene = scenes.pockets()
+    goals = scenes.noisy(scene.goals, np.random.default_rng(1), 5.0, 5.0)
+    arc = relation_graph(scene.assembly).arcs[5]
+    now = pose.inverse(product(arc.manipulated.odl, goals)) @ product(arc.environment.odl, goals)
+    np.testing.assert_allclose(now, pose.inverse(goals[4]) @ goals[1], atol=1e-12)
+    assert simplified(arc.environment.odl) == arc.environment.odl
+
+
+@pytest.mark.parametrize("step", [0, 7, -1])
+def test_there_is_no_other_step(step: int) -> None:
+    with pytest.raises(InputError, match=rf"step {step} was given, .* from 1 to 6\."):
+        relation_graph(scenes.pockets().assembly, step)

@@ -1,0 +1,109 @@
+"""Operation dependency lists: the strings of the paper, and the product law."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Operation, Term, inverted, product, simplified, spelled
+from apo_bench.geometry import pose
+from tests import scenes
+
+
+def words(assembly: Assembly, after: int) -> dict[str, str]:
+    """Part -> its ODL as a string, after that operation, counted from 1."""
+    return {part: spelled(odl) for part, odl in assembly.odls()[after - 1].items()}
+
+
+def moves(*operations: Operation) -> Assembly:
+    """An assembly of blocks in which these operations happen, without contacts."""
+    parts = {part for operation in operations for part in operation.moves}
+    return Assembly({part: scenes.block(part) for part in sorted(parts)}, operations, frozenset())
+
+
+def test_one_object_as_in_fig_4a() -> None:
+    assert words(moves(Operation("A")), 1) == {"A": "T1"}
+
+
+def test_sub_assembly_as_in_fig_4c() -> None:
+    assembly = moves(Operation("A"), Operation("B"), Operation("A", carries=("B",)))
+    assert words(assembly, 2) == {"A": "T1", "B": "T2"}
+    assert words(assembly, 3) == {"A": "T3", "B": "T3 T1^-1 T2"}
+
+
+def test_two_cubes_on_a_stick_as_in_fig_6() -> None:
+    assert words(scenes.pockets().assembly, 6) == {
+        "cube1": "T4",
+        "stick": "T6",
+        "cube2": "T6 T5^-1 T2",
+        "cube3": "T6 T5^-1 T3",
+    }
+
+
+def test_cube_carries_stick_as_in_example_5_2() -> None:
+    after = words(scenes.subassembly_on_castles().assembly, 5)
+    assert after["cube"] == "T5"
+    assert after["stick"] == "T5 T3^-1 T4"
+
+
+def test_carried_twice_by_the_same_part_stays_short() -> None:
+    assembly = moves(Operation("A"), Operation("B"), Operation("A", carries=("B",)), Operation("A", carries=("B",)))
+    assert words(assembly, 4)["B"] == "T4 T1^-1 T2"
+
+
+def test_carried_by_one_part_then_by_another() -> None:
+    assembly = moves(
+        Operation("s"), Operation("a"), Operation("a", carries=("s",)), Operation("b"), Operation("b", carries=("s",))
+    )
+    assert words(assembly, 5)["s"] == "T5 T4^-1 T3 T2^-1 T1"
+
+
+def test_relations_are_kept_when_they_are_lost() -> None:
+    assembly = scenes.fixture().assembly
+    history = {str(r.contact): (r.made + 1, r.lost if r.lost is None else r.lost + 1) for r in assembly.relations()}
+    assert history["castle2.py on cube.ny"] == (3, 4)
+    assert history["castle2.bottom on table.top"] == (3, None)
+    assert history["stick.nz on castle2.sfl"] == (5, None)
+    assert [r.lost for r in assembly.relations() if r.contact.manipulated.part == "cube"] == [3, None]
+
+
+def test_a_contact_of_parts_that_move_together_stays() -> None:
+    kept = {str(r.contact): r.lost for r in scenes.subassembly_on_castles().assembly.relations()}
+    assert kept["stick.py on cube.hpy"] is None
+    assert kept["cube.nz on castle1.topP"] == 4
+
+
+TERMS = st.lists(st.builds(Term, st.integers(0, 3), st.booleans()), max_size=8)
+
+
+@given(TERMS, st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
+def test_products(odl: list[Term], seed: int) -> None:
+    goals = pose.exp(np.random.default_rng(seed).standard_normal((4, 6)))
+    assert_allclose(product(simplified(odl), goals), product(odl, goals), atol=1e-9)
+    assert_allclose(product(inverted(odl), goals) @ product(odl, goals), np.eye(4), atol=1e-9)
+
+
+@given(TERMS)
+def test_nothing_is_left_of_a_word_and_its_inverse(odl: list[Term]) -> None:
+    assert simplified((*inverted(odl), *odl)) == ()
+    assert inverted(inverted(odl)) == tuple(odl)
+
+
+def test_spelled_counts_from_one() -> None:
+    assert spelled((Term(5), Term(4, True), Term(1))) == "T6 T5^-1 T2"
+    assert spelled(()) == "I"
+
+
+def test_odls_stand_for_the_poses_that_walking_the_operations_gives() -> None:
+    for build in scenes.ALL.values():
+        scene = build()
+        goals = scenes.noisy(scene.goals, np.random.default_rng(1), 20.0, 20.0)
+        for odls, poses in zip(scene.assembly.odls(), placed(scene.assembly, scene.start, goals), strict=True):
+            for part, odl in odls.items():
+                assert_allclose(poses[part], product(odl, goals), atol=1e-12)
+            for part in set(poses) - set(odls):
+                assert poses[part] is scene.start[part]

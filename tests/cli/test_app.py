@@ -1,0 +1,370 @@
+"""The command line: what it prints, where, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from apo_bench.cli import app as cli
+from apo_bench.records.run_folder import read_rows
+from apo_bench.records.settings import ROW
+from apo_bench.scenario.file import load_scenario, scenario_names
+
+TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "none")
+MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "none")
+HOPELESS = ("--level", "40")
+"""Plans at this level are refused before the arm moves, so that a replay costs little."""
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout, stderr."""
+    capsys.readouterr()
+    code = cli.main(arguments)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "scenarios")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()[1:]] == list(scenario_names())
+
+
+def test_the_card_of_a_scenario_is_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from apo_bench.resources import folder
+    from apo_bench.show.card import card
+
+    loaded = load_scenario("vanished_fixture")
+    assert run(capsys, "scenarios", "vanished_fixture") == (0, card(loaded), "")
+    path = tmp_path / "mine.toml"
+    path.write_text((folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    _, out, _ = run(capsys, "scenarios", str(path))
+    assert out == card(loaded).replace("vanished_fixture:", "mine:")
+
+
+def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "graph", "pocket_table")
+    assert (code, err) == (0, "")
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert lines[0] == "pocket_table after operation 6"
+    for line in (
+        "cube2 (6): T6 T5^-1 T2",
+        "cube1 (1): T1 moved on",
+        "R4 cube3 -> cube1 made 3, lost at 4 [px-nx]",
+        "R8 cube2 -> table made 6 [nz-A_fl px-A_px nx-A_nx py-A_py ny-A_ny]",
+    ):
+        assert line in lines
+    _, out, _ = run(capsys, "graph", "pocket_table", "--step", "3")
+    assert "lost" not in out
+    assert "R5" not in out
+
+
+def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path, picture = _castle_aside(tmp_path, 3.0), tmp_path / "graph.svg"
+    asked = ("graph", "stick_in_tower", "--observation", str(path))
+    code, out, err = run(capsys, *asked, "--json", "--out", str(picture))
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    found = json.loads(out)
+    assert (found["schema"], found["step"]) == ("apo-bench/graph/1", 3)
+    assert [arc["residual_mm"] for arc in found["arcs"]] == pytest.approx([0, 0, 0, 3], abs=1e-6)
+    stick = {"part": "stick", "placed": 3, "odl": "T3"}
+    assert found["arcs"][3]["manipulated"] == stick
+    assert found["nodes"][-1] == {**stick, "stands": True}
+    assert picture.read_bytes().startswith(b"<?xml")
+    _, out, _ = run(capsys, *asked)
+    assert out.splitlines()[-1].endswith("[pz-sfl py-sny ny-spy]  3.000 mm, above 0.1")
+
+
+def test_a_graph_says_what_was_not_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = _castle_aside(tmp_path, 3.0)
+    document = json.loads(path.read_text())
+    document["operations"][1]["seen"] = False
+    path.write_text(json.dumps(document))
+    _, out, _ = run(capsys, "graph", "stick_in_tower", "--observation", str(path), "--json")
+    known = [arc["residual_mm"] is not None for arc in json.loads(out)["arcs"]]
+    assert known == [True, False, True, False]
+    _, out, _ = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
+    assert out.splitlines()[-1].endswith("not seen")
+
+
+def _castle_aside(folder: Path, mm: float) -> Path:
+    """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
+    from apo_bench.assembly.goals import Observation
+    from apo_bench.files.json_forms import observation_form, write_form
+    from apo_bench.geometry import pose
+
+    scenario = load_scenario("stick_in_tower")
+    n = len(scenario.assembly)
+    goals = np.array(scenario.goals)
+    goals[1] = goals[1] @ pose.at((0.0, mm * 1e-3, 0.0))
+    seen = Observation(scenario.assembly, scenario.start, goals, np.tile(np.eye(6) * 1e-6, (n, 1, 1)), np.ones(n, bool))
+    write_form(observation_form(seen, "stick_in_tower"), folder / "seen.json")
+    return folder / "seen.json"
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["graph", "--help"], ["replay", "--help"], ["sweep", "--help"]])
+def test_help_is_a_result(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *arguments)
+    assert (code, err) == (0, "")
+    assert out.lstrip().startswith("Usage: apo-bench")
+
+
+def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
+    from importlib.metadata import version
+
+    assert run(capsys, "--version") == (0, f"apo-bench {version('apo_bench')}\n", "")
+
+
+def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    import mujoco
+
+    path = tmp_path / "scene.xml"
+    code, out, _ = run(capsys, "scene", "stick_in_tower", "--out", str(path), "--clearance", "0.4")
+    assert code == 0
+    assert str(path) in out
+    assert mujoco.MjModel.from_xml_path(str(path)).nbody > 5
+    (stick,) = (geom for geom in ElementTree.parse(path).iter("geom") if geom.get("name") == "stick/bar")
+    assert [float(x) for x in stick.get("size", "").split()] == pytest.approx([0.11, 0.0096, 0.0096])
+
+
+def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
+    from inspect import signature
+
+    from apo_bench.cli.correction import correct as correct_command
+    from apo_bench.cli.replay_command import replay
+    from apo_bench.cli.show import show
+    from apo_bench.correction.correctors import correct
+    from apo_bench.envs.corrected import Corrected
+    from apo_bench.records.settings import METHOD, TrialSpec
+    from apo_bench.sweeps.grid import METHODS
+    from apo_bench.sweeps.one import Request
+
+    commands = [signature(command).parameters["method"].default for command in (replay, correct_command, show)]
+    doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
+    assert {*commands, *doors, Request("").method, TrialSpec("").method} == {METHOD}
+    assert METHOD in METHODS
+
+
+def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *TRIAL, "--method", "paper", "--json")
+    assert (code, err) == (0, "")
+    assert out.count("\n") == 1
+    row = json.loads(out)
+    assert (row["schema"], row["seed"], row["method"], row["success"]) == (ROW, 5, "paper", True)
+
+
+def test_a_replay_that_fails_is_a_result(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *TRIAL, *HOPELESS)
+    assert (code, err) == (0, "")
+    assert "failure at stage" in out
+    assert "level 40, careless 1, seed 5" in out
+
+
+def test_levels_can_be_set_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, *TRIAL, *HOPELESS, "--level-deg", "0", "--json")
+    row = json.loads(out)
+    assert (row["level"], row["level_deg"]) == (40.0, 0.0)
+
+
+def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "seen.json"
+    _, drawn, _ = run(capsys, *TRIAL, *HOPELESS, "--json", "--save-observation", str(path))
+    code, measured, err = run(capsys, *MEASURED, "--observation", str(path), "--json")
+    assert (code, err) == (0, "")
+    before, after = json.loads(drawn), json.loads(measured)
+    for key in ("success", "failure_stage", "failure_code", "failure_operation"):
+        assert after[key] == before[key]
+    assert after["gap_before_mm"] == pytest.approx(before["gap_before_mm"], rel=1e-9)
+    assert (after["level"], after["noise"]) == (None, "measured")
+    assert after["spec_hash"] != before["spec_hash"]
+    _, out, _ = run(capsys, *MEASURED, "--observation", str(path))
+    assert "measured observation" in out
+
+
+def test_a_table_is_replayed_like_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Of noise that is not stated nothing is assumed; the graph, which needs none, is printed all the same."""
+    seen = Path(__file__).parents[2] / "docs" / "seen.csv"
+    code, out, err = run(capsys, *MEASURED, "--observation", str(seen), "--method", "contact", "--json")
+    assert (code, err, json.loads(out)["success"]) == (0, "", True)
+    path = tmp_path / "bare.csv"
+    path.write_text("\n".join(",".join(line.split(",")[:9]) for line in seen.read_text().splitlines()))
+    _refused(run(capsys, *MEASURED, "--observation", str(path)), "standard deviations are missing; add columns")
+    code, out, err = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
+    assert (code, err, "mm" in out) == (0, "", True)
+
+
+def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from apo_bench.resources import folder
+
+    path = tmp_path / "mine.toml"
+    path.write_text((folder("scenarios") / "stick_in_tower.toml").read_text())
+    code, out, _ = run(capsys, "replay", str(path), "--seed", "5", "--method", "none", *HOPELESS, "--json")
+    assert code == 0
+    assert json.loads(out)["scenario"] == "mine"
+
+
+def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "replay.gif"
+    code, _, err = run(capsys, *TRIAL, *HOPELESS, "--video", str(path))
+    assert (code, err) == (0, "")
+    assert path.read_bytes().startswith(b"GIF8")
+
+
+def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    seen, path = tmp_path / "seen.json", tmp_path / "replay.mp4"
+    run(capsys, *TRIAL, *HOPELESS, "--save-observation", str(seen))
+    document = json.loads(seen.read_text())
+    document["operations"][1]["seen"] = False
+    seen.write_text(json.dumps(document))
+    code, out, err = run(capsys, *MEASURED, "--observation", str(seen), "--video", str(path))
+    assert code == 0
+    assert "failure at stage observe: not_seen, operation 2" in out
+    assert err == f"apo-bench: nothing was replayed, so {path} was not written.\n"
+    assert not path.exists()
+
+
+def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    from apo_bench.sweeps import one
+
+    def fails(*arguments: Any) -> Any:
+        shown = show(*arguments)
+        return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
+
+    show = one.show
+    monkeypatch.setattr(one, "show", fails)
+    code, out, _ = run(capsys, *TRIAL, "--json")
+    assert code == 1
+    assert json.loads(out)["success"] is None
+
+
+def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out_folder = tmp_path / "run"
+    code, out, err = run(
+        capsys, "sweep", "stick_in_tower", "--levels", "40", "--careless", "0", "--methods", "none", "--trials", "2",
+        "--seed", "3", "--grasp", "weld", "--workers", "1", "--out", str(out_folder),
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert "0.0 to 65.8 %" in out
+    assert [row["seed"] for row in read_rows(out_folder)] == [3, 4]
+    code, out, err = run(capsys, "report", str(out_folder))
+    assert (code, err) == (0, "")
+    for name in ("tables/cells.csv", "figures/success_over_level.png", "report.html"):
+        assert str(out_folder / name) in out
+        assert (out_folder / name).stat().st_size > 0
+
+
+WRONG = {
+    "negative level": (("--level", "-1"), "level in mm of -1"),
+    "level nan": (("--level", "nan"), "level in mm of nan"),
+    "level inf": (("--level", "inf"), "level in mm of inf"),
+    "level abc": (("--level", "abc"), "--level"),
+    "level-deg": (("--level-deg", "-0.5"), "level in degrees of -0.5"),
+    "careless": (("--careless", "-1"), "carelessness of -1"),
+    "seed": (("--seed", "-1"), "seed of -1"),
+    "seed is no number": (("--seed", "1.5"), "--seed"),
+    "method": (("--method", "papr"), "did you mean 'paper'"),
+    "module": (("--method", "no_such_module:corrector"), "cannot be imported"),
+    "noise": (("--noise", "isotropc"), "did you mean 'isotropic'"),
+    "grasp": (("--grasp", "glue"), "unknown grasp 'glue'"),
+    "arm": (("--arm", "seven_axis"), "did you mean 'six_axis'"),
+    "negative clearance": (("--clearance", "-0.1"), "clearance of -0.1"),
+    "clearance nan": (("--clearance", "nan"), "clearance of nan"),
+    "timestep": (("--timestep-ms", "5"), "0.1 to 1 ms"),
+    "film ending": (("--video", "film.txt"), ".mp4 or .gif"),
+    "film folder": (("--video", "/no/such/folder/film.mp4"), "cannot be written"),
+    "observation": (("--observation", "/no/such/file.json"), "cannot be read"),
+    "both": (("--observation", "x.json", "--level", "1"), "--level was given together with --observation"),
+    "seed of a file": (("--observation", "x.json", "--seed", "0"), "--seed was given together with --observation"),
+    "oracle of a file": (("--observation", "SEEN", "--method", "oracle"), "truth is not known"),
+    "unknown option": (("--nois", "isotropic"), "--nois"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_replay_is_one_sentence(case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arguments, words = WRONG[case]
+    if "SEEN" in arguments:
+        path = tmp_path / "seen.json"
+        run(capsys, *TRIAL, *HOPELESS, "--save-observation", str(path))
+        arguments = tuple(str(path) if a == "SEEN" else a for a in arguments)
+    trial = MEASURED if "--observation" in arguments else TRIAL
+    _refused(run(capsys, *trial, *arguments), words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("replay", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("replay", "/no/such/file.toml"), "cannot be read"),
+        (("replay",), "scenario"),
+        (("replai", "stick_in_tower"), "replai"),
+        (("scene", "stick_in_tower", "--out", "/no/such/folder/a.xml"), "cannot be written"),
+        (("scene", "stick_in_tower", "--out", "a.txt"), "ends in .xml"),
+        (("scene", "stick_in_tower", "--out", "a.xml", "--clearance", "-1"), "clearance of -1"),
+        (("sweep", "stick_in_tower"), "out"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--trials", "0"), "0 trials"),
+        (("sweep", "stick_in_tower", "--out", ""), "an empty path was given"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--methods", "foo"), "unknown method 'foo'"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--methods", "none,,paper"), "single commas"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--levels", "0,abc"), "--levels 0,abc"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--levels", ""), "--levels ''"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--levels", "-1"), "level of -1"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--workers", "0"), "0 workers"),
+        (("sweep", "stick_in_tower", "--out", "OUT", "--clearance", "nan"), "clearance of nan"),
+        (("sweep", "stick_in_tower", "stick_in", "--out", "OUT"), "unknown scenario 'stick_in'"),
+        (("sweep", "stick_in_tower", "--out", "/proc/none", "--trials", "1"), "cannot be written"),
+        (("report", "/no/such/folder"), "holds no sweep"),
+        (("scenarios", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("graph", "stick_in_towr"), "did you mean 'stick_in_tower'"),
+        (("graph", "pocket_table", "--step", "0"), "give a step from 1 to 6"),
+        (("graph", "pocket_table", "--step", "7"), "step 7 was given"),
+        (("graph", "pocket_table", "--step", "x"), "--step"),
+        (("graph", "pocket_table", "--out", "graph.pdf"), "ends in .svg or .png"),
+        (("graph", "pocket_table", "--out", "/no/such/folder/graph.svg"), "cannot be written"),
+        (("graph", "pocket_table", "--observation", "/no/such/seen.json"), "cannot be read"),
+    ],
+)
+def test_a_wrong_request_is_one_sentence(
+    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    _refused(run(capsys, *(str(out) if a == "OUT" else a for a in arguments)), words)
+    assert not out.exists()
+
+
+def _refused(ended: tuple[int, str, str], words: str) -> None:
+    code, out, err = ended
+    assert code == 2
+    assert out == ""
+    assert words in err
+    assert err.startswith("apo-bench: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+
+
+def test_the_program_ends_with_its_exit_code() -> None:
+    def ended(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [str(Path(sys.executable).parent / "apo-bench"), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    assert ended("scenarios").returncode == 0
+    wrong = ended("replay", "stick_in_towr")
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert wrong.stderr.count("\n") == 1
+
+
+def test_an_interrupted_command_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("apo_bench.cli.terminal.print_scenarios", interrupted)
+    assert run(capsys, "scenarios") == (130, "", "apo-bench: interrupted.\n")

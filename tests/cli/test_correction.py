@@ -1,0 +1,292 @@
+"""`apo-bench explain` and `apo-bench correct`: what they print, what they write, how they end."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.equations import gap
+from apo_bench.assembly.goals import Consistency, Correction, Observation
+from apo_bench.cli import app as cli
+from apo_bench.files.json_forms import observation_form, read_plan, write_form
+from apo_bench.files.observation import read_observation
+from apo_bench.geometry import pose
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.show.correct_text import correction_lines, shown_p
+
+ROOT = Path(__file__).parents[2]
+SEEN = ROOT / "docs" / "seen.csv"
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout, stderr."""
+    capsys.readouterr()
+    code = cli.main(arguments)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def asked(path: Path, *more: str) -> tuple[str, ...]:
+    return ("correct", "stick_in_tower", "--observation", str(path), *more)
+
+
+def aside(folder: Path, mm: float) -> Path:
+    """The observation of the README with castle 2 further aside than the noise explains."""
+    lines = SEEN.read_text(encoding="utf-8").splitlines()
+    cells = lines[2].split(",")
+    cells[3] = f"{float(cells[3]) + mm:g}"
+    path = folder / "aside.csv"
+    path.write_text("\n".join([*lines[:2], ",".join(cells), *lines[3:]]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_scenario_is_explained(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    code, out, err = run(capsys, "explain", name, "--json")
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    found = json.loads(out)
+    assert (found["schema"], found["scenario"]) == ("apo-bench/explanation/1", name)
+    assert sum(o["rank"] for o in found["operations"]) == found["rank"]
+    assert sum(len(o["free"]) for o in found["operations"]) == found["freedom"]
+    assert [o["operation"] for o in found["operations"]] == list(range(1, len(found["operations"]) + 1))
+
+
+def test_an_explanation_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "explain", "vanished_fixture", "--deviation-mm", "2")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    total = "the contacts fix 21 of 30 directions; 9 are free and 12 of 33 equations redundant"
+    assert lines[0] == f"vanished_fixture: {total}"
+    castle2 = "y, z, roll, pitch, yaw fixed by the table and the cube (R3, R4 until operation 4)"
+    assert f"3 castle2: {castle2}; x free, kept as seen, 2.00 mm" in lines
+    assert "R4 castle2 on cube, T3^-1 T2, lost at 4" in out
+
+
+def test_free_directions_in_units(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, "explain", "stick_in_tower", "--json", "--deviation-mm", "3", "--deviation-deg", "2")
+    x, y, yaw = json.loads(out)["operations"][0]["free"]
+    assert (x["name"], x["twist_mm_deg"], x["deviation_mm"]) == ("x", [1, 0, 0, 0, 0, 0], pytest.approx(3.0))
+    assert (y["name"], y["deviation_mm"], y["with"]) == ("y", pytest.approx(np.sqrt(3.0)), [2, 3])
+    assert (yaw["twist_mm_deg"], yaw["point_mm"]) == ([0, 0, 0, 0, 0, 1], pytest.approx([0, 0, 0]))
+    assert yaw["deviation_deg"] == pytest.approx(2 / np.sqrt(3.0))
+
+
+def test_an_observation_is_explained_where_it_is_corrected_to(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "explain", "stick_in_tower", "--observation", str(SEEN), "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert (found["rank"], found["freedom"]) == (13, 5)
+    made = json.loads(run(capsys, *asked(SEEN, "--json"))[1])
+    for part, operation in zip(found["parts"], made["operations"], strict=True):
+        assert part["position_mm"] == pytest.approx(operation["position_mm"], abs=1e-6)
+    assert made["explanation"] == found
+
+
+def test_the_picture_of_an_explanation_is_the_same_every_time(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pictures = [tmp_path / "a.png", tmp_path / "b.png"]
+    for path in pictures:
+        code, out, err = run(capsys, "explain", "stick_in_tower", "--out", str(path))
+        assert (code, err, out.endswith(f"Wrote {path}\n")) == (0, "", True)
+    a, b = (path.read_bytes() for path in pictures)
+    assert a.startswith(b"\x89PNG")
+    assert a == b
+    assert len(a) < 200_000
+
+
+def test_a_correction_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *asked(SEEN))
+    assert (code, err) == (0, "")
+    for said in (
+        "ended        every contact holds within 0.1 mm",
+        "mm as seen, 0.000 mm corrected",
+        "13 degrees of freedom",
+        "explained by the stated noise",
+        "the contacts fix 13 of 18 directions",
+    ):
+        assert said in out
+    assert "assumed" not in out
+
+
+def test_assumed_noise_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "bare.csv"
+    bare = [",".join(line.split(",")[:9]) for line in SEEN.read_text(encoding="utf-8").splitlines()]
+    path.write_text("\n".join(bare), encoding="utf-8")
+    _, out, _ = run(capsys, *asked(path, "--deviation-mm", "2.5"))
+    assert "standard deviation of 2.5 mm and 1 deg per axis, assumed where the file states none" in out
+    assert json.loads(run(capsys, *asked(path, "--json"))[1])["deviations_assumed"] is True
+
+
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_what_is_written_holds_every_contact(capsys: pytest.CaptureFixture[str], tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"made.{ending}"
+    code, out, err = run(capsys, *asked(SEEN, "--out", str(path), "--json"))
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    made = json.loads(out)
+    scenario = load_scenario("stick_in_tower")
+    seen = read_observation(SEEN, scenario)
+    goals = read_observation(path, scenario).goals if ending == "csv" else read_plan(path, scenario).goals
+    assert gap(seen.assembly, seen.start, goals) < 1e-12
+    stated = [pose.unpack([*(1e-3 * np.array(o["position_mm"])), *o["quaternion_wxyz"]]) for o in made["operations"]]
+    assert goals == pytest.approx(np.array(stated), abs=1e-12)
+    assert (made["status"], made["rank"], made["freedom"], made["test"]["passes"]) == ("converged", 13, 5, True)
+    assert np.array(made["operations"][0]["covariance_mm_deg"]).shape == (6, 6)
+
+
+def test_json_of_a_replay_is_read_too(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "seen.json"
+    write_form(observation_form(read_observation(SEEN, "stick_in_tower"), "stick_in_tower"), path)
+    by_json, by_csv = (json.loads(run(capsys, *asked(p, "--json"))[1]) for p in (path, SEEN))
+    for a, b in zip(by_json["operations"], by_csv["operations"], strict=True):
+        assert a["position_mm"] == pytest.approx(b["position_mm"], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("doubt", "code", "status"),
+    [("apply", 0, "converged"), ("warn", 0, "converged"), ("refuse", 1, "doubtful"), ("drop", 0, "converged")],
+)
+def test_what_happens_in_doubt(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, doubt: str, code: int, status: str
+) -> None:
+    """Castle 2 was seen 25 mm aside: R4, which it has with the stick, is what the rest does without."""
+    path, out = aside(tmp_path, 25.0), tmp_path / "out.csv"
+    ended, said, err = run(capsys, *asked(path, "--if-doubtful", doubt, "--json", "--out", str(out)))
+    made = json.loads(said)
+    assert (ended, made["status"], made["test"]["passes"]) == (code, status, False)
+    assert made["dropped"] == (["R4"] if doubt == "drop" else [])
+    assert (made["test_after"] or {}).get("passes") == (True if doubt == "drop" else None)
+    assert made["test"]["ambiguous"] == ([] if doubt == "apply" else ["R4"])
+    assert out.exists() == (code == 0)
+    assert bool(err) == (code != 0)
+    if doubt == "drop":
+        assert (made["rank"], made["freedom"], made["explanation"]["rank"]) == (11, 7, 11)
+    if code:
+        assert made["operations"] is None
+    words = run(capsys, *asked(path, "--if-doubtful", doubt))[1]
+    assert ("R4 may be wrong" in words) == (doubt != "apply")
+    without = [line for line in words.splitlines() if line.startswith("test without")]
+    assert [line.endswith("explained by the stated noise") for line in without] == [True] * (doubt == "drop")
+
+
+def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    lines = SEEN.read_text(encoding="utf-8").splitlines()
+    path = tmp_path / "missed.csv"
+    path.write_text("\n".join([f"{lines[0]},seen", *(f"{line},{i != 1}" for i, line in enumerate(lines[1:]))]))
+    code, out, err = run(capsys, *asked(path))
+    assert (code, err, "not_seen" in out) == (1, "", True)
+    assert json.loads(run(capsys, *asked(path, "--json"))[1])["operations"] is None
+    code, _, err = run(capsys, "explain", "stick_in_tower", "--observation", str(path))
+    assert (code, err.count("\n"), "cannot be corrected" in err) == (1, 1, True)
+
+
+@pytest.mark.parametrize("method", ["paper", "paper-track", "snap", "apo_bench.correction.contact:contact"])
+def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path, method: str) -> None:
+    code, out, err = run(capsys, *asked(SEEN, "--method", method, "--json", "--out", str(tmp_path / "plan.json")))
+    made = json.loads(out)
+    assert (code, err, made["method"]) == (0, "", method)
+    assert len(read_plan(tmp_path / "plan.json").goals) == 3
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--if-doubtful", "maybe"), "apply, warn, refuse or drop is allowed"),
+        (("--if-doubtful", "drop", "--method", "paper"), "only contact can be told what to do"),
+        (("--method", "contakt"), "did you mean 'contact'?"),
+        (("--out", "plan.xml"), "a file name that ends in .json or .csv is allowed"),
+        (("--deviation-mm", "0"), "deviation_mm 0 was given; a number from 0.0001 to 10000 is allowed"),
+        (("--deviation-mm", "1e-5"), "deviation_mm 1e-05 was given"),
+        (("--deviation-deg", "nan"), "deviation_deg nan was given"),
+    ],
+)
+def test_a_wrong_request_is_said_in_one_sentence(
+    capsys: pytest.CaptureFixture[str], more: tuple[str, ...], said: str
+) -> None:
+    code, out, err = run(capsys, *asked(SEEN, *more))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
+def test_a_file_of_another_scenario_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "correct", "pocket_table", "--observation", str(SEEN))
+    assert (code, out) == (2, "")
+    assert "line 2, column part: 'cube1' is needed" in err
+
+
+def test_what_was_seen_is_not_written_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path, link = tmp_path / "seen.csv", tmp_path / "link.csv"
+    path.write_bytes(SEEN.read_bytes())
+    link.symlink_to(path)
+    for out, words in ((path, "is the file of the observation; name another"), (link, "a symbolic link")):
+        code, said, err = run(capsys, *asked(path, "--out", str(out)))
+        assert (code, said, words in err) == (2, "", True)
+    assert path.read_bytes() == SEEN.read_bytes()
+
+
+def test_json_may_leave_deviations_to_be_assumed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    form = observation_form(read_observation(SEEN, "stick_in_tower"), "stick_in_tower")
+    for entry in form["operations"]:
+        del entry["covariance_mm_deg"]
+    path = tmp_path / "bare.json"
+    write_form(form, path)
+    for command in (asked(path, "--deviation-mm", "2.5"), ("explain", *asked(path, "--deviation-mm", "2.5")[1:])):
+        code, out, err = run(capsys, *command)
+        assert (code, err, "standard deviation of 2.5 mm and 1 deg" in out) == (0, "", True)
+    assert json.loads(run(capsys, *asked(path, "--json"))[1])["deviations_assumed"] is True
+
+
+def test_noise_that_is_stated_far_too_large_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "metres.csv"
+    lines = [line.split(",")[:9] for line in SEEN.read_text(encoding="utf-8").splitlines()]
+    path.write_text("\n".join(map(",".join, lines)), encoding="utf-8")
+    code, out, _ = run(capsys, *asked(path, "--deviation-mm", "1000", "--deviation-deg", "100"))
+    assert (code, "the stated noise is far larger than what was seen; are the units right?" in out) == (0, True)
+
+
+@pytest.mark.parametrize(("p", "said"), [(0.63, "0.63"), (0.00996, "0.00996"), (0.0100001, "0.01"), (0.01, "0.01")])
+def test_p_values_show_their_side_of_the_level(p: float, said: str) -> None:
+    assert shown_p(p, 0.01) == said
+
+
+@pytest.mark.parametrize(("p", "words"), [(0.5, "but the contacts contradict"), (1e-9, ": the contacts contradict")])
+def test_contradictory_contacts_are_not_explained(p: float, words: str) -> None:
+    seen = read_observation(SEEN, "stick_in_tower")
+    test = Consistency(chi_square=9.0, freedom=9, p_value=p, level=0.01)
+    made = Correction(seen.goals, "inconsistent", "no", (), 0.0, 0.0, 9, test=test)
+    said = dict(correction_lines(seen, made, None))["test"]
+    assert words in said
+    assert "explain" not in said
+
+
+def closed(seen: Observation) -> Correction:
+    """Claims what it did not do."""
+    return Correction(seen.goals, "converged", "every gap is closed", (), 0.0, 0.0, 0)
+
+
+def test_a_corrector_is_not_believed(capsys: pytest.CaptureFixture[str]) -> None:
+    made = json.loads(run(capsys, *asked(SEEN, "--method", "tests.cli.test_correction:closed", "--json"))[1])
+    assert made["gap_after_mm"] == made["gap_before_mm"] > 1.0
+    assert made["explanation"] is None
+
+
+def test_no_simulator_is_needed() -> None:
+    """Nor what draws; the commands read, correct and print in a process that has none."""
+    missing = ("mujoco", "mink", "dm_control", "matplotlib", "apo_bench.simulation")
+    for arguments in (asked(SEEN), asked(SEEN, "--json"), ("explain", "stick_in_tower", "--observation", str(SEEN))):
+        code = f"import sys\nfor name in {missing!r}: sys.modules[name] = None\n"
+        done = _python(f"{code}from apo_bench.cli.app import main\nsys.exit(main({list(arguments)!r}))")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "R3" in done.stdout
+
+
+def _python(code: str) -> subprocess.CompletedProcess[Any]:
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )

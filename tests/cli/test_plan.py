@@ -1,0 +1,322 @@
+"""The plan of every example is that of the paper, and another motion parameter is another line of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan, Step
+from apo_bench.assembly.placement import placed
+from apo_bench.cli import app as cli
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.insertion.arrival import turning
+from apo_bench.insertion.operations import understand
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.nominal import understood, waiting
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.show.plan_lines import plan_lines
+from apo_bench.show.plan_text import direction, plan_form, plan_text
+from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.scene.scene import build_scene
+from tests import scenes
+
+ROOT = Path(__file__).parents[2]
+SEEN = ROOT / "docs" / "seen.csv"
+DOWN = "move-to-contact -z"
+SLOT = ["insert-into-slot -z", DOWN]
+TABLE = {
+    "block_on_block": [("S -> A", [DOWN]), ("S -> A", [DOWN])],
+    "bridge_cycle": [("S -> A", [DOWN]), ("S -> C", [DOWN, "slide-to-contact -x"]), ("S -> A", [DOWN])],
+    "stick_on_castles": [("S -> A", [DOWN]), ("S -> A", [DOWN]), ("S -> D", SLOT)],
+    "fixture_alignment": [
+        ("S -> A", [DOWN]),
+        ("S -> C", [DOWN, "slide-to-contact +x"]),
+        ("C -> A", ["depart +x", DOWN]),
+    ],
+    "pocket_table": [
+        ("S -> A", [DOWN]),
+        ("S -> A", [DOWN]),
+        ("S -> C", [DOWN, "slide-to-contact +x"]),
+        ("C -> A", ["depart +x", DOWN]),
+        ("S -> E", ["insert-into +x"]),
+        ("A -> H", ["insert-into -z", "move-to-bottom -z"]),
+    ],
+    "stick_in_tower": [("S -> A", [DOWN]), ("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
+    "carried_bridge": [
+        ("S -> A", [DOWN]),
+        ("S -> A", [DOWN]),
+        ("S -> A", [DOWN]),
+        ("S -> E", ["insert-into +x"]),
+        ("A -> D", SLOT),
+    ],
+    "vanished_fixture": [
+        ("S -> A", [DOWN]),
+        ("S -> A", [DOWN]),
+        ("S -> C", [DOWN, "slide-to-contact +y"]),
+        ("C -> A", ["depart +y", DOWN]),
+        ("S -> D", SLOT),
+    ],
+}
+"""Every operation of every example: state before and after, and the macros, directions in the frame of the assembly."""
+LENGTHS_MM = {
+    ("stick_in_tower", 3): 140.0,
+    ("carried_bridge", 4): 135.0,
+    ("carried_bridge", 5): 10.0,
+    ("pocket_table", 5): 195.0,
+    ("pocket_table", 6): 6.0,
+    ("stick_on_castles", 3): 10.0,
+    ("vanished_fixture", 5): 10.0,
+}
+SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "H": (0, 1, 5)}
+
+
+def nominal(scenario: Scenario) -> Plan:
+    return Plan(scenario.assembly, scenario.start, scenario.goals)
+
+
+def unstated(scenario: Scenario) -> list[tuple[str, list[str]]]:
+    """States and macros found without any stated line of attach."""
+    found = understand(scenario.assembly, waiting(scenario), scenario.goals)
+    return [
+        (
+            f"{each.before.state.letter} -> {each.after.state.letter}",
+            [f"{m.name} {direction(m.direction)}" for m in (*each.before.departs, *each.after.macros)],
+        )
+        for each in found
+    ]
+
+
+def test_the_table_covers_every_scenario() -> None:
+    assert set(TABLE) == set(scenario_names())
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_states_and_macros_of_every_operation(name: str) -> None:
+    scenario = load_scenario(name)
+    form = plan_form(plan_lines(nominal(scenario), scenario), scenario)
+    found = [
+        (
+            f"{step['before']['letter']} -> {step['after']['letter']}",
+            [f"{m['name']} {direction(np.array(m['direction']))}" for m in step["macros"]],
+        )
+        for step in form["steps"]
+    ]
+    assert found == TABLE[name]
+    assert unstated(scenario) == TABLE[name], "stated lines of attach tell nothing new"
+    for step in form["steps"]:
+        inserted = [m["length_mm"] for m in step["macros"] if m["name"].startswith("insert")]
+        assert inserted == [LENGTHS_MM.get((name, step["operation"]))] * len(inserted)
+        assert step["line"]["free"]
+        assert tuple(step["after"]["screw"]) == SCREWS[step["after"]["letter"]]
+        axes = [len(step[kind]) for kind in ("position", "guarded", "walls")]
+        assert axes == step["after"]["translation"], "every axis is settled in one way"
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_plans_do_not_depend_on_the_frame(name: str) -> None:
+    """Turned and shifted on the table, the same macros in the same directions of the parts; also a little askew."""
+    scene, rng = scenes.ALL[name](), np.random.default_rng(3)
+    straight = understand(scene.assembly, scene.start, scene.goals)
+    for _ in range(3):
+        turn = scenes.turned(scene, pose.at(rng.uniform(-0.3, 0.3, 3) * (1, 1, 0), (0, 0, rng.uniform(-180, 180))))
+        found = understand(turn.assembly, turn.start, turn.goals)
+        askew = scenes.noisy(scene.goals, rng, 1.0, 1.0)
+        seen = understand(scene.assembly, scene.start, askew, angle_rad=np.radians(10.0))
+        for a, b, c in zip(straight, found, seen, strict=True):
+            assert a.names == b.names == c.names
+            assert a.after.state == b.after.state == c.after.state
+            assert b.after.line.travel_m == a.after.line.travel_m
+            np.testing.assert_allclose(b.after.line.direction, a.after.line.direction, atol=1e-9)
+            for m, n in zip(a.after.macros, b.after.macros, strict=True):
+                np.testing.assert_allclose(b.after.own(n.direction), a.after.own(m.direction), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_changing_one_motion_parameter_changes_one_line_of_the_plan(name: str) -> None:
+    scenario, rng = load_scenario(name), np.random.default_rng(7)
+    before = plan_text(plan_lines(nominal(scenario), scenario))
+    for k in range(len(scenario.goals)):
+        goals = np.array(scenario.goals)
+        goals[k] = scenes.noisy(goals[k : k + 1], rng, 2.0, 2.0)[0]
+        after = plan_text(plan_lines(replace(nominal(scenario), goals=goals, targets=goals), scenario))
+        assert [i for i, pair in enumerate(zip(before, after, strict=True)) if pair[0] != pair[1]] == [k + 1]
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    capsys.readouterr()
+    code = cli.main(arguments)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_the_printed_plan(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "plan", "vanished_fixture")
+    assert (code, err) == (0, "")
+    rows = [line for line in out.splitlines() if line[:1].isdigit()]
+    assert len(rows) == 5
+    assert rows[3].split("  ")[0].startswith("4")
+    for word in ("cube", "C -> A", "depart +y, move-to-contact -z", "T2", "(0, 0, 8) across x", "R5", "140.000"):
+        assert word in rows[3]
+
+
+def test_the_page_on_plans_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
+    assert run(capsys, "plan", "pocket_table")[1] in page
+
+
+def test_trouble_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A stick in a hole with a block before each end: it cannot be there, or no way leads there."""
+    block = '[parts.{0}]\nfile = "block"\nfixed = true\nstart = {{ at_mm = [{1}, 0, 25] }}\n'
+    text = 'schema = 1\ntitle = "own"\n[parts.table]\nfile = "table"\nfixed = true\n'
+    text += '[parts.stick]\nfile = "stick"\nstart = { at_mm = [0, 320, 10] }\n'
+    text += '[parts.cube]\nfile = "cube"\nfixed = true\nstart = { at_mm = [0, 0, 25] }\n'
+    hole = '["py", "cube.hpy"], ["ny", "cube.hny"], ["pz", "cube.hpz"], ["nz", "cube.hnz"]'
+    for at, more, words in (
+        (135, ', ["px", "a.nx"], ["nx", "b.px"]', "operation 1 (stick): locked"),
+        (180, "", "operation 1 (stick): no free way in"),
+    ):
+        path = tmp_path / "own.toml"
+        operation = f'[[operations]]\nmove = "stick"\ngoal = {{ at_mm = [0, 0, 25] }}\ncontacts = [{hole}{more}]\n'
+        path.write_text(text + block.format("a", at) + block.format("b", -at) + operation, encoding="utf-8")
+        code, out, err = run(capsys, "plan", str(path))
+        assert (code, err) == (0, "")
+        assert words in out
+        code, out, _ = run(capsys, "plan", str(path), "--json")
+        assert json.loads(out)["steps"][0]["trouble"] in out
+
+
+def test_a_cell_of_a_file_changes_a_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """What was seen, as it is: castle 2 aside changes the line of operation 2; corrected, what hangs on it follows."""
+    lines = SEEN.read_text(encoding="utf-8").splitlines()
+    cells = lines[2].split(",")
+    cells[3] = f"{float(cells[3]) + 0.5:g}"
+    aside = tmp_path / "seen.csv"
+    aside.write_text("\n".join([*lines[:2], ",".join(cells), *lines[3:]]), encoding="utf-8")
+    for method, changed in (("none", [2]), ("contact", [1, 2, 3])):
+        texts = []
+        for path in (SEEN, aside):
+            code, out, err = run(capsys, "plan", "stick_in_tower", "--observation", str(path), "--method", method)
+            assert (code, err) == (0, "")
+            texts.append([line for line in out.splitlines() if line[:1].isdigit()])
+        assert [i for i, (a, b) in enumerate(zip(*texts, strict=True), start=1) if a != b] == changed
+
+
+def test_a_plan_that_takes_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(
+        capsys, "plan", "stick_in_tower", "--observation", str(SEEN), "--method", "paper-track", "--json"
+    )
+    steps = json.loads(out)["steps"]
+    assert code == 0
+    (undone,) = [step for step in steps if step["undo"]]
+    assert (undone["part"], undone["from"], undone["until"]["back_to"]) == ("castle2", "T2", "start")
+    assert (undone["before"]["letter"], undone["after"]["letter"]) == ("A", "S")
+
+
+def test_undoing_reverses_the_macros() -> None:
+    """Example 5.3: the cube goes back against castle 2, so undoing its departure is the sliding that put it there."""
+    scenario = load_scenario("vanished_fixture")
+    goals = scenario.goals
+    schedule = (*(Step(k) for k in range(5)), Step(4, True), Step(3, True))
+    plan = Plan(scenario.assembly, scenario.start, goals, schedule)
+    *_, stick, cube = plan_lines(plan, scenario)
+    assert [m.name for m in stick.macros] == ["depart"]
+    assert direction(stick.macros[0].direction) == "+z"
+    assert [(m.name, direction(m.direction)) for m in cube.macros] == [
+        ("move-to-contact", "-z"),
+        ("slide-to-contact", "-y"),
+    ]
+    assert (cube.came_from, cube.back_to, cube.goal) == ("T4", "T2", None)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plan", "stick_in_towr"), ("unknown scenario", "stick_in_tower")),
+        (("plan", "stick_in_tower", "--method", "none"), ("--method none", "--observation")),
+        (("plan", "stick_in_tower", "--observation", "nowhere.csv"), ("nowhere.csv",)),
+        (("plan", "stick_in_tower", "--observation", str(SEEN), "--method", "papr"), ("papr", "did you mean")),
+        (("plan", "stick_in_tower", "--observation", str(SEEN), "--method", "oracle"), ("oracle", "truth")),
+        (("plan", "carried_bridge", "--observation", str(SEEN)), ("seen.csv",)),
+    ],
+)
+def test_wrong_requests(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
+    code, out, err = run(capsys, *arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert all(word in err for word in words), err
+
+
+TOWER = (ROOT / "scenarios" / "stick_in_tower.toml").read_text(encoding="utf-8")
+ATTACH = 'attach = { along = "+x", travel_mm = 160 }\n'
+
+
+def tower(folder: Path, attach: str) -> Scenario:
+    path = folder / "tower.toml"
+    path.write_text(TOWER.replace(ATTACH, attach), encoding="utf-8")
+    return load_scenario(path)
+
+
+@pytest.mark.parametrize(
+    ("attach", "along", "travel_mm"),
+    [
+        ("", 1.0, 160.0),
+        ('attach = { along = "-x" }\n', -1.0, 160.0),
+        ('attach = { along = "-x", travel_mm = 140 }\n', -1.0, 140.0),
+        ("attach = { travel_mm = 200 }\n", 1.0, 200.0),
+    ],
+)
+def test_a_line_of_attach_is_a_preference(tmp_path: Path, attach: str, along: float, travel_mm: float) -> None:
+    line = tower(tmp_path, attach).attach[2]
+    assert line.direction.tolist() == [along, 0.0, 0.0]
+    assert line.travel_m == pytest.approx(1e-3 * travel_mm, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("attach", "words"),
+    [
+        ('attach = { along = "-z" }\n', ("operation 3, attach, along", "castle2.sfl")),
+        ("attach = { along = [1, 0.1, 0] }\n", ("operation 3, attach, along", "castle")),
+        ('attach = { along = "+x", travel_mm = 139 }\n', ("operation 3, attach, travel_mm", "139", "at least 140")),
+    ],
+)
+def test_a_line_that_cannot_be_one_is_refused(tmp_path: Path, attach: str, words: tuple[str, ...]) -> None:
+    with pytest.raises(InputError) as refused:
+        tower(tmp_path, attach)
+    assert all(word in str(refused.value) for word in words), refused.value
+
+
+def test_no_shipped_scenario_states_what_is_found_without_need() -> None:
+    """Where a line is stated, the stated grasp asks for that end of the hole."""
+    stated = {name for name in scenario_names() if "attach =" in (ROOT / "scenarios" / f"{name}.toml").read_text()}
+    assert stated == {"stick_in_tower", "carried_bridge"}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
+    scenario = load_scenario(name)
+    layout = draw_layout(scenario, np.random.default_rng([5, 0]))
+    done = moves(Plan(scenario.assembly, layout.start, layout.goals), build_scene(scenario))
+    stages = placed(scenario.assembly, layout.start, layout.goals)
+    for move, what in zip(done, understood(scenario), strict=True):
+        t, T = move.transfer, stages[what.operation][what.main]
+        assert [motion.name for motion in t.macros] == [macro.name for macro in what.after.macros]
+        assert len(t.departs) == len(what.before.departs)
+        for motion, macro in zip(t.macros, what.after.macros, strict=True):
+            np.testing.assert_allclose(motion.way, T[:3, :3] @ what.after.own(macro.direction), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_rotation_never_adds_freedom_that_translation_lacks(name: str) -> None:
+    scenario = load_scenario(name)
+    start = waiting(scenario)
+    stages = (start, *placed(scenario.assembly, start, scenario.goals))
+    for what in understood(scenario):
+        for found, poses in ((what.before, stages[what.operation]), (what.after, stages[what.operation + 1])):
+            screw = turning(scenario.assembly, found, poses)
+            assert screw.translation == found.state
+            assert min(*screw.all, *screw.rotation) >= 0

@@ -1,0 +1,148 @@
+"""What is refused at the door of the correctors, and that the sentence blames what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import apo_bench
+from apo_bench.assembly.equations import gap
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.correction.contact import contact
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.many import correct_many
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+
+def seen(seed: int = 0) -> Observation:
+    built = scenes.stick_in_tower()
+    return scenes.seen(built, scenes.noisy(built.goals, np.random.default_rng(seed), 2.0, 1.0))
+
+
+def edited(name: str, change: Callable[[Array], None]) -> Observation:
+    one = seen()
+    array = np.array(getattr(one, name))
+    change(array)
+    changed: dict[str, Any] = {name: array}
+    return replace(one, **changed)
+
+
+def stretched(goals: Array) -> None:
+    goals[1, :3, :3] *= 1.3
+
+
+def mirrored(goals: Array) -> None:
+    goals[2, :3, 0] *= -1.0
+
+
+def far(goals: Array) -> None:
+    goals[0, 0, 3] = 1e200
+
+
+def lopsided(covariance: Array) -> None:
+    covariance[1, 0, 1] = 0.9 * covariance[1, 0, 0]
+
+
+WRONG: dict[str, tuple[Callable[[], Any], str]] = {
+    "none": (lambda: None, "an Observation is needed, None was given"),
+    "list": (lambda: [seen()], "an Observation is needed, a list was given"),
+    "stretched": (lambda: edited("goals", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
+    "mirrored": (lambda: edited("goals", mirrored), "the goal of operation 3 in the observation is not a rigid pose"),
+    "far": (lambda: edited("goals", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
+    "lopsided": (
+        lambda: edited("covariance", lopsided),
+        "the covariance of operation 2 in the observation is not symm",
+    ),
+    "play nan": (lambda: replace(seen(), play_m=float("nan")), "states play_m=nan; a finite length from 0 is needed"),
+    "play negative": (lambda: replace(seen(), play_m=-1e-3), "states play_m=-0.001"),
+    "gap nan": (lambda: replace(seen(), gap_m=float("nan")), "states gap_m=nan; a finite length above 0 is needed"),
+    "gap zero": (lambda: replace(seen(), gap_m=0.0), "states gap_m=0.0"),
+    "gap text": (lambda: replace(seen(), gap_m="1"), "states gap_m='1'"),  # type: ignore[arg-type]
+    "no start": (lambda: replace(seen(), start={}), "the observation has no start of the part"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+@pytest.mark.parametrize("corrector", ["contact", "paper", lambda seen: seen.goals])
+def test_an_observation_that_makes_no_sense_is_blamed_itself(case: str, corrector: Any) -> None:
+    make, message = WRONG[case]
+    with pytest.raises(InputError) as refused:
+        correct(make(), corrector)
+    assert message in str(refused.value)
+    assert "the corrector" not in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("case", [case for case in WRONG if case != "list"])
+def test_of_many_the_one_is_named(case: str) -> None:
+    make, message = WRONG[case]
+    with pytest.raises(InputError) as refused:
+        correct_many([seen(), make()])
+    if case != "no start":
+        assert message.replace("the observation", "observation 2") in str(refused.value)
+
+
+def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
+    for given in (seen(), iter([seen()]), None):
+        with pytest.raises(InputError, match="correct_many needs a list of observations"):
+            correct_many(given)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="'paper'; give a ContactCorrector"):
+        correct_many([seen()], "paper")  # type: ignore[arg-type]
+
+
+def lying(seen: Observation, **changed: Any) -> Correction:
+    made = Correction(seen.goals, "converged", "all is well", (), 0.0, 0.0, 0)
+    return replace(made, **changed)
+
+
+def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
+    one = seen()
+    open_m = gap(one.assembly, one.start, one.goals)
+    assert open_m > 1e-3
+    for claimed in (0.0, float("nan"), -1.0):
+        made = correct(one, lambda seen, claimed=claimed: lying(seen, gap_after_m=claimed))
+        assert (made.gap_before_m, made.gap_after_m) == (open_m, open_m)
+    wrapped, own = correct(one, lambda seen: contact(seen)), correct(one)
+    assert (wrapped.gap_before_m, wrapped.gap_after_m) == (own.gap_before_m, own.gap_after_m)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"sentence": None}, "returned None as its sentence; return one line of plain text"),
+        ({"sentence": " "}, "returned ' ' as its sentence"),
+        ({"sentence": "a\nb"}, "as its sentence"),
+        ({"test": 3}, "returned 3 as `test`; return a Consistency or None"),
+        ({"dropped": ("R99",)}, "returned 'R99' in `dropped`; return a tuple of relations, such as 'R1'"),
+        ({"dropped": ([],)}, "returned [] in `dropped`"),
+    ],
+)
+def test_words_that_nobody_can_read_are_refused(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        correct(seen(), lambda seen: lying(seen, **changed))
+    assert message in str(refused.value)
+
+
+def test_poses_far_beyond_everything_are_refused() -> None:
+    def away(seen: Observation) -> Array:
+        goals = np.array(seen.goals)
+        goals[1, 0, 3] = 1e200
+        return goals
+
+    for corrector in (away, lambda seen: lying(seen, goals=away(seen))):
+        with pytest.raises(InputError, match=r"returned a goal for operation 2 with a position of 1e\+200 m; return"):
+            correct(seen(), corrector)
+    assert correct(seen(), lambda seen: np.full((3, 4, 4), np.inf)).status == "not_finite"
+
+
+def test_what_is_exported_is_there() -> None:
+    assert apo_bench.correct_many([seen()])[0].ok
+    assert apo_bench.ContactCorrector("drop")(seen()).ok

@@ -1,0 +1,113 @@
+"""The motion parameters that Section 3.3.2 chooses: the paper's own lists, and what holds for any graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.topology import Assembly, Operation, Relation
+from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.scenario.file import load_scenario
+from tests import scenes
+from tests.assembly.test_equations import random_scene
+
+pytestmark = pytest.mark.numeric
+
+
+def arcs(assembly: Assembly, *ends: str) -> NDArray[np.bool_]:
+    """The contacts of these arcs, each as `stick-castle1`, or `cube-table 4` with the operation (from 1)."""
+    return np.array([any(_named(relation, given) for given in ends) for relation in assembly.relations()])
+
+
+def _named(relation: Relation, given: str) -> bool:
+    pair, _, made = given.partition(" ")
+    manipulated, environment = (end.part for end in relation.contact)
+    return pair == f"{manipulated}-{environment}" and made in ("", str(relation.made + 1))
+
+
+def chosen(assembly: Assembly, *failing: str) -> tuple[int, ...]:
+    """Candidates counted from 1, as in the paper."""
+    return counted(candidates(assembly, arcs(assembly, *failing)))
+
+
+def counted(operations: Iterable[int]) -> tuple[int, ...]:
+    return tuple(k + 1 for k in operations)
+
+
+PAPER = {
+    "bridge": (("A-B", "A-C"), (3, 2, 1)),
+    "stick_on_castles": (("stick-castle1", "stick-castle2"), (3, 2, 1)),
+    "stick_in_tower": (("stick-castle1", "stick-castle2"), (3, 2, 1)),
+    "subassembly_on_castles": (("stick-castle1", "stick-castle2"), (5, 4, 3, 2, 1)),
+    "fixture": (("stick-castle1", "stick-castle2"), (5, 3, 2, 1)),
+    "pockets": (("cube2-table 6", "cube3-table 6"), (6, 5, 3, 2, 1)),
+}
+FILES = {"subassembly_on_castles": "carried_bridge", "fixture": "vanished_fixture", "pockets": "pocket_table"}
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_candidates_of_the_paper(name: str) -> None:
+    failing, expected = PAPER[name]
+    assert chosen(scenes.ALL[name]().assembly, *failing) == expected
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_candidates_of_the_scenario_files(name: str) -> None:
+    failing, expected = PAPER[name]
+    assert chosen(load_scenario(FILES[name]).assembly, *failing) == expected
+
+
+def test_the_first_operation_of_fig_6_is_reached_through_a_lost_arc_only() -> None:
+    assembly = scenes.pockets().assembly
+    failing = arcs(assembly, "cube2-table 6", "cube3-table 6")
+    for missing, expected in (("cube3-cube1", (6, 5, 3, 2)), ("cube3-table 3", (6, 5, 3, 2, 1))):
+        known = ~arcs(assembly, missing)
+        assert counted(candidates(assembly, failing, known)) == expected
+
+
+def test_a_stable_object_connects_nothing() -> None:
+    assembly = scenes.fixture().assembly
+    assert chosen(assembly, "cube-table 4") == (4,)
+    assert chosen(assembly, "castle1-table") == (5, 3, 2, 1)
+    assert chosen(scenes.pockets().assembly, "cube1-table 4") == (4,)
+
+
+def test_a_part_that_was_never_moved_connects_nothing() -> None:
+    solids = [scenes.table(), *map(scenes.block, "ABC")]
+    operations = [Operation(part, scenes.touch(part, "C", "nz-pz")) for part in "AB"]
+    assembly = scenes.scene(solids, operations, [scenes.mm(0, 0, 0)] * 2).assembly
+    assert chosen(assembly, "A-C") == (1,)
+
+
+def test_nothing_fails_nothing_is_chosen() -> None:
+    for build in scenes.ALL.values():
+        assert chosen(build().assembly) == ()
+
+
+def test_a_fixture_that_is_taken_away_stays_connected() -> None:
+    assembly = scenes.fixture_alignment().assembly
+    assert chosen(assembly, "A-B") == (2, 1)
+    assert chosen(assembly, "B-table 3") == (3,)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
+def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> None:
+    """Equations with a candidate hold candidates only; those of any other operation hold none; more failures, more."""
+    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    n = len(scene.assembly)
+    system = equations(scene.assembly, scene.start, scene.goals)
+    failing = rng.random(len(system.letters)) < 0.3
+    free = candidates(scene.assembly, failing)
+    assert free == tuple(sorted(set(free), reverse=True))
+    assert set(system.among(system.containing(free)).variables(n)) <= set(free)
+    assert set(system.among(failing).variables(n)) <= set(free)
+    fewer = candidates(scene.assembly, failing & (rng.random(len(failing)) < 0.5))
+    assert set(fewer) <= set(free)
+    assert set(candidates(scene.assembly, failing, failing)) <= set(free)

@@ -1,0 +1,204 @@
+"""The compiled solver is the plain one: the same goals after the same number of turns, whatever it is given."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.many import correct_many
+from apo_bench.correction.solvers import compiled, loops, manifold
+from apo_bench.correction.solvers.compact import Compact, compact
+from apo_bench.correction.solvers.manifold import Nearest
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import SERIES, exp_and_jacobian
+from apo_bench.scenario.file import load_scenario
+from tests import scenes
+
+SCENARIOS = ("bridge_cycle", "stick_on_castles", "carried_bridge", "vanished_fixture", "pocket_table")
+LEVELS = {(2.0, 1.0): 1e-12, (10.0, 8.0): 1e-9}
+"""Noise in mm and degrees, and how far goals may differ, [m]. At the larger one rounding grows on the way: the plain
+solver differs from itself by up to 2e-10 m when the contacts come in another order."""
+
+
+def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[Compact, Array, Array]:
+    """Equations, goals that were seen, and L, a different one for every operation."""
+    rng = np.random.default_rng(seed)
+    given = load_scenario(name)
+    sigma = np.repeat([mm * 1e-3, np.radians(degrees)], 3) * rng.uniform(0.5, 1.5, size=(len(given.assembly), 1))
+    twisted = np.tril(rng.normal(scale=0.2, size=(len(given.assembly), 6, 6)), -1) + np.eye(6)
+    L = sigma[:, :, None] * twisted
+    goals = given.goals @ pose.exp((L @ rng.standard_normal((*L.shape[:2], 1)))[..., 0])
+    return compact(equations(given.assembly, given.start, goals), len(goals)), goals, L
+
+
+def alike(expected: Nearest, actual: Nearest, within_m: float) -> None:
+    assert len(expected.trace) == len(actual.trace)
+    assert np.array_equal(expected.at_rest, actual.at_rest)
+    assert np.array_equal(expected.finite, actual.finite)
+    for name in ("goals", "z", "e", "Jt", "B", "at_rest", "finite"):
+        assert getattr(expected, name).shape == getattr(actual, name).shape
+    np.testing.assert_allclose(actual.goals, expected.goals, rtol=0, atol=within_m)
+    np.testing.assert_allclose(actual.e, expected.e, rtol=0, atol=within_m)
+    np.testing.assert_allclose(actual.B, expected.B, rtol=0, atol=1e2 * within_m)
+    np.testing.assert_allclose(actual.Jt, expected.Jt, rtol=0, atol=1e2 * within_m)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _numba() -> None:
+    pytest.importorskip("numba")
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
+    for seed in range(6):
+        given = drawn(name, *level, seed)
+        alike(manifold.nearest(*given), compiled.nearest(*given), LEVELS[level])
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_soft_contacts_are_the_same_too(name: str) -> None:
+    for seed in range(3):
+        system, goals, L = drawn(name, 2.0, 1.0, seed)
+        soft_m = np.repeat(np.arange(len(system)) % 2 * 5e-5, 3)
+        alike(manifold.nearest(system, goals, L, soft_m), compiled.nearest(system, goals, L, soft_m), 1e-12)
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("own_points", [False, True])
+def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> None:
+    draws = [drawn("stick_on_castles", 5.0, 3.0, seed) for seed in range(6)]
+    goals, L = np.array([d[1] for d in draws]).reshape(2, 3, -1, 4, 4), np.array([d[2] for d in draws])
+    system = draws[0][0]
+    if own_points:
+        points = np.array([d[0].points for d in draws]) * np.arange(1.0, 7.0)[:, None, None, None]
+        system = replace(system, points=points)
+        goals = goals.reshape(6, -1, 4, 4)
+    L = L.reshape(*goals.shape[:-3], -1, 6, 6)
+    alike(manifold.nearest(system, goals, L), compiled.nearest(system, goals, L), 1e-11)
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_compact_equations_are_the_same(name: str) -> None:
+    given = load_scenario(name)
+    goals = given.goals @ pose.exp(np.random.default_rng(0).normal(scale=0.01, size=(len(given.assembly), 6)))
+    system = equations(given.assembly, given.start, goals)
+    for some in (system, system.among(np.zeros(len(system.letters), dtype=np.bool_))):
+        expected, actual = compact(some, len(goals)), compiled.compact(some, len(goals))
+        for field in ("start", "letters", "columns", "inverse", "plane"):
+            assert np.array_equal(getattr(expected, field), getattr(actual, field))
+        v, w = (np.swapaxes(K.points, 1, 2) @ K.points for K in (expected, actual))
+        np.testing.assert_allclose(w, v, rtol=0, atol=1e-15)
+
+
+@pytest.mark.numeric
+def test_what_is_not_finite_is_said_and_left_alone() -> None:
+    system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
+    three = np.array([goals, goals, goals])
+    three[1, 0, 0, 3] = np.nan
+    found = compiled.nearest(system, three, np.array([L, L, L]))
+    assert found.finite.tolist() == [True, False, True]
+    assert np.array_equal(found.goals[1], three[1], equal_nan=True)
+    assert not found.z[1].any()
+    assert np.array_equal(found.goals[0], compiled.nearest(system, goals, L).goals)
+    endless = goals.copy()
+    endless[1, 1, 3] = np.inf
+    assert not compiled.nearest(system, endless, L).finite
+
+
+def test_no_contacts_ask_for_nothing() -> None:
+    system, goals, L = drawn("bridge_cycle", 2.0, 1.0, 0)
+    none = system.among(np.zeros(len(system), dtype=np.bool_))
+    found = compiled.nearest(none, goals, L)
+    alike(manifold.nearest(none, goals, L), found, 0.0)
+    assert np.array_equal(found.goals, goals)
+
+
+@pytest.mark.parametrize("name", ["contact", "contact-fast"])
+def test_no_operations_make_no_goals(name: str) -> None:
+    built = scenes.bridge()
+    none = Assembly(built.assembly.solids, (), frozenset(built.assembly.solids))
+    seen = Observation(none, built.start, np.zeros((0, 4, 4)), np.zeros((0, 6, 6)), np.zeros(0, dtype=np.bool_))
+    made = correct(seen, name)
+    assert made.ok
+    assert made.goals.shape == (0, 4, 4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
+    """There is no point to rest on: the plain solver's own end depends on the order of the contacts."""
+    system, goals, L = drawn("stick_on_castles", 2.0, 1.0, seed)
+    plane = system.plane.copy()
+    plane[-1, 3] += 3e-3
+    for nearest in (manifold.nearest, compiled.nearest):
+        found = nearest(replace(system, plane=plane), goals, L)
+        assert bool(found.finite)
+        assert np.abs(found.e).max() > 1e-4
+        assert np.isfinite(found.goals).all()
+
+
+def test_the_corrector_by_name_is_contact_with_another_solver() -> None:
+    built = scenes.ALL["bridge"]()
+    seen = scenes.seen(built, scenes.noisy(built.goals, np.random.default_rng(3), 1.0, 1.0))
+    plain, fast = correct(seen, "contact"), correct(seen, "contact-fast")
+    assert (plain.status, plain.sentence, plain.rank) == (fast.status, fast.sentence, fast.rank)
+    np.testing.assert_allclose(fast.goals, plain.goals, rtol=0, atol=1e-12)
+    assert np.array_equal(ContactCorrector(solver=compiled.nearest)(seen).goals, fast.goals)
+
+
+def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> None:
+    built, rng = scenes.ALL["bridge"](), np.random.default_rng(0)
+    drawn_ones = [scenes.noisy(built.goals, rng, 1.0, 1.0) for _ in range(3)]
+    first = scenes.seen(built, drawn_ones[0])
+    seen = [replace(first, goals=goals) for goals in drawn_ones]
+    calls = list[int]()
+
+    def counting(system: Compact, goals: Array, L: Array) -> Nearest:
+        calls.append(len(goals))
+        return compiled.nearest(system, goals, L)
+
+    for one, other in zip(correct_many(seen), correct_many(seen, ContactCorrector(solver=counting)), strict=True):
+        assert (one.status, one.rank) == (other.status, other.rank)
+        np.testing.assert_allclose(other.goals, one.goals, rtol=0, atol=1e-12)
+    assert calls == [3]
+
+
+def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled._compiled.cache_clear()
+    monkeypatch.setitem(sys.modules, "numba", None)
+    with pytest.raises(InputError, match=r"pip install 'apo_bench\[fast\]'"):
+        compiled.nearest(*drawn("bridge_cycle", 2.0, 1.0, 0))
+
+
+def test_every_loop_is_handed_to_the_compiler() -> None:
+    written = {f for f in vars(loops).values() if getattr(f, "__module__", "") == loops.__name__ and callable(f)}
+    assert written == {loops.solve, loops.summarised, *compiled.HELPERS}
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 0.999, 1.001, 3.0])
+def test_exp_and_its_derivative_in_three_by_three(turn: float) -> None:
+    """Uncompiled, against the matrix polynomials, below and above the angle at which the series is cut."""
+    rng = np.random.default_rng(0)
+    xi = rng.standard_normal(6)
+    xi[3:] *= turn / np.linalg.norm(xi[3:])
+    seen, L = pose.exp(rng.standard_normal(6)), rng.standard_normal((6, 6))
+    T, B = np.eye(4), np.zeros((6, 6))
+    z = np.asarray(np.linalg.solve(L, xi), dtype=np.float64)
+    loops.moved(seen, L, z, SERIES, T, B)
+    D, Jr = exp_and_jacobian(L @ z)
+    T[3] = seen[3]
+    np.testing.assert_allclose(T, seen @ D, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(B, Jr @ L, rtol=0, atol=1e-12)

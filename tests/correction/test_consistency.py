@@ -1,0 +1,278 @@
+"""The test of a correction: quiet where everything is right, and naming the relation that is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import kstest
+
+from apo_bench.assembly.goals import Consistency, Correction, Observation
+from apo_bench.assembly.topology import Assembly, Contact, PartFace
+from apo_bench.correction.consistency import MOST, p_value
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.correctors import correct
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Face
+from benchmarks.corrector_bench.problems import problem
+from tests import scenes
+from tests.correction.test_large import fence
+
+ALONG = {"redundant": ("R3", "stick.py on castle1.spy"), "not redundant": ("R1", "castle1.bottom on table.top")}
+"""In Fig. 3 a side of the stick contradicts the other one; in the tower nothing contradicts the height of the table."""
+SCENES = {"redundant": scenes.stick_on_castles, "not redundant": scenes.stick_in_tower}
+
+
+def shifted(assembly: Assembly, by_mm: Mapping[str, float]) -> Assembly:
+    """The same relations, with the lower face of some contacts, `a.py on b.spy`, off along its normal."""
+    solids, operations = dict(assembly.solids), []
+    for operation in assembly.operations:
+        contacts = []
+        for contact in operation.contacts:
+            part, name = contact.environment
+            if str(contact) in by_mm:
+                old = solids[part].faces[name]
+                new = Face(f"{name}_off", old.outline + 1e-3 * by_mm[str(contact)] * old.normal, fit=old.fit)
+                solids[part] = replace(solids[part], faces={**solids[part].faces, new.name: new})
+                contacts.append(Contact(contact.manipulated, PartFace(part, new.name)))
+            else:
+                contacts.append(contact)
+        operations.append(replace(operation, contacts=tuple(contacts)))
+    return replace(assembly, solids=solids, operations=tuple(operations))
+
+
+def without(assembly: Assembly, relation: str) -> Assembly:
+    """The assembly with the contacts of one relation taken out."""
+    gone = [assembly.relations()[i] for i in assembly.arcs()[int(relation[1:]) - 1]]
+    operations = list(assembly.operations)
+    kept = tuple(c for c in operations[gone[0].made].contacts if c not in [relation.contact for relation in gone])
+    operations[gone[0].made] = replace(operations[gone[0].made], contacts=kept)
+    return replace(assembly, operations=tuple(operations))
+
+
+def look(scene: scenes.Scene, seed: int, by_mm: Mapping[str, float] | None = None) -> Observation:
+    """An observation at 1 mm and 1 degree, with some relations told wrongly."""
+    seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0))
+    return replace(seen, assembly=shifted(scene.assembly, by_mm or {}))
+
+
+def consistency_of(made: Correction) -> Consistency:
+    assert made.test is not None
+    return made.test
+
+
+@pytest.mark.parametrize("name", ["stick_on_castles", "bridge"])
+def test_p_values_are_uniform_where_everything_is_right(name: str) -> None:
+    scene = scenes.ALL[name]()
+    p = [consistency_of(correct(look(scene, seed), "contact")).p_value for seed in range(300)]
+    assert kstest(p, "uniform").pvalue > 0.01
+    assert np.mean(np.array(p) < 0.01) <= 0.03
+
+
+def test_p_values_notice_noise_that_is_stated_too_small() -> None:
+    scene = scenes.stick_on_castles()
+    p = []
+    for seed in range(60):
+        seen = look(scene, seed)
+        p.append(consistency_of(correct(replace(seen, covariance=seen.covariance / 1.5**2), "contact")).p_value)
+    assert kstest(p, "uniform").pvalue < 1e-4
+
+
+def test_chi_square_is_the_squared_length_of_the_correction() -> None:
+    scene = scenes.stick_in_tower()
+    for seed in range(5):
+        seen = look(scene, seed)
+        made = correct(seen, "contact")
+        xi = pose.log(pose.inverse(seen.goals) @ made.goals)
+        length = np.einsum("ni,nij,nj->", xi, np.linalg.inv(seen.covariance), xi)
+        assert consistency_of(made).chi_square == pytest.approx(length, rel=1e-9)
+        assert consistency_of(made).freedom == made.rank == 13
+        assert consistency_of(made).p_value == pytest.approx(p_value(length, 13))
+
+
+def off(contact: str) -> str:
+    """What the shifted contact is called."""
+    return contact.replace("spy", "spy_off").replace("top", "top_off")
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_a_relation_that_is_wrong_by_far_is_named(kind: str) -> None:
+    relation, contact = ALONG[kind]
+    for seed in range(8):
+        for by_mm in (10.0, -10.0):
+            seen = look(SCENES[kind](), seed, {contact: by_mm})
+            made = correct(seen, "contact")
+            test = consistency_of(made)
+            assert not test.passes
+            assert relation in [suspect.relation for suspect in test.ambiguous]
+            assert relation in made.sentence
+            assert {suspect.relation for suspect in test.suspects} == {f"R{i + 1}" for i in range(4)}
+            if kind == "redundant":
+                assert test.suspects[0].relation == relation
+                assert made.status == "inconsistent"
+                assert made.covariance is None
+            else:
+                assert made.ok
+            named = next(suspect for suspect in test.suspects if suspect.relation == relation)
+            assert off(contact) in map(str, named.contacts)
+            assert named.made == (2 if kind == "redundant" else 0)
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_a_suspect_is_measured_as_if_it_were_not_there(kind: str) -> None:
+    seen = look(SCENES[kind](), 1, {ALONG[kind][1]: 10.0})
+    for suspect in consistency_of(correct(seen, "contact")).suspects:
+        alone = consistency_of(correct(replace(seen, assembly=without(seen.assembly, suspect.relation)), "contact"))
+        assert suspect.freedom == alone.freedom
+        assert suspect.chi_square == pytest.approx(alone.chi_square, rel=1e-6)
+        assert suspect.p_value == pytest.approx(alone.p_value, rel=1e-4, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_what_to_do_if_the_test_fails(kind: str) -> None:
+    relation, contact = ALONG[kind]
+    seen = look(SCENES[kind](), 2, {contact: 10.0})
+    apply, warn, refuse, drop = (ContactCorrector(doubt)(seen) for doubt in ("apply", "warn", "refuse", "drop"))
+    wrong = "inconsistent" if kind == "redundant" else "converged"
+    assert (apply.status, warn.status) == (wrong, wrong)
+    assert refuse.status == ("inconsistent" if kind == "redundant" else "doubtful")
+    assert (drop.status, drop.dropped) == ("converged", (f"{relation}: {off(contact)}",))
+    assert not consistency_of(apply).suspects
+    assert "suspected" not in apply.sentence
+    assert f"suspected: {relation}" in warn.sentence
+    assert f"left out: {relation}" in drop.sentence
+    assert drop.test_after is not None
+    assert drop.test_after.passes
+    assert apply.dropped == warn.dropped == refuse.dropped == ()
+    assert_allclose(warn.goals, apply.goals, rtol=0, atol=0)
+    assert not consistency_of(drop).passes
+    assert drop.covariance is not None
+    assert warn.covariance is None or kind == "not redundant"
+
+
+def test_what_is_left_out_no_longer_counts() -> None:
+    """The goals are those of the assembly without the one contact of the relation that is wrong."""
+    contact = ALONG["redundant"][1]
+    seen = look(scenes.stick_on_castles(), 3, {contact: 10.0})
+    made = ContactCorrector("drop")(seen)
+    kept = (
+        replace(o, contacts=tuple(c for c in o.contacts if str(c) != off(contact))) for o in seen.assembly.operations
+    )
+    right = correct(replace(seen, assembly=replace(seen.assembly, operations=tuple(kept))), "contact")
+    assert_allclose(made.goals, right.goals, rtol=0, atol=1e-9)
+    assert made.rank == right.rank
+    assert made.gap_after_m > 5e-3
+
+
+def test_two_wrong_relations_are_left_out_one_after_the_other() -> None:
+    both = {"stick.py on castle1.spy": 10.0, "stick.py on castle2.spy": 12.0}
+    for seed in range(5):
+        made = ContactCorrector("drop")(look(scenes.stick_on_castles(), seed, both))
+        assert made.ok
+        first, second = both
+        whole, single = made.dropped
+        assert {whole, single.partition(":")[0]} == {"R3", "R4"}
+        assert single == {"R3": f"R3: {off(first)}", "R4": f"R4: {off(second)}"}[single[:2]]
+
+
+def test_four_wrong_relations_are_too_many_to_leave_out() -> None:
+    off = {f"stick{k}.py on castle{k}.spy": 10.0 for k in range(5)}
+    given = problem("chain6")
+    seen = look(scenes.Scene(given.assembly, given.start, given.goals), 0, off)
+    made = ContactCorrector("drop")(seen)
+    assert len(made.dropped) == 3
+    assert made.status == "inconsistent"
+
+
+def test_of_very_many_relations_the_likeliest_are_tried() -> None:
+    scene = fence(40)
+    assert len(scene.assembly.arcs()) > MOST
+    test = consistency_of(correct(look(scene, 0, {"b20.nx on b19.px": 10.0}), "contact"))
+    assert len(test.suspects) == MOST
+    assert test.suspects[0].relation == "R41"
+    assert [suspect.relation for suspect in test.ambiguous] == ["R41"]
+
+
+def resting(scene: scenes.Scene, rng: np.random.Generator, play_mm: float) -> Array:
+    """Goals with the stick anywhere in its slots, lying on their floor."""
+    goals = np.array(scene.goals)
+    goals[2, 1, 3] += 1e-3 * rng.uniform(-play_mm, play_mm)
+    goals[2, 2, 3] -= 1e-3 * play_mm
+    return goals
+
+
+def test_play_is_no_reason_for_an_alarm() -> None:
+    scene, alarms = scenes.stick_on_castles(), {0.0: 0, 0.25: 0}
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        goals = scenes.noisy(resting(scene, rng, 0.25), rng, 0.05, 0.05)
+        covariance = np.tile(np.diag(np.repeat([0.05e-3, np.radians(0.05)], 3) ** 2), (3, 1, 1))
+        for play_mm in alarms:
+            seen = replace(scenes.seen(scene, goals), covariance=covariance, play_m=1e-3 * play_mm)
+            alarms[play_mm] += not consistency_of(correct(seen, "contact")).passes
+    assert alarms[0.0] >= 40
+    assert alarms[0.25] <= 2
+
+
+def test_play_leaves_the_goals_as_they_are() -> None:
+    seen = look(scenes.stick_in_tower(), 0)
+    loose = replace(seen, play_m=0.25e-3)
+    assert_allclose(correct(loose, "contact").goals, correct(seen, "contact").goals, rtol=0, atol=0)
+    assert consistency_of(correct(loose, "contact")).chi_square < consistency_of(correct(seen, "contact")).chi_square
+
+
+def test_the_level_decides() -> None:
+    seen = look(scenes.stick_in_tower(), 0)
+    p = consistency_of(ContactCorrector()(seen)).p_value
+    below, above = ContactCorrector("refuse", p * 0.99)(seen), ContactCorrector("refuse", p + 1e-3)(seen)
+    assert (below.status, consistency_of(below).level) == ("converged", p * 0.99)
+    assert (above.status, consistency_of(above).level) == ("doubtful", p + 1e-3)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 5.0, float("nan"), float("inf")])
+def test_a_level_that_is_none_is_refused(level: float) -> None:
+    with pytest.raises(InputError, match=r"^a test level of .* was given; a number between 0 and 1 is allowed\.$"):
+        ContactCorrector(level=level)
+
+
+def test_a_policy_that_is_none_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^doubt='hope' was given; apply, warn, refuse or drop is allowed\.$"):
+        ContactCorrector("hope")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fault", [0.0, -1e-6, 1e-2])
+def test_a_covariance_that_is_not_positive_definite_is_refused(fault: float) -> None:
+    """A variance of zero, a negative one, and a covariance that is larger than both variances."""
+    seen = look(scenes.stick_in_tower(), 0)
+    covariance = np.array(seen.covariance)
+    if fault > 0.0:
+        covariance[1, 0, 1] = covariance[1, 1, 0] = fault
+    else:
+        covariance[1, 2, 2] = fault
+    for name in ("contact", "contact-refuse", "contact-drop"):
+        with pytest.raises(InputError, match=r"^the covariance of operation 2 is not positive definite; .*\.$"):
+            correct(replace(seen, covariance=covariance), name)
+
+
+def test_nothing_to_test() -> None:
+    """Without contacts nothing can be wrong; with numbers that are not finite everything is."""
+    scene = scenes.stick_in_tower()
+    bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
+    made = correct(replace(look(scene, 0), assembly=bare), "contact")
+    assert (consistency_of(made).chi_square, consistency_of(made).freedom, consistency_of(made).p_value) == (
+        0.0,
+        0,
+        1.0,
+    )
+    assert (p_value(np.inf, 3), p_value(np.nan, 3), p_value(0.0, 0)) == (0.0, 0.0, 1.0)
+
+
+def test_what_was_not_seen_is_not_tested() -> None:
+    seen = look(scenes.stick_in_tower(), 0)
+    made = correct(replace(seen, seen=np.array([True, False, True])), "contact")
+    assert (made.status, made.test, made.covariance) == ("not_seen", None, None)

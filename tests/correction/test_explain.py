@@ -1,0 +1,264 @@
+"""What the contacts determine: laws of rank and freedom, the free directions, the relations, the posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Gap
+from apo_bench.correction.contact import contact
+from apo_bench.correction.directions import Direction, directions, held
+from apo_bench.correction.explain import Explanation, explain
+from apo_bench.correction.solvers.newton import solve
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.scenario import Scenario
+from benchmarks.corrector_bench import problems
+
+STEP = 1e-3
+"""Of a shift, [m], and of a turn, [rad]: large enough to see curvature."""
+
+
+def nominal(scenario: Scenario, sigma: float = 1.0) -> Observation:
+    """The goals of a scenario, seen with `sigma` mm and degrees."""
+    n = len(scenario.assembly)
+    deviations = sigma * np.array([1e-3] * 3 + [np.radians(1.0)] * 3)
+    covariance = np.tile(np.diag(deviations**2), (n, 1, 1))
+    return Observation(scenario.assembly, scenario.start, scenario.goals, covariance, np.ones(n, bool))
+
+
+def explained(name: str) -> tuple[Observation, Explanation]:
+    seen = nominal(load_scenario(name))
+    return seen, explain(seen, seen.goals)
+
+
+def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> float:
+    """What is left of the contacts when goal k has moved and some later ones adapt."""
+    goals = np.array(seen.goals)
+    goals[k] = goals[k] @ pose.exp(STEP * twist)
+    system = equations(seen.assembly, seen.start, seen.goals)
+    free = tuple(adapting)
+    if not free:
+        return float(np.abs(system.residual(goals)).max())
+    moved = solve(system, goals, free, cut_off=1e-6)
+    return float(np.abs(system.residual(moved.goals)).max())
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_ranks_and_freedoms_add_up(name: str) -> None:
+    seen, found = explained(name)
+    assert (sum(o.rank for o in found.operations), found.rank + found.freedom) == (found.rank, 6 * len(seen.goals))
+    assert sum(len(o.free) for o in found.operations) == found.freedom
+    for o in (*found.operations, *found.parts):
+        assert (len(o.free), len(o.fixed)) == (6 - o.rank, o.rank)
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table"])
+def test_free_directions_are_free_and_the_others_are_not(name: str) -> None:
+    """Newton's method, which knows nothing of null spaces, closes the gap in exactly these directions."""
+    seen, found = explained(name)
+    for o in found.operations:
+        for free in o.free:
+            assert gap_m(seen, o.operation, free.direction.twist, free.along) < 1e-9
+        later = range(o.operation + 1, len(seen.goals))
+        span = np.column_stack([np.zeros(6), *(free.direction.twist for free in o.free)])
+        for i in range(6):
+            beyond = np.eye(6)[i] - span @ np.linalg.lstsq(span, np.eye(6)[i], rcond=None)[0]
+            if np.linalg.norm(beyond) > 0.5:
+                assert gap_m(seen, o.operation, beyond, later) > 1e-6
+
+
+def test_the_tower_in_words() -> None:
+    _, found = explained("stick_in_tower")
+    assert [(o.part, o.fixed, [str(f.direction) for f in o.free]) for o in found.operations] == [
+        ("castle1", ("z", "roll", "pitch"), ["x", "y", "yaw"]),
+        ("castle2", ("y", "z", "roll", "pitch", "yaw"), ["x"]),
+        ("stick", ("y", "z", "roll", "pitch", "yaw"), ["x"]),
+    ]
+    assert [[hold.relation for hold in o.through] for o in found.operations] == [["R1"], ["R3", "R4"], ["R3"]]
+    assert [[hold.relation for hold in o.agreeing] for o in found.operations] == [[], ["R2"], ["R4"]]
+    assert [f.along for f in found.operations[0].free] == [(), (1, 2), (1, 2)]
+    assert (found.rank, found.freedom, found.redundant, found.spectral_gap > 1e9) == (13, 5, 14, True)
+
+
+def test_a_vanished_relation_holds_what_was_put_against_it() -> None:
+    _, found = explained("vanished_fixture")
+    castle2 = found.operations[2]
+    assert [(hold.relation, hold.parts, hold.made, hold.lost) for hold in castle2.through] == [
+        ("R3", ("castle2", "table"), 2, None),
+        ("R4", ("castle2", "cube"), 2, 3),
+    ]
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table"])
+def test_the_relations_named_suffice_and_none_is_too_many(name: str) -> None:
+    seen, found = explained(name)
+    for o in found.operations:
+        names = [hold.relation for hold in o.through]
+        assert _rank_with(seen, names, o.operation) == o.rank
+        for left_out in names:
+            assert _rank_with(seen, [other for other in names if other != left_out], o.operation) < o.rank
+
+
+def _rank_with(seen: Observation, names: list[str], k: int) -> int:
+    """Directions of operation k that are fixed in an assembly that has these relations only."""
+    relations, arcs = seen.assembly.relations(), seen.assembly.arcs()
+    kept = {(relations[i].made, relations[i].contact) for name in names for i in arcs[int(name[1:]) - 1]}
+    operations = tuple(
+        replace(operation, contacts=tuple(c for c in operation.contacts if (j, c) in kept))
+        for j, operation in enumerate(seen.assembly.operations)
+    )
+    fewer = replace(seen, assembly=Assembly(seen.assembly.solids, operations, seen.assembly.fixed))
+    return explain(fewer, seen.goals).operations[k].rank
+
+
+def test_without_contacts_everything_is_as_it_was_seen() -> None:
+    scenario = load_scenario("stick_in_tower")
+    operations = tuple(replace(operation, contacts=()) for operation in scenario.assembly.operations)
+    bare = replace(scenario, assembly=Assembly(scenario.assembly.solids, operations, scenario.assembly.fixed))
+    found = explain(nominal(bare, 2.0), bare.goals)
+    assert (found.rank, found.freedom) == (0, 18)
+    for o in found.operations:
+        assert [str(f.direction) for f in o.free] == ["x", "y", "z", "roll", "pitch", "yaw"]
+        assert [f.deviation for f in o.free] == pytest.approx([2e-3] * 3 + [np.radians(2.0)] * 3)
+
+
+def test_walls_leave_a_part_free_between_them() -> None:
+    """With play at the sides of both slots, only floors and ceilings are left: the tower's z, roll and pitch."""
+    scenario = load_scenario("stick_in_tower")
+    sides = [c for c in scenario.assembly.operations[2].contacts if c.manipulated.face in ("py", "ny")]
+    gaps = {contact: Gap("clearance", -2e-4, 2e-4) for contact in sides}
+    loose = replace(scenario, assembly=replace(scenario.assembly, gaps=gaps))
+    found = explain(nominal(loose), loose.goals)
+    assert [o.fixed for o in found.operations] == [("z", "roll", "pitch")] * 3
+    assert (found.rank, found.freedom) == (9, 9)
+    assert found.rank + found.redundant == 3 * (len(scenario.assembly.relations()) - len(sides))
+
+
+def test_dropped_relations_hold_nothing() -> None:
+    seen, _ = explained("stick_in_tower")
+    found = explain(seen, seen.goals, ("R4",))
+    assert [o.fixed for o in found.operations][1] == ("z", "roll", "pitch")
+    assert "R4" not in {hold.relation for o in found.operations for hold in (*o.through, *o.agreeing)}
+    assert (found.rank, found.rank + found.redundant) == (11, 3 * (9 - 3))
+
+
+def test_a_row_of_castles_is_held_by_its_neighbours() -> None:
+    """Of K castles and the sticks between them 10 K - 7 directions are fixed, each by relations near by."""
+    chain = problems.chain(6)
+    n = len(chain.assembly)
+    covariance = np.tile(np.diag([1e-6] * 3 + [1e-4] * 3), (n, 1, 1))
+    found = explain(Observation(chain.assembly, chain.start, chain.goals, covariance, np.ones(n, bool)), chain.goals)
+    assert (found.rank, found.freedom) == (53, 6 * n - 53)
+    for o in found.operations[1:6]:
+        assert [str(free.direction) for free in o.free] == ["x"]
+        assert {hold.parts[0] for hold in o.through} == {f"stick{o.operation - 1}"}
+
+
+def test_too_many_operations_are_refused() -> None:
+    scenario = load_scenario("block_on_block")
+    n = 101
+    many = Assembly(scenario.assembly.solids, scenario.assembly.operations[:1] * n, scenario.assembly.fixed)
+    goals, covariance = np.tile(scenario.goals[0], (n, 1, 1)), np.tile(np.eye(6), (n, 1, 1))
+    with pytest.raises(InputError, match="101 operations were given; up to 100 can be explained"):
+        explain(Observation(many, scenario.start, goals, covariance, np.ones(n, bool)), goals)
+
+
+def test_what_is_free_alone_is_kept_as_seen() -> None:
+    """Along a shift that takes nothing with it, a correction of millimetres leaves a part where it was."""
+    rng, seen = np.random.default_rng(5), nominal(load_scenario("stick_in_tower"), 2.0)
+    xi = rng.standard_normal((3, 6)) * [*[2e-3] * 3, *[np.radians(2.0)] * 3]
+    noisy = replace(seen, goals=seen.goals @ pose.exp(xi))
+    made = contact(noisy)
+    for o in explain(noisy, made.goals).operations:
+        back = pose.inverse(made.goals[o.operation]) @ noisy.goals[o.operation]
+        alone = [free.direction.axis for free in o.free if not free.along]
+        assert len(alone) == 1
+        assert np.linalg.norm(back[:3, 3]) > 1e-3
+        assert abs(alone[0] @ back[:3, 3]) < 1e-6
+
+
+def test_no_operations_are_explained_too() -> None:
+    scenario = load_scenario("stick_in_tower")
+    empty = Assembly(scenario.assembly.solids, (), scenario.assembly.fixed)
+    none = Observation(empty, scenario.start, np.zeros((0, 4, 4)), np.zeros((0, 6, 6)), np.zeros(0, bool))
+    found = explain(none, none.goals)
+    assert (found.operations, found.parts, found.rank, found.freedom) == ((), (), 0, 0)
+
+
+def test_the_error_of_a_carried_part_goes_through_its_history() -> None:
+    """The stick of example 5.2 stands at T5 T3^-1 T4: three errors along x, which no contact fixes."""
+    _, found = explained("carried_bridge")
+    stick = found.parts[-1]
+    assert (stick.part, [str(f.direction) for f in stick.free]) == ("stick", ["x", "y", "yaw"])
+    assert stick.free[0].deviation == pytest.approx(np.sqrt(3.0) * 1e-3)
+
+
+def test_what_two_see_together_is_better_known() -> None:
+    """Castles and stick must agree along y, and each was seen on its own: sigma / sqrt(3)."""
+    _, found = explained("stick_in_tower")
+    assert [part.deviations[1] for part in found.parts] == pytest.approx([1e-3 / np.sqrt(3.0)] * 3)
+
+
+def test_the_posterior_of_parts_is_that_of_draws() -> None:
+    scenario = load_scenario("pocket_table")
+    seen = nominal(scenario, 1e-3)
+    found = explain(seen, seen.goals)
+    rng, drawn = np.random.default_rng(0), []
+    for _ in range(200):
+        xi = 1e-6 * rng.standard_normal((len(seen.goals), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
+        made = contact(replace(seen, goals=seen.goals @ pose.exp(xi)))
+        at = placed(seen.assembly, seen.start, made.goals)[-1]
+        drawn.append([pose.log(pose.inverse(part.pose) @ at[part.part]) for part in found.parts])
+    spread = np.sqrt(np.mean(np.square(drawn), axis=0))
+    stated = np.array([part.deviations for part in found.parts])
+    unit = 1e-6 * np.array([1, 1, 1, *[np.radians(1e3)] * 3])
+    assert (spread[stated > 1e-3 * unit] / stated[stated > 1e-3 * unit]).tolist() == pytest.approx(
+        [1.0] * int((stated > 1e-3 * unit).sum()), abs=0.17
+    )
+    assert (np.abs(spread / unit)[stated <= 1e-3 * unit] < 1e-3).all()
+
+
+@pytest.mark.parametrize(
+    ("columns", "names", "point"),
+    [
+        ([[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 1]], ["x", "yaw"], [0, 0, 0]),
+        ([[1, 1, 0, 0, 0, 0], [1, 2, 0, 0, 0, 0]], ["x", "y"], None),
+        ([[1, 2, 0, 0, 0, 0]], ["y with x"], None),
+        ([[0, -0.03, 0, 0, 0, 1]], ["yaw"], [0.03, 0, 0]),
+        ([[0, 0, 0.01, 0, 0, 1]], ["yaw with z"], [0, 0, 0]),
+        ([[0, 0, 0, 0, 1, 1], [0, 0, 0, 0, 1, -1]], ["pitch", "yaw"], [0, 0, 0]),
+    ],
+)
+def test_directions_have_names(columns: list[list[float]], names: list[str], point: list[float] | None) -> None:
+    found = directions(np.array(columns, dtype=float).T)
+    assert [str(d) for d in found] == names
+    if point is not None:
+        assert found[-1].point == pytest.approx(np.array(point), abs=1e-12)
+
+
+def test_directions_span_the_space_they_name() -> None:
+    rng = np.random.default_rng(1)
+    for f in range(7):
+        space = rng.standard_normal((6, f)) * np.array([1e-3] * 3 + [0.02] * 3)[:, None]
+        found = directions(space)
+        assert (len(found), len(held(found))) == (f, 6 - f)
+        if f:
+            basis = np.column_stack([d.twist for d in found])
+            left = space - basis @ np.linalg.lstsq(basis, space, rcond=None)[0]
+            assert np.abs(left).max() < 1e-9
+            for d in found:
+                assert np.linalg.norm(d.axis) == pytest.approx(1.0)
+
+
+def test_a_turn_leaves_its_point_where_it_is() -> None:
+    turn = Direction(np.array([0.02, -0.03, 0.0, 0.0, 0.0, 1.0]))
+    assert pose.apply(pose.exp(0.3 * turn.twist), turn.point[None])[0] == pytest.approx(turn.point)

@@ -1,0 +1,225 @@
+"""Many operations: sparse matrices give what dense ones give, and the rank is right where only they are possible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csr_array
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.correction import posterior
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.solvers import sparse
+from apo_bench.correction.solvers.compact import Compact
+from apo_bench.correction.solvers.large import nearest_large
+from apo_bench.correction.solvers.manifold import nearest
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid
+from benchmarks.corrector_bench.draws import draw
+from benchmarks.corrector_bench.problems import problem
+from tests import scenes
+from tests.correction.test_manifold import correction, crooked, scales, system_of, twisted
+
+BLOCK = scenes.block()
+PLATE = scenes.cuboid("plate", (600, 500, 10))
+
+
+def blocks(n: int, onto: Callable[[int], str], goal: Callable[[int], Array], first: Solid = BLOCK) -> scenes.Scene:
+    """n blocks, b0, b1, ..: the first stands on the table, each other one on the part of that name."""
+    solids = {"table": scenes.table(), "b0": first} | {f"b{k}": BLOCK for k in range(1, n)}
+    operations = [Operation("b0", scenes.touch("b0", "table", "nz-top"))]
+    for k in range(1, n):
+        below = onto(k)
+        operations.append(Operation(f"b{k}", scenes.touch(f"b{k}", below, "nz-top" if below == "table" else "nz-pz")))
+    start = {part: np.eye(4) for part in solids}
+    goals = np.array([goal(k) for k in range(n)])
+    return scenes.Scene(Assembly(solids, tuple(operations), frozenset({"table"})), start, goals)
+
+
+def row(n: int) -> scenes.Scene:
+    return blocks(n, lambda k: "table", lambda k: scenes.mm(60 * k, 0, 25))
+
+
+def tower(n: int) -> scenes.Scene:
+    return blocks(n, lambda k: f"b{k - 1}", lambda k: scenes.mm(0, 0, 25 + 50 * k))
+
+
+def hub(n: int) -> scenes.Scene:
+    """One plate that carries everything."""
+    return blocks(n, lambda k: "b0", lambda k: scenes.mm(0, 0, 10) if k == 0 else scenes.mm(k % 20, k // 20, 45), PLATE)
+
+
+def fence(n: int) -> scenes.Scene:
+    """Blocks side by side, each against the one before."""
+    operations = [Operation("b0", scenes.touch("b0", "table", "nz-top"))]
+    for k in range(1, n):
+        touching = scenes.touch(f"b{k}", "table", "nz-top") + scenes.touch(f"b{k}", f"b{k - 1}", "nx-px")
+        operations.append(Operation(f"b{k}", touching))
+    parts = [scenes.table(), *(scenes.block(f"b{k}") for k in range(n))]
+    return scenes.scene(parts, operations, [scenes.mm(50 * k, 0, 25) for k in range(n)])
+
+
+def of_problem(name: str) -> scenes.Scene:
+    given = problem(name)
+    return scenes.Scene(given.assembly, given.start, given.goals)
+
+
+SMALL: dict[str, tuple[Callable[[], scenes.Scene], int]] = {
+    "chain3": (lambda: of_problem("chain3"), 23),
+    "chain7": (lambda: of_problem("chain7"), 63),
+    "grid2": (lambda: of_problem("grid2"), 39),
+    "grid3": (lambda: of_problem("grid3"), 107),
+    "row": (lambda: row(12), 36),
+    "tower": (lambda: tower(12), 36),
+    "hub": (lambda: hub(12), 36),
+    "fence": (lambda: fence(12), 3 + 11 * 5),
+    "pockets": (scenes.pockets, 28),
+}
+"""Scenes, and the rank of their contacts by hand (chains 10 K - 7, grids 16 G^2 - 12 G - 1)."""
+
+
+def drawn(name: str, seed: int = 0) -> tuple[Compact, Array, Array]:
+    scene, rng = SMALL[name][0](), np.random.default_rng(seed)
+    L = crooked(len(scene.goals), rng)
+    seen = twisted(scene.goals, L, rng)
+    return system_of(scene, seen), seen, L
+
+
+@pytest.fixture(params=["banded", "together", "crowded"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Each way to solve for z, whatever the graph."""
+    if request.param == "crowded":
+        monkeypatch.setattr(sparse, "CROWDED", 0)
+    else:
+        monkeypatch.setattr(sparse, "WIDE", {"banded": 10**9, "together": 0}[request.param])
+    return str(request.param)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_sparse_is_dense(name: str, way: str) -> None:
+    system, seen, L = drawn(name)
+    large, small = nearest_large(system, seen, L), nearest(system, seen[None], L)
+    assert large.at_rest
+    assert small.at_rest.all()
+    assert_allclose(large.goals, small.goals[0], rtol=0, atol=1e-9)
+    assert_allclose(large.z, small.z[0], rtol=0, atol=1e-6)
+    assert_allclose(large.Jt.toarray(), small.Jt[0], rtol=0, atol=1e-8)
+    assert_allclose(large.B, small.B[0], rtol=0, atol=1e-9)
+    assert np.abs(large.e).max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["chain3", "grid2", "hub", "pockets"])
+def test_sparse_is_dense_for_soft_contacts(name: str, way: str) -> None:
+    system, seen, L = drawn(name)
+    soft_m = np.random.default_rng(1).uniform(0.1e-3, 1e-3, 3 * len(system))
+    soft_m[:3] = 0.0
+    large, small = nearest_large(system, seen, L, soft_m), nearest(system, seen[None], L, soft_m)
+    assert large.at_rest
+    assert_allclose(large.z, small.z[0], rtol=0, atol=1e-5)
+    assert_allclose(large.e, small.e[0], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_one_step_is_the_shortest_solution(name: str, way: str) -> None:
+    """J^t (J J^t + diag(added))^-1 right, against dense matrices."""
+    system, seen, L = drawn(name)
+    where = sparse.incidence(system)
+    _, every = system.blocks(seen, L)
+    chosen = every[where.contact, where.letter]
+    J, rng = system.gathered(every).T, np.random.default_rng(2)
+    added, right = rng.uniform(1e-6, 1e-5, len(J)), rng.standard_normal(len(J))
+    expected = J.T @ np.linalg.solve(J @ J.T + np.diag(added), right)
+    found = sparse.solver(where)(added, chosen, right)
+    assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_products_are_those_of_the_matrix(name: str) -> None:
+    system, seen, L = drawn(name)
+    where = sparse.incidence(system)
+    _, every = system.blocks(seen, L)
+    chosen, J, rng = every[where.contact, where.letter], system.gathered(every).T, np.random.default_rng(3)
+    z, y = rng.standard_normal((1, J.shape[1]))[0], rng.standard_normal((1, len(J)))[0]
+    assert_allclose(where.matrix(chosen).toarray(), J, rtol=0, atol=1e-15)
+    assert_allclose(where.times(chosen, z), J @ z, rtol=0, atol=1e-14)
+    assert_allclose(where.transposed_times(chosen, y), J.T @ y, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("few", [0, 10**9])
+def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sparse, "FEW", few)
+    for seed in range(4):
+        system, seen, L = drawn(name, seed)
+        Jt = nearest(system, seen[None], L).Jt[0]
+        assert sparse.rank(csr_array(Jt)) == posterior.rank(Jt) == SMALL[name][1]
+
+
+def test_rank_of_nothing() -> None:
+    for shape in ((0, 0), (6, 0), (12, 3)):
+        assert sparse.rank(csr_array(shape)) == posterior.rank(np.zeros(shape)) == 0
+
+
+@pytest.mark.parametrize("build", [row, tower, hub])
+def test_three_thousand_blocks(build: Callable[[int], scenes.Scene]) -> None:
+    n = 3000
+    scene, L = build(n), scales(n, 0.5, 0.02)
+    seen = twisted(scene.goals, L, np.random.default_rng(0))
+    found = nearest(system_of(scene, seen), seen, L)
+    assert found.at_rest
+    assert np.abs(found.e).max() <= 1e-9
+    assert posterior.rank(found.Jt) == 3 * n
+    truth = correction(seen, scene.goals, L)
+    assert found.z @ found.z <= truth @ truth
+
+
+def test_the_corrector_takes_many_operations_whole() -> None:
+    """What would be a dense matrix is not stated; everything else is."""
+    scene = fence(400)
+    goals = twisted(scene.goals, scales(400, 1.0, 1.0), np.random.default_rng(1))
+    made = correct(scenes.seen(scene, goals), "contact")
+    assert made.ok, made.sentence
+    assert made.rank == 3 + 399 * 5
+    assert made.test is not None
+    assert made.test.freedom == made.rank
+    assert 0.0 < made.test.p_value < 1.0
+    assert made.covariance is None
+
+
+def test_numbers_that_are_not_finite() -> None:
+    system, seen, L = drawn("chain7")
+    seen = np.array(seen)
+    seen[5, 0, 3] = np.nan
+    with np.errstate(invalid="ignore"):
+        found: Any = nearest_large(system, seen, L)
+    assert not found.finite
+    assert not found.at_rest
+    assert_array_equal(found.goals, seen)
+    assert_array_equal(found.z, np.zeros(6 * len(seen)))
+
+
+def test_rounding_does_not_stop_the_banded_solver() -> None:
+    """With nothing on the diagonal, redundant equations leave a matrix that is not positive definite."""
+    scene = of_problem("chain10")
+    system = system_of(scene, scene.goals)
+    where = sparse.incidence(system)
+    _, every = system.blocks(scene.goals, np.tile(np.eye(6), (len(scene.goals), 1, 1)))
+    found = every[where.contact, where.letter]
+    right = where.times(found, np.random.default_rng(0).standard_normal(6 * len(scene.goals)))
+    z = sparse.solver(where)(np.zeros(len(right)), found, right)
+    assert_allclose(where.times(found, z), right, rtol=0, atol=1e-6 * np.abs(right).max())
+
+
+def test_a_row_of_castles_seen_very_badly_ends_with_a_sentence() -> None:
+    given = problem("chain200")
+    of = draw(given, "10/8", 1, per_part=True)
+    seen = Observation(given.assembly, given.start, of.seen, of.covariance, np.ones(given.n, dtype=np.bool_))
+    made = correct(seen, ContactCorrector("apply"))
+    assert made.status in ("inconsistent", "not_converged")
+    assert made.sentence

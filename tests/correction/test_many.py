@@ -1,0 +1,178 @@
+"""Many observations corrected at once are those corrected one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench.assembly.equations import equations, lies_on
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.topology import Gap
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.many import CHUNK, compact_many, correct_many
+from apo_bench.correction.solvers.compact import compact
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from tests import scenes
+from tests.assembly.test_equations import random_scene
+from tests.correction.test_consistency import shifted
+from tests.correction.test_large import of_problem
+from tests.correction.test_manifold import crooked, scales, twisted
+from tests.correction.test_walls import walled
+
+SCENES: dict[str, Callable[[], scenes.Scene]] = {**scenes.ALL, "chain6": lambda: of_problem("chain6")}
+
+
+def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) -> list[Observation]:
+    """Observations of one assembly, each with noise of its own."""
+    rng, out = np.random.default_rng(0), []
+    for i in range(count):
+        n = len(scene.goals)
+        L = crooked(n, rng, mm, deg) if i % 2 else scales(n, mm, deg)
+        seen = scenes.seen(scene, twisted(scene.goals, L, rng))
+        out.append(replace(seen, covariance=L @ np.swapaxes(L, 1, 2)))
+    return out
+
+
+def check_same(many: tuple[Correction, ...], single: list[Correction]) -> None:
+    assert len(many) == len(single)
+    for a, b in zip(many, single, strict=True):
+        assert (a.status, a.sentence, a.freed, a.rank, a.dropped) == (b.status, b.sentence, b.freed, b.rank, b.dropped)
+        assert_allclose(a.goals, b.goals, rtol=0, atol=1e-9)
+        assert a.gap_before_m == b.gap_before_m
+        assert (a.test is None) == (b.test is None)
+        assert (a.covariance is None) == (b.covariance is None)
+        if a.covariance is not None and b.covariance is not None:
+            assert_allclose(a.covariance, b.covariance, rtol=0, atol=1e-9)
+        if a.test is not None and b.test is not None:
+            assert a.test.freedom == b.test.freedom
+            assert a.test.chi_square == pytest.approx(b.test.chi_square, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_many_are_one_after_the_other(name: str) -> None:
+    seen = draws(SCENES[name](), 12)
+    corrector = ContactCorrector()
+    check_same(correct_many(seen), [corrector(one) for one in seen])
+
+
+@pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])
+def test_vertices_of_either_face(name: str) -> None:
+    """Corners of the manipulated face are laid onto the other one at each observation's own goals."""
+    scene = SCENES[name]()
+    own = [lies_on(scene.assembly, relation.contact) for relation in scene.assembly.relations()]
+    assert any(own)
+    assert not all(own)
+    goals = np.array([one.goals for one in draws(scene, 5, 10.0, 8.0)])
+    pattern = equations(scene.assembly, scene.start, goals[0])
+    together = compact_many(scene.assembly, pattern, goals)
+    for i, each in enumerate(goals):
+        one = compact(equations(scene.assembly, scene.start, each), len(each))
+        e, blocks = together.only(np.arange(5) == i).blocks(
+            each[None], np.broadcast_to(np.eye(6), (1, len(each), 6, 6))
+        )
+        e_one, blocks_one = one.blocks(each, np.broadcast_to(np.eye(6), (len(each), 6, 6)))
+        J, J_one = together.gathered(blocks)[0].T, one.gathered(blocks_one).T
+        assert_allclose(J.T @ J, J_one.T @ J_one, rtol=0, atol=1e-12)
+        assert_allclose(J.T @ e[0], J_one.T @ e_one, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_vertices_of_random_assemblies(seed: int) -> None:
+    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    goals = np.array([scenes.noisy(scene.goals, rng, 20.0, 20.0) for _ in range(3)])
+    together = compact_many(scene.assembly, equations(scene.assembly, scene.start, goals[0]), goals)
+    e = together.residual(goals).reshape(3, -1, 3)
+    for i, each in enumerate(goals):
+        one = compact(equations(scene.assembly, scene.start, each), len(each))
+        expected = (one.residual(each).reshape(-1, 3) ** 2).sum(axis=1)
+        assert_allclose((e[i] ** 2).sum(axis=1), expected, rtol=1e-9, atol=1e-15)
+
+
+def test_more_than_fit_into_a_chunk() -> None:
+    seen = draws(scenes.bridge(), 2 * CHUNK + 3)
+    many = correct_many(seen)
+    assert len(many) == len(seen)
+    corrector = ContactCorrector()
+    for i in (0, CHUNK - 1, CHUNK, 2 * CHUNK - 1, 2 * CHUNK, 2 * CHUNK + 2):
+        assert_allclose(many[i].goals, corrector(seen[i]).goals, rtol=0, atol=1e-9)
+
+
+def test_the_same_with_walls() -> None:
+    scene = scenes.stick_on_castles()
+    assembly = walled(scene, "stick_on_castles", Gap("clearance", -0.5e-3, 0.5e-3))
+    seen = [replace(one, assembly=assembly) for one in draws(scene, 6)]
+    corrector = ContactCorrector()
+    many = correct_many(seen)
+    assert all(made.ok for made in many)
+    check_same(many, [corrector(one) for one in seen])
+
+
+@pytest.mark.parametrize("doubt", ["apply", "warn", "refuse", "drop"])
+def test_the_same_with_wrong_relations(doubt: str) -> None:
+    scene = scenes.stick_on_castles()
+    assembly = shifted(scene.assembly, {"stick.py on castle1.spy": 10.0})
+    seen = [replace(one, assembly=assembly) for one in draws(scene, 4)]
+    corrector = ContactCorrector(doubt)  # type: ignore[arg-type]
+    many, single = correct_many(seen, corrector), [corrector(one) for one in seen]
+    assert [made.status for made in many] == [made.status for made in single]
+    assert [made.dropped for made in many] == [made.dropped for made in single]
+    assert {made.status for made in many} == {"converged" if doubt == "drop" else "inconsistent"}
+    for a, b in zip(many, single, strict=True):
+        if a.ok:
+            assert_allclose(a.goals, b.goals, rtol=0, atol=1e-9)
+
+
+def test_one_that_was_not_seen_is_refused_alone() -> None:
+    seen = draws(scenes.stick_in_tower(), 3)
+    seen[1] = replace(seen[1], seen=np.array([True, False, True]))
+    many = correct_many(seen)
+    assert [made.status for made in many] == ["converged", "not_seen", "converged"]
+    assert_allclose(many[1].goals, seen[1].goals, rtol=0, atol=0)
+
+
+def test_none_at_all() -> None:
+    assert correct_many([]) == ()
+    assert correct_many(()) == ()
+
+
+def test_other_assemblies_are_refused() -> None:
+    first, second = draws(scenes.stick_in_tower(), 2)
+    start = {**second.start, "castle1": pose.at((9.0, 0.0, 0.0))}
+    for other in (
+        draws(scenes.stick_in_tower(), 1)[0],
+        replace(second, assembly=replace(second.assembly)),
+        replace(second, start=start),
+        replace(second, play_m=1e-3),
+    ):
+        with pytest.raises(InputError) as error:
+            correct_many([first, second, other])
+        assert str(error.value) == (
+            "observation 3 is of another assembly, start or play than observation 1; "
+            "correct those together that share them."
+        )
+
+
+def test_a_covariance_that_is_not_positive_definite_is_refused() -> None:
+    seen = draws(scenes.stick_in_tower(), 3)
+    covariance = np.array(seen[2].covariance)
+    covariance[1] = 0.0
+    seen[2] = replace(seen[2], covariance=covariance)
+    with pytest.raises(InputError, match="the covariance of operation 2 is not positive definite"):
+        correct_many(seen)
+
+
+def test_no_operations_and_no_contacts() -> None:
+    scene = scenes.stick_in_tower()
+    bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
+    seen = [replace(one, assembly=bare) for one in draws(scene, 3)]
+    for made, one in zip(correct_many(seen), seen, strict=True):
+        assert made.ok
+        assert_allclose(made.goals, one.goals, rtol=0, atol=0)
+    still = scenes.Scene(scene.assembly.first(0), scene.start, np.zeros((0, 4, 4)))
+    nothing = scenes.seen(still, still.goals)
+    assert [made.status for made in correct_many([nothing, nothing])] == ["converged", "converged"]

@@ -1,0 +1,191 @@
+"""What is still uncertain after a correction: ranks, free directions, and covariances that draws bear out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Gap, Operation
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.posterior import freedom, inside, marginals, rank
+from apo_bench.correction.solvers.manifold import nearest
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from tests import scenes
+from tests.correction.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
+
+
+def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:
+    goals = twisted(scene.goals, L, np.random.default_rng(seed))
+    return replace(scenes.seen(scene, goals), covariance=L @ np.swapaxes(L, 1, 2))
+
+
+@given(st.integers(0, 10**6), st.sampled_from(sorted(RANKS)))
+@settings(max_examples=25, deadline=None)
+def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
+    scene, rng = scenes.ALL[name](), np.random.default_rng(seed)
+    n, L = len(scene.goals), crooked(len(scene.goals), rng, 5.0, 3.0)
+    seen = twisted(scene.goals, L, rng)
+    system = system_of(scene, seen)
+    found = nearest(system, seen, L)
+    known = freedom(found.Jt)
+    assert known is not None
+    assert known.rank == rank(found.Jt) == RANKS[name]
+    assert known.free.shape == (6 * n, 6 * n - RANKS[name])
+    assert known.redundant == 3 * len(system) - RANKS[name]
+    assert known.spectral_gap > 1e5
+    assert_allclose(known.free.T @ known.free, np.eye(6 * n - RANKS[name]), rtol=0, atol=1e-12)
+    J = jacobian(system, found)
+    assert np.abs(J @ known.free).max() <= 1e-6 * np.abs(J).max()
+    assert np.abs(found.z @ known.free).max() <= 1e-6
+
+
+def test_freedom_of_nothing() -> None:
+    for shape in ((12, 0), (0, 0)):
+        known = freedom(np.zeros(shape))
+        assert known is not None
+        assert (known.rank, known.redundant, known.spectral_gap) == (0, 0, np.inf)
+        assert_allclose(known.free, np.eye(shape[0]), rtol=0, atol=0)
+    assert freedom(np.zeros((606, 3))) is None
+
+
+def test_every_row_that_counts_leaves_no_gap() -> None:
+    known = freedom(np.eye(6)[:, :4])
+    assert known is not None
+    assert (known.rank, known.redundant, known.spectral_gap) == (4, 0, np.inf)
+
+
+def test_without_contacts_it_is_the_noise_that_is_left() -> None:
+    scene, L = scenes.stick_in_tower(), crooked(3, np.random.default_rng(0))
+    system = system_of(scene, scene.goals)
+    found = nearest(system.among(np.zeros(len(system), dtype=np.bool_)), scene.goals, L)
+    assert_allclose(marginals(found, np.eye(18)), L @ np.swapaxes(L, 1, 2), rtol=1e-12, atol=1e-20)
+
+
+@pytest.mark.parametrize("correlated", [False, True])
+@pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
+def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> None:
+    """Errors of corrected goals over 400 draws; what is stated to be fixed is fixed."""
+    scene = scenes.ALL[name]()
+    n = len(scene.goals)
+    L = crooked(n, np.random.default_rng(1), 0.5, 0.5) if correlated else scales(n, 0.5, 0.5)
+    errors, stated = np.zeros((400, n, 6)), np.zeros((n, 6, 6))
+    for seed in range(len(errors)):
+        made = correct(look(scene, L, seed), "contact")
+        assert made.covariance is not None
+        errors[seed] = pose.log(pose.inverse(made.goals) @ scene.goals)
+        stated += made.covariance / len(errors)
+    empirical = np.einsum("sni,snj->nij", errors, errors) / len(errors)
+    deviation = np.sqrt(np.einsum("nii->ni", stated))
+    largest = np.repeat([deviation[:, :3].max(), deviation[:, 3:].max()], 3)
+    unit = np.maximum(deviation, 0.02 * largest)
+    scaled = (empirical - stated) / (unit[:, :, None] * unit[:, None, :])
+    assert np.abs(scaled).max() <= 0.25
+    fixed = deviation < 1e-9
+    assert fixed[0].tolist() == [False, False, True, True, True, False]
+    assert np.abs(errors[:, fixed]).max() <= 1e-9
+
+
+def test_contacts_take_uncertainty_away_and_add_none() -> None:
+    """The stated noise minus what is left is positive semidefinite, up to the curvature of a correction this small."""
+    scene, L = scenes.stick_in_tower(), crooked(3, np.random.default_rng(2), 0.01, 0.01)
+    seen = look(scene, L, 0)
+    made = correct(seen, "contact")
+    assert made.covariance is not None
+    scaled = np.linalg.inv(L) @ (seen.covariance - made.covariance) @ np.swapaxes(np.linalg.inv(L), 1, 2)
+    assert np.linalg.eigvalsh(scaled).min() >= -1e-2
+    assert np.linalg.eigvalsh(scaled).max() > 0.99
+
+
+@pytest.mark.parametrize(("level", "low", "high"), [(0.95, 0.90, 0.99), (0.5, 0.41, 0.59)])
+def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, high: float) -> None:
+    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    held = []
+    for seed in range(300):
+        seen = look(scene, L, seed)
+        held.append(inside(seen, correct(seen, "contact"), scene.goals, level))
+    assert None not in held
+    assert low <= np.mean(np.array(held, dtype=float)) <= high
+
+
+def test_regions_of_noise_that_is_stated_too_small_do_not() -> None:
+    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    held = []
+    for seed in range(60):
+        seen = look(scene, L, seed)
+        seen = replace(seen, covariance=seen.covariance / 4.0)
+        held.append(inside(seen, correct(seen, "contact"), scene.goals))
+    assert np.mean(np.array(held, dtype=float)) < 0.5
+
+
+def test_only_free_directions_count() -> None:
+    """Off along the free x of the stick the truth is outside from some sigmas on; off the table it is not looked at."""
+    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    seen = look(scene, L, 0)
+    made = correct(seen, "contact")
+    assert inside(seen, made, made.goals)
+    for mm, expected in ((1.0, True), (12.0, False), (-12.0, False)):
+        aside = np.array(made.goals)
+        aside[2] = aside[2] @ scenes.mm(mm, 0, 0)
+        assert inside(seen, made, aside) is expected
+    lifted = np.array(made.goals)
+    lifted[:, 2, 3] += 0.012
+    assert inside(seen, made, lifted)
+
+
+def test_what_was_left_out_no_longer_fixes_anything() -> None:
+    """Lifted out of its slots the stick is outside only if nothing holds it there."""
+    scene, L = scenes.stick_on_castles(), scales(3, 1.0, 1.0)
+    seen = look(scene, L, 0)
+    made = correct(seen, "contact")
+    lifted = np.array(made.goals)
+    lifted[2] = lifted[2] @ scenes.mm(0, 0, 12)
+    for dropped, expected in (((), True), (("R3",), True), (("R3", "R4"), False)):
+        assert inside(seen, replace(made, dropped=dropped), lifted) is expected
+
+
+def pocketed() -> scenes.Scene:
+    """A block in a pocket: nothing is free."""
+    contacts = scenes.touch("block", "table", *scenes.pocket("A"))
+    parts = [scenes.table_with_pockets(), scenes.block()]
+    return scenes.scene(parts, [Operation("block", contacts)], [scenes.mm(-60, 150, 19)])
+
+
+def test_where_there_is_no_region_there_is_no_answer() -> None:
+    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    seen = look(scene, L, 0)
+    assert inside(seen, correct(seen, "paper"), scene.goals) is None
+    unseen = replace(seen, seen=np.array([True, True, False]))
+    assert inside(unseen, correct(unseen, "contact"), scene.goals) is None
+    made = correct(seen, "contact")
+    assert inside(seen, replace(made, status="doubtful"), scene.goals) is None
+    assert inside(seen, replace(made, covariance=None), scene.goals) is None
+
+
+def test_where_nothing_is_free_the_covariance_is_zero_and_there_is_no_region() -> None:
+    scene = pocketed()
+    seen = look(scene, scales(1, 1.0, 1.0), 0)
+    made = correct(seen, "contact")
+    assert (made.ok, made.rank) == (True, 6)
+    assert_allclose(made.goals, scene.goals, rtol=0, atol=1e-12)
+    assert made.covariance is not None
+    assert np.abs(made.covariance).max() <= 1e-20
+    assert inside(seen, made, scene.goals) is None
+
+
+def test_walls_fix_nothing() -> None:
+    """Of contacts with a clearance only the exact ones enter the posterior."""
+    scene = pocketed()
+    gaps = {contact: Gap("clearance", -1e-3, 1e-3) for contact in scene.assembly.operations[0].contacts[1:]}
+    seen = replace(look(scene, scales(1, 0.1, 0.1), 0), assembly=replace(scene.assembly, gaps=gaps))
+    made = correct(seen, "contact")
+    assert (made.ok, made.rank) == (True, 3)
+    assert made.covariance is not None
+    assert np.linalg.matrix_rank(made.covariance[0], tol=1e-12) == 3
+    assert inside(seen, made, scene.goals) is True

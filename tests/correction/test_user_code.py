@@ -1,0 +1,177 @@
+"""Code of the user's that raises: one sentence that says whose it was and what it raised, never a traceback."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.topology import Contact, PartFace
+from apo_bench.cli.app import main
+from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.errors import InputError, failed
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.observing import observe
+from apo_bench.observation.relations import told
+from tests import scenes
+
+TOWER = scenes.stick_in_tower()
+LEVEL = Level(1.0, 1.0)
+CODE = """
+from __future__ import annotations
+
+import math
+import numpy as np
+from pathlib import Path
+from apo_bench.errors import InputError
+from apo_bench.observation.models.isotropic import Isotropic
+
+mine = Isotropic((2.0, 2.0))
+
+def name(assembly, shown, rng):
+    return no_such_name
+
+def imports(assembly, shown, rng):
+    import no_such_module
+
+def plain(goals, rng):
+    raise TypeError("of my own")
+
+plain.deviation_mm = plain.deviation_deg = 1.0
+
+class Init:
+    def __init__(self, level):
+        raise RuntimeError("init oops")
+
+    def __call__(self, assembly, shown, rng):
+        pass
+
+class Slow:
+    def __init__(self, level):
+        pass
+
+    def __call__(self, goals, rng):
+        return goals
+
+    @property
+    def deviation_mm(self):
+        raise KeyError("no deviation")
+
+def relations(assembly, start, goals, rng):
+    raise ValueError("told nothing")
+"""
+RAISED = {
+    "name": "the noise model 'name' failed: it raised NameError(\"name 'no_such_name' is not defined\"); mend it",
+    "imports": "the noise model 'imports' failed: it raised ModuleNotFoundError(",
+    "plain": "the noise model 'plain' failed: it raised TypeError('of my own'); mend it, or use another.",
+    "Init": "the noise model 'users_code:Init' failed: it raised RuntimeError('init oops'); mend it, or use another.",
+    "Slow": "the noise model 'users_code:Slow' failed: it raised KeyError('no deviation'); mend it, or use another.",
+}
+
+
+@pytest.fixture(autouse=True)
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    (tmp_path / "users_code.py").write_text(CODE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    sys.modules.pop("users_code", None)
+
+
+def refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr()
+    assert words in said.err
+    assert (said.out, said.err.count("\n"), said.err[:11]) == ("", 1, "apo-bench: ")
+
+
+@pytest.mark.parametrize("name", RAISED)
+def test_a_card_and_a_replay_of_noise_that_raises(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    refused(["noise", "card", f"users_code:{name}"], RAISED[name], capsys)
+    trial = ["replay", "stick_in_tower", "--careless", "0", "--grasp", "weld"]
+    refused([*trial, "--noise", f"users_code:{name}"], RAISED[name], capsys)
+
+
+def test_a_sweep_of_noise_that_raises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cells = ["--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1", "--grasp", "weld"]
+    work = ["--workers", "1", "--out", str(tmp_path / "run")]
+    refused(["sweep", "stick_in_tower", *cells, *work, "--noise", "users_code:name"], RAISED["name"], capsys)
+
+
+def test_an_environment_whose_noise_raises() -> None:
+    with pytest.raises(InputError, match=r"'Init' failed: it raised RuntimeError|'users_code:Init' failed"):
+        APOReplay(noise="users_code:Init")
+    env = APOReplay(noise="users_code:name", careless=0.0, grasp="weld")
+    with pytest.raises(InputError, match="the noise model 'name' failed: it raised NameError"):
+        env.reset(seed=0)
+
+
+def test_relations_that_raise(capsys: pytest.CaptureFixture[str]) -> None:
+    trial = ["replay", "stick_in_tower", "--careless", "0", "--grasp", "weld", "--method", "contact"]
+    words = "the relations 'relations' failed: told nothing; mend it, or use another."
+    refused([*trial, "--relations", "users_code:relations"], words, capsys)
+
+
+def _raising(error: Exception) -> Any:
+    def users(*given: Any) -> Any:
+        raise error
+
+    return users
+
+
+class Unspeakable(Exception):
+    def __repr__(self) -> str:
+        raise RuntimeError("not even that")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (KeyError("k"), "failed: it raised KeyError('k'); mend it, or use another."),
+        (ValueError("two\nlines."), "failed: two lines; mend it, or use another."),
+        (ValueError(), "failed: it raised ValueError(); mend it, or use another."),
+        (ValueError(np.eye(2)), "failed: [[1. 0.] [0. 1.]]; mend it, or use another."),
+        (ZeroDivisionError(np.eye(2)), "failed: it raised ZeroDivisionError(array([[1., 0.], [0., 1.]])); mend it"),
+        (Unspeakable(), "failed: it raised Unspeakable; mend it, or use another."),
+        (InputError("say this."), "say this."),
+    ],
+)
+def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
+    seen, rng = scenes.seen(TOWER, TOWER.goals), np.random.default_rng(0)
+    with pytest.raises(InputError) as by_noise:
+        observe(scenes.shown(TOWER), make_noise(_raising(error), LEVEL), rng)
+    with pytest.raises(InputError) as by_relations:
+        told(seen, _raising(error), TOWER.goals, rng)
+    for raised in (by_noise, by_relations):
+        assert words in str(raised.value)
+        assert "\n" not in str(raised.value)
+        assert isinstance(error, InputError) or raised.value.__cause__ is error
+
+
+def test_a_sentence_about_what_failed() -> None:
+    said = "the noise model 'mine' failed: it raised RuntimeError('oops'); mend it, or use another."
+    assert str(failed("the noise model 'mine'", RuntimeError("oops"))) == said
+
+
+def test_relations_name_faces_that_there_are() -> None:
+    def invents(assembly: Any, *_: Any) -> Any:
+        first, *others = assembly.operations
+        made = Contact(first.contacts[0].manipulated, PartFace("table", "cellar"))
+        return replace(assembly, operations=(replace(first, contacts=(made,)), *others))
+
+    with pytest.raises(InputError, match=r"'invents' returned a contact of table\.cellar, which is no face"):
+        told(scenes.seen(TOWER, TOWER.goals), invents, TOWER.goals, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("given", ["users_code:nope", "users_code:Pathh", "users_code:annotation", "users_code:maths"])
+def test_only_what_a_module_makes_itself_is_suggested(given: str) -> None:
+    with pytest.raises(InputError) as raised:
+        make_noise(given, LEVEL)
+    said = str(raised.value)
+    assert said.endswith("Known: Init, Slow, imports, mine, name, plain, relations.")
+    assert all(f"'{other}'" not in said for other in ("np", "Path", "annotations", "math"))

@@ -1,0 +1,435 @@
+"""The door for learners, as Gymnasium and its users expect it."""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import apo_bench
+from apo_bench.assembly.goals import Correction, Observation, Step
+from apo_bench.correction.correctors import correct
+from apo_bench.envs import apo_replay as envs
+from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.envs.nullable import predicted_info, whole
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.records import outcomes
+from apo_bench.records.settings import TrialSpec
+from apo_bench.simulation.execution import controller as replays
+from apo_bench.trial.trial import run_trial
+
+SEED = 5
+
+
+@pytest.fixture(scope="module")
+def env() -> Iterator[APOReplay]:
+    """One environment for the module: its episodes must not depend on each other."""
+    made = gymnasium.make("APOReplay-v0", grasp="weld").unwrapped
+    assert isinstance(made, APOReplay)
+    yield made
+    made.close()
+
+
+def zeros(env: Any) -> Any:
+    return np.zeros(env.action_space.shape)
+
+
+def gives_up(seen: Observation) -> Correction:
+    return Correction(seen.goals, "inconsistent", "the contacts cannot all hold", (), 1e-3, 1e-3, 0)
+
+
+def test_reset_fits_the_spaces(env: APOReplay) -> None:
+    seen, info = env.reset(seed=SEED)
+    assert env.observation_space.contains(seen)
+    assert {key: value.shape for key, value in seen.items()} == {"goals": (3, 7), "covariance": (3, 6, 6), "seen": (3,)}
+    assert all(np.isfinite(box.low).all() and np.isfinite(box.high).all() for box in _boxes(env))
+    assert env.action_space.shape == (3, 6)
+    assert info == {"demonstration": "ok"}
+    assert env.trial == SEED
+
+
+def _boxes(env: APOReplay) -> list[Any]:
+    return [env.action_space, env.observation_space["goals"], env.observation_space["covariance"]]
+
+
+def test_what_is_returned_is_what_was_seen(env: APOReplay) -> None:
+    seen, _ = env.reset(seed=SEED)
+    np.testing.assert_array_equal(seen["goals"], pose.pack(env.seen.goals))
+    np.testing.assert_array_equal(seen["covariance"], env.seen.covariance)
+    assert seen["seen"].tolist() == [1, 1, 1]
+    assert env.seen.assembly is env.assembly
+    assert [operation.main for operation in env.assembly.operations] == ["castle1", "castle2", "stick"]
+
+
+def test_a_learner_may_write_into_what_it_was_given(env: APOReplay) -> None:
+    first, _ = env.reset(seed=SEED)
+    kept = {key: value.copy() for key, value in first.items()}
+    for value in first.values():
+        value[:] = 0
+    again, _ = env.reset(seed=SEED)
+    for key, value in kept.items():
+        np.testing.assert_array_equal(again[key], value)
+
+
+def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
+    first, _ = env.reset(seed=SEED)
+    other, _ = env.reset()
+    drawn, _ = env.reset(seed=SEED)
+    assert not np.array_equal(first["goals"], other["goals"])
+    np.testing.assert_array_equal(first["goals"], drawn["goals"])
+    after, _ = env.reset()
+    np.testing.assert_array_equal(other["goals"], after["goals"])
+
+
+def test_an_episode_is_the_row_of_its_trial(env: APOReplay) -> None:
+    """Zeros, corrected, are method `paper` of `apo-bench replay --seed`."""
+    row = run_trial(TrialSpec("stick_in_tower", grasp="weld", method="paper", seed=SEED), env._scene)
+    assert row["success"] is True
+    _check_episode(apo_bench.Corrected(env, "paper"), row)
+    reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in env._poses.items()}
+    assert reached == row["reached"]
+
+
+def test_an_episode_that_fails_is_the_row_of_its_trial() -> None:
+    """Zeros, bare, are method `none`; at this level the plan is refused before the arm moves."""
+    env = APOReplay(grasp="weld", level=40)
+    spec = TrialSpec("stick_in_tower", level_mm=40.0, level_deg=40.0, grasp="weld", method="none", seed=SEED)
+    row = run_trial(spec, env._scene)
+    assert row["success"] is False
+    _check_episode(env, row)
+
+
+def _check_episode(env: Any, row: dict[str, Any]) -> None:
+    env.reset(seed=SEED)
+    _, reward, terminated, truncated, info = env.step(zeros(env))
+    assert (reward, terminated, truncated) == (float(row["success"]), True, False)
+    assert (info["is_success"], info["loose_success"]) == (row["success"], row["loose_success"])
+    stage, code = row["failure_stage"] or "done", row["failure_code"] or "ok"
+    assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
+    assert info["operation"] == row["failure_operation"]
+    assert info["predicted"] == row["predicted"]
+
+
+def test_an_action_moves_each_goal_in_the_frame_of_its_part(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
+    env.reset(seed=SEED)
+    twist = np.linspace(-0.09, 0.09, 18).reshape(3, 6)
+    env.step(twist)
+    env.reset(seed=SEED)
+    env.step(zeros(env))
+    np.testing.assert_allclose(asked[0].goals, env.seen.goals @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].goals, env.seen.goals)
+
+
+def _nothing() -> Any:
+    from types import SimpleNamespace as Record
+
+    outcome = Record(stage="plan", code="unreachable", operation=0, sentence="the arm cannot reach it")
+    result = Record(outcome=outcome, reached=Record(final=None))
+    return Record(result=result, verdict=Record(success=False, as_demonstrated=False, loose_success=False))
+
+
+def test_correction_aims_and_an_action_composes_on_top(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
+    corrected = apo_bench.Corrected(env, "apo_bench.correction.baselines.paper:paper")
+    seen, info = corrected.reset(seed=SEED)
+    assert info["correction"] == "converged"
+    assert not np.array_equal(seen["goals"], pose.pack(env.seen.goals))
+    twist = np.full((3, 6), 0.01)
+    after, *_ = corrected.step(twist)
+    np.testing.assert_allclose(asked[0].goals, pose.unpack(seen["goals"]) @ pose.exp(twist), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(after["goals"], seen["goals"])
+    env.reset(seed=SEED)
+    env.step(zeros(env))
+    np.testing.assert_array_equal(asked[1].goals, env.seen.goals)
+
+
+def test_a_correction_that_fails_is_not_executed(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda *_: pytest.fail("nothing may be replayed"))
+    corrected = apo_bench.Corrected(env, gives_up)
+    seen, info = corrected.reset(seed=SEED)
+    assert info["correction"] == "inconsistent"
+    np.testing.assert_array_equal(seen["goals"], pose.pack(env.seen.goals))
+    _, reward, terminated, _, info = corrected.step(zeros(env))
+    assert (reward, terminated, info["stage"], info["code"]) == (0.0, True, "correct", "inconsistent")
+    assert "predicted" not in info
+
+
+def rebuilds(seen: Observation) -> Correction:
+    """Example 5.1: castle 2 is put down as it was seen, taken off, and put down rightly."""
+    made = correct(seen, "paper")
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = made.goals[[step.operation for step in schedule]]
+    targets[1:3] = seen.goals[1]
+    return replace(made, schedule=schedule, targets=targets)
+
+
+def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
+    env: APOReplay, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
+    corrected = apo_bench.Corrected(env, rebuilds)
+    corrected.reset(seed=SEED)
+    made = rebuilds(env.seen)
+    twist = np.linspace(-0.02, 0.02, 18).reshape(3, 6)
+    corrected.step(twist)
+    corrected.reset(seed=SEED)
+    corrected.step(zeros(env))
+    assert asked[0].schedule == asked[1].schedule == made.schedule
+    moved = made.targets @ pose.exp(twist)[[0, 1, 1, 1, 2]]
+    np.testing.assert_allclose(asked[0].targets, moved, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(asked[0].goals, made.goals @ pose.exp(twist), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(asked[1].targets, made.targets)
+
+
+def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
+    """One episode ends without an operation to name, the other with one, in either order."""
+    many: Any = gymnasium.vector.VectorEnv()
+    many.num_envs = 2
+    endings = [
+        {"operation": whole(k), "predicted": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x})}
+        for k, x in ((3, 1.5), (None, None))
+    ]
+    for order in (endings, endings[::-1]):
+        infos = many._add_info(many._add_info({}, order[0], 0), order[1], 1)
+        assert infos["operation"].tolist() == [info["operation"] for info in order]
+        assert infos["predicted"]["size_mm"].tolist() == [info["predicted"]["size_mm"] for info in order]
+
+
+def test_info_never_holds_the_truth(env: APOReplay) -> None:
+    _, first = env.reset(seed=SEED)
+    _, _, _, _, info = env.step(np.full((3, 6), 0.05))
+    said = info.pop("predicted")
+    assert set(said) == {"fails", "operation", "code", "size_mm"}
+    assert set(info) == {"is_success", "as_demonstrated", "loose_success", "stage", "code", "operation", "sentence"}
+    assert set(first) == {"demonstration"}
+    assert info["stage"] in (*outcomes.STAGES, "done")
+    assert info["code"] in outcomes.CODES
+    assert all(isinstance(value, (bool, str, int, type(None))) for value in info.values())
+    assert {f.name for f in fields(env.seen)} == {
+        *("assembly", "start", "goals", "covariance", "seen", "gap_m", "play_m")
+    }
+
+
+def test_simulated_time_has_a_limit(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
+    env.reset(seed=SEED)
+    again = (Step(0), Step(0, undo=True)) * 600
+    env.aim(env.seen.goals, (*again, *(Step(k) for k in range(3))))
+    monkeypatch.setattr(replays, "moves", _nothing)
+    info = env.step(zeros(env))[4]
+    assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
+    monkeypatch.undo()
+    monkeypatch.setattr(envs, "LONGEST_REPLAY_S", 5.0)
+    env.reset(seed=SEED)
+    info = env.step(zeros(env))[4]
+    assert [info[key] for key in ("is_success", "stage", "code")] == [False, "pick", "time_limit"]
+    assert info["operation"] > 1
+    assert info["sentence"] == "the trial took longer than its limit"
+
+
+def test_one_step_is_one_episode(env: APOReplay) -> None:
+    fresh = APOReplay(grasp="weld")
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        fresh.step(zeros(env))
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        _ = fresh.seen
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        _ = fresh.trial
+    env.reset(seed=SEED)
+    env.step(np.full((3, 6), 0.05))
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        env.step(zeros(env))
+
+
+@pytest.mark.parametrize("action", [np.zeros((3, 5)), np.full((3, 6), np.nan), np.full((3, 6), 0.6), np.zeros(18)])
+def test_an_action_outside_the_space_is_refused(env: APOReplay, action: Any) -> None:
+    env.reset(seed=SEED)
+    with pytest.raises(InputError, match=r"action of shape"):
+        env.step(action)
+
+
+def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from apo_bench.observation.models.isotropic import Isotropic
+    from apo_bench.observation.noise import Level
+
+    def blind(assembly: Any, shown: Any, rng: Any) -> Observation:
+        full = Isotropic(Level(1.0, 1.0))(assembly, shown, rng)
+        return Observation(assembly, full.start, full.goals, full.covariance, np.array([True, True, False]))
+
+    env = APOReplay(grasp="weld", noise=blind)
+    seen, _ = env.reset(seed=SEED)
+    assert seen["seen"].tolist() == [1, 1, 0]
+    _, reward, _, _, info = env.step(zeros(env))
+    assert (reward, info["stage"], info["code"], info["operation"]) == (0.0, "observe", "not_seen", 3)
+    corrected = apo_bench.Corrected(env)
+    corrected.reset(seed=SEED)
+    _, _, _, _, info = corrected.step(zeros(env))
+    assert (info["stage"], info["code"]) == ("correct", "not_seen")
+
+
+def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
+    env: APOReplay, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import apo_bench.envs.apo_replay as module
+
+    real, calls = module.show, []
+
+    def fails_at_first(scene: Any, careless: float, seed: int, eye: str) -> Any:
+        calls.append(seed)
+        shown = real(scene, careless, seed, eye)
+        if len(calls) > 1:
+            return shown
+        return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
+
+    monkeypatch.setattr(module, "show", fails_at_first)
+    _, info = env.reset(seed=SEED)
+    assert info["demonstration"] == "demonstration_failed"
+    _, reward, terminated, _, info = env.step(zeros(env))
+    assert (reward, terminated, info["stage"], info["is_success"]) == (0.0, True, "demonstrate", False)
+    calls.clear()
+    _, info = env.reset()
+    assert info["demonstration"] == "ok"
+    assert env.trial == calls[1] != calls[0]
+
+
+def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
+    env: APOReplay, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import apo_bench.envs.apo_replay as module
+
+    shown = module.show(env._scene, 1.0, SEED)
+    failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
+    monkeypatch.setattr(module, "show", lambda *_: failed)
+    with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row went wrong at carelessness"):
+        env.reset()
+
+
+def test_poses_may_be_measured_in_depth_images() -> None:
+    env = APOReplay(eye="range", level=1.0)
+    first, _ = env.reset(seed=SEED)
+    again, _ = env.reset(seed=SEED)
+    drawn, _ = APOReplay(level=1.0).reset(seed=SEED)
+    for key, x in first.items():
+        np.testing.assert_array_equal(x, again[key])
+    assert first["seen"].all()
+    off = np.linalg.norm(first["goals"][:, :3] - APOReplay(level=0.0).reset(seed=SEED)[0]["goals"][:, :3], axis=1)
+    assert (off < 2e-3).all()
+    assert not np.array_equal(first["goals"], drawn["goals"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"scenario": "stick_in_towr"}, "did you mean 'stick_in_tower'"),
+        ({"eye": "rang"}, "did you mean 'range'"),
+        ({"level": "1"}, "the level '1' was given"),
+        ({"level": True}, "the level True was given"),
+        ({"level": -1}, "level in mm of -1"),
+        ({"level": (1, 2, 3)}, "a pair of mm and degrees"),
+        ({"careless": float("nan")}, "carelessness of nan"),
+        ({"noise": "isotropc"}, "did you mean 'isotropic'"),
+        ({"grasp": "glue"}, "unknown grasp 'glue'"),
+        ({"clearance_mm": -1.0}, "clearance of -1"),
+        ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
+        ({"render_mode": "ansi"}, "use rgb_array, human or None"),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        APOReplay(**arguments)
+
+
+def test_corrected_wraps_only_this_environment(env: APOReplay) -> None:
+    with pytest.raises(InputError, match="did you mean 'paper'"):
+        apo_bench.Corrected(env, "papr")
+    with pytest.raises(InputError, match="wraps an APOReplay"):
+        apo_bench.Corrected(gymnasium.make("CartPole-v1"))
+
+
+def test_make_takes_every_argument_and_a_copy_travels() -> None:
+    made = gymnasium.make(
+        "APOReplay-v0", scenario="stick_on_castles", level=(0.5, 0.25), careless=0.0, noise="isotropic", grasp="weld",
+        clearance_mm=0.4, arm="six_axis", render_mode=None,
+    )  # fmt: skip
+    seen, _ = made.reset(seed=1)
+    assert np.sqrt(seen["covariance"][0, 0, 0]) == pytest.approx(0.5e-3)
+    assert np.sqrt(seen["covariance"][0, 5, 5]) == pytest.approx(np.radians(0.25))
+    again = gymnasium.make(pickle.loads(pickle.dumps(made.spec)))
+    np.testing.assert_array_equal(again.reset(seed=1)[0]["goals"], seen["goals"])
+
+
+def test_a_picture_without_a_display(env: APOReplay) -> None:
+    env.reset(seed=SEED)
+    assert env.render() is None
+    env.render_mode = "rgb_array"
+    try:
+        before = env.render()
+        env.step(zeros(env))
+        after = env.render()
+    finally:
+        env.render_mode = None
+    assert (before.shape, before.dtype) == ((480, 640, 3), np.uint8)
+    assert before.std() > 10
+    assert env._state is not None
+    assert env._state.shape == env._scene.work.model.qpos0.shape
+    assert np.abs(before.astype(int) - after.astype(int)).max() > 50
+
+
+def test_the_human_mode_watches_the_replay_and_closes(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
+    windows: list[Any] = []
+
+    class Window:
+        def __init__(self, scene: Any) -> None:
+            self.ticks, self.closed = 0, False
+            windows.append(self)
+
+        def __call__(self, data: Any) -> None:
+            self.ticks += 1
+
+        def close(self) -> None:
+            self.closed = True
+
+    monkeypatch.setattr("apo_bench.simulation.scene.render.Viewer", Window)
+    monkeypatch.setattr(env, "render_mode", "human")
+    env.reset(seed=SEED)
+    assert env.render() is None
+    assert not windows
+    env.step(np.full((3, 6), 0.05))
+    env.close()
+    assert (len(windows), windows[0].closed) == (1, True)
+    assert windows[0].ticks > 10
+
+
+@pytest.mark.slow
+def test_gymnasium_finds_nothing_to_warn_of() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for mode in (None, "rgb_array"):
+            made = gymnasium.make("APOReplay-v0", render_mode=mode)
+            check_env(made.unwrapped)
+            made.close()
+        made = gymnasium.make("APOReplay-v0")
+        made.reset(seed=0)
+        made.step(np.zeros((3, 6)))
+
+
+@pytest.mark.slow
+def test_vector_environments_are_the_same_trials(env: APOReplay) -> None:
+    many = gymnasium.make_vec("APOReplay-v0", num_envs=2, vectorization_mode="async", grasp="weld")
+    try:
+        seen, _ = many.reset(seed=[SEED, SEED + 1])
+        for i in range(2):
+            np.testing.assert_array_equal(seen["goals"][i], env.reset(seed=SEED + i)[0]["goals"])
+    finally:
+        many.close()

@@ -1,0 +1,230 @@
+"""Copies of an environment, and the settings of one episode."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import cloudpickle
+import gymnasium
+import numpy as np
+import pytest
+
+import apo_bench
+from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.envs import episode
+from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.errors import InputError
+from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.records.settings import TrialSpec
+from apo_bench.trial.trial import run_trial
+
+SEED = 5
+WAYS: dict[str, Callable[[Any], Any]] = {
+    "pickle": lambda env: pickle.loads(pickle.dumps(env)),
+    "deepcopy": copy.deepcopy,
+    "cloudpickle": lambda env: cloudpickle.loads(cloudpickle.dumps(env)),
+}
+NEAR = np.full((3, 6), 1e-4)
+
+
+@pytest.fixture(scope="module")
+def env() -> APOReplay:
+    """One between reset and step; nothing here may change it."""
+    made = APOReplay(grasp="weld")
+    made.reset(seed=SEED)
+    return made
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two results, nested, are equal bit by bit."""
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    return np.array_equal(a, b)
+
+
+@pytest.mark.parametrize(("way", "level"), [("pickle", 0.5), ("deepcopy", 40.0), ("cloudpickle", 40.0)])
+def test_a_copy_goes_on_as_the_original_would(way: str, level: float) -> None:
+    """Before the first reset, between reset and step, and after the step; at level 40 the arm does not move."""
+    made = gymnasium.make("APOReplay-v0", level=level, grasp="weld", render_mode="rgb_array")
+    env = apo_bench.Corrected(made, "paper")
+    fresh = WAYS[way](env)
+    begun = env.reset(seed=SEED)
+    assert same(fresh.reset(seed=SEED), begun)
+    pending = WAYS[way](env)
+    stepped = env.step(NEAR)
+    assert same(pending.step(NEAR), stepped)
+    over = WAYS[way](env)
+    assert same(over.render(), env.render())
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        over.step(NEAR)
+    following = env.reset()
+    assert same(pending.reset(), following)
+    assert same(over.reset(), following)
+    assert env.unwrapped.trial == pending.unwrapped.trial == over.unwrapped.trial != SEED
+
+
+def test_a_copy_is_one_of_its_own(env: APOReplay) -> None:
+    kept = env.seen.goals.copy()
+    other = copy.deepcopy(env)
+    other.reset(seed=SEED + 1, options={"level": 3.0, "clearance_mm": 0.5})
+    assert (env.trial, other.trial) == (SEED, SEED + 1)
+    assert env._scene.clearance_mm != other._scene.clearance_mm
+    np.testing.assert_array_equal(env.seen.goals, kept)
+
+
+def test_what_is_frozen_is_frozen_in_the_copy(env: APOReplay) -> None:
+    copied = WAYS["pickle"](env)
+    seen: Observation = copied.seen
+    assert seen.assembly is copied.assembly
+    face = next(iter(copied.assembly.solids["stick"].faces.values()))
+    for array in (seen.goals, seen.covariance, seen.seen, *seen.start.values(), face.outline, face.normal):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    for mapping in (seen.start, copied.assembly.solids, copied._scene.scenario.colors):
+        with pytest.raises(TypeError, match="does not support item assignment"):
+            mapping["stick"] = None
+
+
+def test_a_correction_can_be_pickled() -> None:
+    made = Correction(np.tile(np.eye(4), (2, 1, 1)), "converged", "", (1,), 0.1, 0.0, 3)
+    again = pickle.loads(pickle.dumps(made))
+    assert (again.status, again.freed, again.covariance) == ("converged", (1,), None)
+    np.testing.assert_array_equal(again.goals, made.goals)
+
+
+@pytest.mark.parametrize("name", [*NOISES, "megapose-lmo"])
+def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
+    assert env._shown is not None
+    noise = make_noise(name, Level(1.0, 1.0))
+    here, there = (
+        model(env.assembly, env._shown.demonstration, np.random.default_rng(1))
+        for model in (noise, pickle.loads(pickle.dumps(noise)))
+    )
+    np.testing.assert_array_equal(here.goals, there.goals)
+
+
+def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> None:
+    """The depth images of the demonstration, tens of megabytes, are gone when the poses are measured."""
+    env = APOReplay(eye="range", level=1.0)
+    usual = env.reset(seed=SEED)
+    pickled = pickle.dumps(env)
+    assert len(pickled) < 2e6
+    worse = pickle.loads(pickled).reset(seed=SEED, options={"level": 3})
+    assert same(worse, APOReplay(eye="range", level=3).reset(seed=SEED))
+    assert not same(worse, usual)
+    with pytest.raises(InputError, match="one number is allowed, mm per ray"):
+        env.reset(options={"level": (1, 1)})
+
+
+def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Window:
+        def __init__(self, scene: Any) -> None: ...
+
+        def __call__(self, data: Any) -> None: ...
+
+        def close(self) -> None: ...
+
+        def __reduce__(self) -> Any:
+            raise TypeError("a window cannot be pickled")
+
+    monkeypatch.setattr("apo_bench.simulation.scene.render.Viewer", Window)
+    env = APOReplay(grasp="weld", level=40, render_mode="human")
+    env.reset(seed=SEED)
+    env.step(NEAR)
+    assert env._window is not None
+    assert WAYS["deepcopy"](env)._window is None
+
+
+@pytest.mark.parametrize("options", [{"level": (0.5, 0.25), "careless": 0}, {"clearance_mm": 0.5}])
+def test_options_are_of_one_episode(options: dict[str, Any]) -> None:
+    """It is that of an environment which was made with them, and the next one is as ever."""
+    env = APOReplay(grasp="weld")
+    usual = env.reset(seed=SEED)
+    got = env.reset(seed=SEED, options=options)
+    assert same(got, APOReplay(grasp="weld", **options).reset(seed=SEED))
+    assert not same(got, usual)
+    assert same(env.reset(seed=SEED), usual)
+
+
+def test_an_episode_with_options_is_the_row_of_its_trial() -> None:
+    """At this level the plan is refused before the arm moves."""
+    env = APOReplay(grasp="weld")
+    env.reset(seed=SEED, options={"level": 40, "clearance_mm": 0.5})
+    spec = TrialSpec("stick_in_tower", 40.0, 40.0, clearance_mm=0.5, grasp="weld", method="none", seed=SEED)
+    row = run_trial(spec, env._scene)
+    _, reward, _, _, info = env.step(np.zeros((3, 6)))
+    assert (reward, info["sentence"], info["predicted"]) == (float(row["success"]), row["sentence"], row["predicted"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"levl": 1}, "unknown option of reset.. 'levl'; did you mean 'level'. Known: careless, clearance_mm, level"),
+        ({"seed": 1}, "unknown option of reset.. 'seed'"),
+        ({3: 1}, "unknown option of reset.. '3'"),
+        ([("level", 1)], "a dict with level, careless, clearance_mm is allowed"),
+        ({"level": None}, "the level None was given"),
+        ({"level": float("nan")}, "level in mm of nan"),
+        ({"level": -1}, "level in mm of -1"),
+        ({"careless": "much"}, "carelessness of 'much'"),
+        ({"careless": None}, "carelessness of None"),
+        ({"clearance_mm": -0.1}, "clearance of -0.1"),
+        ({"clearance_mm": float("inf")}, "clearance of inf"),
+        ({"level": 2, "careless": 11}, "carelessness of 11"),
+        ({"level": 2, "clearance_mm": 5.1}, "clearance of 5.1"),
+    ],
+)
+def test_wrong_options_are_refused_and_change_nothing(env: APOReplay, options: Any, words: str) -> None:
+    other = copy.deepcopy(env)
+    with pytest.raises(InputError, match=words):
+        other.reset(seed=1, options=options)
+    assert other.trial == SEED
+    assert other._scene.clearance_mm == env._scene.clearance_mm
+    assert other._now == env._now
+    assert other.np_random.bit_generator.state == env.np_random.bit_generator.state
+
+
+def test_an_episode_survives_a_refused_reset() -> None:
+    env = APOReplay(grasp="weld", level=40)
+    env.reset(seed=SEED)
+    with pytest.raises(InputError, match="did you mean 'level'"):
+        env.reset(options={"levels": 1})
+    assert env.step(np.zeros((3, 6)))[2] is True
+
+
+def test_scenes_of_other_clearances_are_kept_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[float] = []
+    scene = APOReplay(grasp="weld")._scene
+    monkeypatch.setattr(episode, "build_scene", lambda _, clearance_mm, **__: built.append(clearance_mm) or object())
+    scenes = episode.Scenes(scene)
+    for clearance in (0.5, 0.6, 0.5, None, 0.25):
+        scenes.of(clearance)
+    assert built == [0.5, 0.6]
+    assert scenes.of(None) is scenes.of(0.25) is scene
+    for i in range(episode.MOST_SCENES):
+        scenes.of(1.0 + i)
+    scenes.of(0.5)
+    assert built.count(0.5) == 2
+    assert len(scenes._others) == episode.MOST_SCENES
+
+
+@pytest.mark.slow
+def test_environments_work_in_spawned_processes() -> None:
+    many = gymnasium.make_vec(
+        "APOReplay-v0", num_envs=2, vectorization_mode="async", vector_kwargs={"context": "spawn"}, grasp="weld"
+    )
+    env = APOReplay(grasp="weld")
+    try:
+        seen, infos = many.reset(seed=[SEED, SEED + 1], options={"level": 2.0})
+        assert "trial" not in infos
+        for i in range(2):
+            mine, _ = env.reset(seed=SEED + i, options={"level": 2.0})
+            np.testing.assert_array_equal(seen["goals"][i], mine["goals"])
+        assert many.get_attr("trial") == (SEED, SEED + 1)
+    finally:
+        many.close()

@@ -1,0 +1,244 @@
+"""Estimates and truth of the BOP formats: what is understood, how they are matched, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+from apo_bench.files import bop, bop_truth
+from apo_bench.files.bop import read_results
+from apo_bench.files.bop_truth import read_truth
+from apo_bench.observation.models import residuals
+from apo_bench.observation.models.residuals import compare
+from tests import bop_made as made_of
+from tests.bop_made import HEADER, Known, Made
+
+ONE = "1 0 0 0 1 0 0 0 1"
+ROW = f"1,7,3,0.5,{ONE},10 20 900,0.1"
+
+
+@pytest.fixture(scope="module")
+def made() -> Made:
+    return made_of.draw(300, Known(), np.random.default_rng(1))
+
+
+def written(folder: Path, *lines: str, name: str = "estimates.csv") -> Path:
+    path = folder / name
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_rows_are_read_in_mm_model_to_camera(tmp_path: Path) -> None:
+    turned = "0 -1 0 1 0 0 0 0 1"
+    path = tmp_path / "a.csv"
+    path.write_bytes(
+        b"\xef\xbb\xbf" + f"{HEADER}\r\n\r\n{ROW}\r\n 2 , 8,4,1e-3,{turned}, -1.5  2e2 1000,-1\r\n".encode()
+    )
+    read = read_results(path)
+    assert_array_equal(read.where, [[1, 7, 3], [2, 8, 4]])
+    assert_array_equal(read.t_mm, [[10, 20, 900], [-1.5, 200, 1000]])
+    assert_array_equal(read.R[1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    assert read.said(1) == f"{path}, line 4"
+
+
+def test_planted_errors_come_back(tmp_path: Path, made: Made) -> None:
+    """In the frame of each ray, for every part that was found, whatever the order of rows; the rest is missed."""
+    estimates, truth = made_of.files(tmp_path, made)
+    lines = estimates.read_text(encoding="utf-8").splitlines()
+    order = np.random.default_rng(0).permutation(len(lines) - 1)
+    estimates.write_text("\n".join([lines[0], *(lines[1 + i] for i in order)]), encoding="utf-8")
+    seen = read_results(estimates)
+    found = compare(seen, read_truth(truth, seen))
+    assert_array_equal(found.found, made.found)
+    assert_allclose(found.shift_mm[made.found], made.shift[made.found], atol=1e-4)
+    assert_allclose(found.turn_deg[made.found], made.turn[made.found], atol=1e-4)
+    assert_allclose(found.trace_deg[made.found], found.angle_deg[made.found], atol=0.02)
+    assert np.isnan(found.shift_mm[~made.found]).all()
+    assert found.surplus == 0
+
+
+def test_json_and_csv_say_the_same(tmp_path: Path, made: Made) -> None:
+    estimates, truth = made_of.files(tmp_path, made)
+    seen = read_results(estimates)
+    by_csv = read_truth(truth, seen)
+    by_json = read_truth(made_of.scene_gt(tmp_path / "scene_gt.json", made.where, made.R, made.t), seen)
+    assert_array_equal(by_json.where, by_csv.where)
+    assert_allclose(by_json.t_mm, by_csv.t_mm, rtol=1e-8)
+    assert_allclose(by_json.R, by_csv.R, atol=1e-8)
+
+
+def test_images_that_were_not_estimated_count_only_where_they_were_asked_for(tmp_path: Path, made: Made) -> None:
+    """A scene_gt.json holds the whole scene, a results file what was asked for."""
+    estimates, truth = made_of.files(tmp_path, made)
+    some = written(tmp_path, *estimates.read_text(encoding="utf-8").splitlines()[:101], name="some.csv")
+    seen = read_results(some)
+    images = len(np.unique(seen.where[:, 1]))
+    whole = made_of.scene_gt(tmp_path / "scene_gt.json", made.where, made.R, made.t)
+    assert len(read_truth(whole, seen).where) == 5 * images
+    assert len(read_truth(truth, seen).where) == len(made.where)
+
+
+def test_the_scene_of_a_json_file(tmp_path: Path, made: Made) -> None:
+    """Named, else that of the folder, else the only one that was estimated."""
+    where = made.where.copy()
+    where[150:, 0] = 12
+    estimates = read_results(made_of.results(tmp_path / "e.csv", where, made.R_seen, made.t_seen))
+    (tmp_path / "000012").mkdir()
+    part = made.where[150:], made.R[150:], made.t[150:]
+    loose = made_of.scene_gt(tmp_path / "scene_gt.json", *part)
+    with pytest.raises(InputError, match=r"does not say which scene .* of 1, 12; name it with --scene-id"):
+        read_truth(loose, estimates)
+    for path, scene in ((loose, 12), (made_of.scene_gt(tmp_path / "000012" / "scene_gt.json", *part), None)):
+        truth = read_truth(path, estimates, scene)
+        assert set(truth.where[:, 0].tolist()) == {12}
+        assert len(truth.where) == 150
+    with pytest.raises(InputError, match=r"no image of scene 3 has an estimate in .*e.csv"):
+        read_truth(loose, estimates, 3)
+
+
+def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
+    """Two alike, three estimates: the pairs that add up to the least, not the nearest one twice."""
+    at = np.array([[0.0, 0, 900], [20, 0, 900]])
+    seen = np.array([[30.0, 0, 900], [-400.0, 0, 900], [15.0, 0, 900]])
+    R = np.tile(np.eye(3), (3, 1, 1))
+    where = np.ones((3, 3), dtype=int)
+    estimates = read_results(made_of.results(tmp_path / "e.csv", where, R, seen))
+    truth = read_results(made_of.results(tmp_path / "t.csv", where[:2], R[:2], at))
+    assert_array_equal(residuals.matched(estimates, truth), [2, 0])
+    assert compare(estimates, truth).surplus == 1
+
+
+def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path: Path) -> None:
+    """Published truth is rounded and scaled; angles do not suffer from that, those of the trace do."""
+    R = Rotation.from_euler("xyz", [[30, 20, 10]], degrees=True).as_matrix()
+    seen = Rotation.from_euler("z", 3.0, degrees=True).as_matrix() @ R
+    where, t = np.ones((1, 3), dtype=int), np.array([[0.0, 0.0, 900.0]])
+    estimates = read_results(made_of.results(tmp_path / "e.csv", where, seen, t))
+    found = compare(estimates, read_results(made_of.results(tmp_path / "t.csv", where, 1.004 * R, t)))
+    assert found.angle_deg[0] == pytest.approx(3.0, abs=1e-5)
+    assert found.trace_deg[0] == 0.0
+
+
+BAD = {
+    "empty": ([], "the file is empty; needed are, in this order, scene_id,im_id"),
+    "no rows": ([HEADER], "no pose stands in the file"),
+    "missing column": ([HEADER.replace(",time", ""), ROW], "line 1: the column 'time' is missing; needed are"),
+    "wrong order": ([HEADER.replace("R,t", "t,R"), ROW], "line 1: the columns are scene_id,.*in this order"),
+    "semicolons": (
+        [HEADER.replace(",", ";"), ROW.replace(",", ";")],
+        "line 1: .* by commas; this file uses ';', so save",
+    ),
+    "tabs": ([HEADER.replace(",", "\t")], "line 1: .* by commas; this file uses tabs"),
+    "no header": ([ROW], "line 1: the column 'scene_id' is missing"),
+    "cells": ([HEADER, ROW, ROW + ",1"], "line 3: 7 cells are needed, one for each column, 8 were given"),
+    "text": ([HEADER, ROW.replace("900", "far")], "line 2, t: 3 numbers with spaces between .* '10 20 far' was given"),
+    "nan": ([HEADER, ROW, ROW.replace("900", "nan")], "line 3, t: 3 numbers .* '10 20 nan' was given"),
+    "infinite": ([HEADER, ROW.replace("0.5", "inf")], "line 2, score: a number .* 'inf' was given"),
+    "underscore": ([HEADER, ROW.replace("900", "9_00")], "line 2, t: 3 numbers"),
+    "swapped": ([HEADER, f"1,7,3,0.5,10 20 900,{ONE},0.1"], "line 2, R: 9 numbers .*, 3 numbers were given"),
+    "id": ([HEADER, ROW.replace("1,7,3", "1,7,ape")], "line 2, obj_id: a whole number from 0 is needed, 'ape' was"),
+    "negative id": ([HEADER, ROW.replace("1,7,3", "1,-7,3")], "line 2, im_id: a whole number from 0"),
+    "not a rotation": ([HEADER, ROW, f"1,8,3,0.5,{ONE[:-1]}2,1 2 900,1"], "line 3, R: a rotation .* identity by 3"),
+    "mirror": ([HEADER, ROW, f"1,8,3,0.5,-{ONE},1 2 900,1"], "line 3, R: a rotation matrix.*; it mirrors"),
+    "metres": ([HEADER, ROW.replace("10 20 900", "0.01 0.02 0.9")], "line 2, t: millimetres .* multiply by 1000"),
+    "twice": ([HEADER, ROW, ROW.replace("7", "8"), ROW], "line 4: the row of line 2 stands there once more"),
+    "long line": ([HEADER, "1" * 5000], "line 2: a line of at most 4096 characters"),
+    "not text": (["\udcff"], "line 1: this is not UTF-8 text"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_malformed_results_are_refused_with_the_line(case: str, tmp_path: Path) -> None:
+    lines, message = BAD[case]
+    path = tmp_path / "estimates.csv"
+    path.write_bytes("".join(f"{line}\n" for line in lines).encode("utf-8", "surrogateescape"))
+    with pytest.raises(InputError, match=message) as raised:
+        read_results(path)
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_file_that_never_ends_its_line_is_not_read_whole(tmp_path: Path) -> None:
+    """100 MB without a line break cost one line."""
+    path = tmp_path / "estimates.csv"
+    with path.open("wb") as stream:
+        stream.write(f"{HEADER}\n".encode())
+        stream.truncate(100_000_000)
+    with pytest.raises(InputError, match="line 2: a line of at most 4096 characters is needed"):
+        read_results(path)
+
+
+def test_too_many_rows_are_refused_while_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bop, "MOST_ROWS", 3)
+    path = written(tmp_path, HEADER, *(ROW.replace(",7,", f",{i},") for i in range(4)), "then anything")
+    with pytest.raises(InputError, match="line 5: a file of at most 3 rows is needed"):
+        read_results(path)
+
+
+def test_too_many_estimates_of_one_object_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(residuals, "MOST_PAIRS", 3)
+    rows = [ROW.replace("10 20", f"{i} 20") for i in range(4)]
+    estimates = read_results(written(tmp_path, HEADER, *rows))
+    with pytest.raises(InputError, match=r"estimates.csv, line 2: at most 3000 .*, 4 were given"):
+        compare(estimates, read_results(written(tmp_path, HEADER, ROW, name="truth.csv")))
+
+
+ENTRY = {"obj_id": 3, "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [10, 20, 900]}
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ([], "an object is needed whose keys are the numbers of images"),
+        ({}, "no pose stands in the file"),
+        ({"first": []}, "the keys are numbers of images, 'first' was given"),
+        ({"7": ENTRY}, "image 7: a list is needed"),
+        ({"7": [3]}, "image 7, entry 1: the key 'obj_id' is missing"),
+        ({"7": [ENTRY, {**ENTRY, "obj_id": "ape"}]}, "image 7, entry 2, obj_id: a whole number is needed"),
+        ({"7": [{**ENTRY, "cam_R_m2c": [1, 0, 0]}]}, "image 7, entry 1, cam_R_m2c: 9 finite numbers are needed"),
+        ({"7": [{**ENTRY, "cam_R_m2c": [2, 0, 0, 0, 1, 0, 0, 0, 1]}]}, "image 7, entry 1, R: a rotation matrix"),
+        ({"7": [{**ENTRY, "cam_t_m2c": [0, 0, 1e9]}]}, "image 7, entry 1: numbers of at most 1e"),
+        ({"7": [{**ENTRY, "cam_t_m2c": [0, 0, 0.9]}]}, "image 7, entry 1, t: millimetres are needed"),
+        ({"7": [{**ENTRY, "cam_t_m2c": [0, 0, -900]}]}, "image 7, entry 1, t: the third number is the depth"),
+        ({"7": [ENTRY, ENTRY]}, "image 7, entry 2: the row of image 7, entry 1 stands there once more"),
+        ({"8": [ENTRY]}, "no image of scene 1 has an estimate in .*; the first of the truth is image 8 of scene 1"),
+    ],
+)
+def test_malformed_truth_is_refused_with_the_entry(document: Any, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "scene_gt.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_truth(path, read_results(written(tmp_path, HEADER, ROW)), 1)
+
+
+def test_truth_that_is_too_large_or_no_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    estimates, path = read_results(written(tmp_path, HEADER, ROW)), tmp_path / "scene_gt.json"
+    path.write_text('{"7": [\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"scene_gt.json, line 2: this is not JSON"):
+        read_truth(path, estimates)
+    monkeypatch.setattr(bop_truth, "LARGEST_BYTES", 3)
+    with pytest.raises(InputError, match="the file is larger than"):
+        read_truth(path, estimates)
+
+
+@pytest.mark.parametrize("case", ["missing column", "nan", "not a rotation", "empty"])
+def test_the_command_ends_with_2_and_one_sentence(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good, bad = written(tmp_path, HEADER, ROW), written(tmp_path, *BAD[case][0], name="bad.csv")
+    if case == "empty":
+        bad.write_text("", encoding="utf-8")
+    for estimates, truth in ((bad, good), (good, bad), (tmp_path / "none.csv", good), (tmp_path, good)):
+        assert main(["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
+        assert said.err.startswith("apo-bench: ")

@@ -1,0 +1,350 @@
+"""The JSON forms: what is written is read back, and what is not right is refused in one sentence."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, event, given, settings
+from hypothesis import strategies as st
+
+from apo_bench.assembly.goals import Demonstration, Observation, Plan, Step
+from apo_bench.errors import InputError
+from apo_bench.files import json_forms as files
+from apo_bench.geometry import pose
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario import Scenario
+
+SCENARIO = load_scenario("stick_in_tower")
+N = len(SCENARIO.assembly)
+QUICK = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def observation(seed: int = 0) -> Observation:
+    """An observation with nothing round in it."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(N, 6, 6)) * np.repeat([1e-3, 2e-2], 3)[:, None]
+    return Observation(
+        assembly=SCENARIO.assembly,
+        start=SCENARIO.start,
+        goals=SCENARIO.goals @ pose.exp(rng.normal(size=(N, 6)) * np.repeat([0.1, 1.0], 3)),
+        covariance=A @ np.swapaxes(A, 1, 2) + 1e-8 * np.eye(6),
+        seen=rng.random(N) < 0.7,
+        gap_m=float(rng.uniform(1e-5, 1e-3)),
+        play_m=float(rng.uniform(0.0, 1e-3)),
+    )
+
+
+def form() -> dict[str, Any]:
+    return files.observation_form(observation(), "stick_in_tower")
+
+
+def read(tmp_path: Path, document: Any, scenario: Scenario | None = SCENARIO) -> Observation:
+    path = tmp_path / "seen.json"
+    path.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
+    return files.read_observation(path, scenario)
+
+
+@QUICK
+@given(seed=st.integers(0, 2**32))
+def test_an_observation_comes_back(seed: int, tmp_path: Path) -> None:
+    seen = observation(seed)
+    back = read(tmp_path, files.observation_form(seen, "stick_in_tower"))
+    np.testing.assert_allclose(back.goals, seen.goals, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.covariance, seen.covariance, rtol=1e-12, atol=0)
+    assert back.seen.tolist() == seen.seen.tolist()
+    assert back.gap_m == pytest.approx(seen.gap_m, rel=1e-12)
+    assert back.play_m == pytest.approx(seen.play_m, rel=1e-12)
+    assert set(back.start) == set(seen.start)
+    for part, T in seen.start.items():
+        np.testing.assert_allclose(back.start[part], T, rtol=0, atol=1e-13)
+
+
+def test_a_demonstration_comes_back(tmp_path: Path) -> None:
+    seen = observation(3)
+    careless = np.zeros((N, 6, 6))
+    careless[1, 1, 1] = 8e-6
+    shown = Demonstration(SCENARIO.assembly, SCENARIO.start, seen.goals, SCENARIO.start, careless, "ok")
+    files.write_form(files.demonstration_form(shown, "stick_in_tower"), tmp_path / "shown.json")
+    back = files.read_demonstration(tmp_path / "shown.json")
+    np.testing.assert_allclose(back.goals, shown.goals, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.careless, shown.careless, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(back.final["stick"], shown.final["stick"], rtol=0, atol=1e-13)
+    assert back.code == "ok"
+
+
+def test_a_plan_comes_back_with_its_schedule(tmp_path: Path) -> None:
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals, schedule)
+    files.write_form(files.plan_form(plan, "stick_in_tower"), tmp_path / "plan.json")
+    back = files.read_plan(tmp_path / "plan.json")
+    np.testing.assert_allclose(back.goals, plan.goals, rtol=0, atol=1e-13)
+    assert back.schedule == schedule
+
+
+@QUICK
+@given(seed=st.integers(0, 2**32))
+def test_a_plan_comes_back_with_its_targets(seed: int, tmp_path: Path) -> None:
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = observation(seed).goals[[0, 1, 1, 2, 2]]
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(seed).goals[[0, 2, 2]], schedule, targets)
+    form = files.plan_form(plan, "stick_in_tower")
+    assert ["position_mm" in entry for entry in form["schedule"]] == [False, True, True, False, False]
+    files.write_form(form, tmp_path / "plan.json")
+    back = files.read_plan(tmp_path / "plan.json", SCENARIO)
+    assert back.schedule == schedule
+    np.testing.assert_allclose(back.targets, targets, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(back.goals, plan.goals, rtol=0, atol=1e-13)
+
+
+def test_a_plan_without_a_schedule_does_everything_once(tmp_path: Path) -> None:
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
+    form = files.plan_form(plan, "stick_in_tower") | {"schedule": []}
+    files.write_form(form, tmp_path / "plan.json")
+    back = files.read_plan(tmp_path / "plan.json")
+    assert back.schedule == plan.schedule == (Step(0), Step(1), Step(2))
+    np.testing.assert_array_equal(back.targets, back.goals)
+
+
+HALF = {"operation": 1, "position_mm": [0.0, 0.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("schedule", "words"),
+    [
+        (
+            [{"operation": 1}, {"operation": 2}],
+            "plan.json, schedule: it leaves operation 3 undone; do operations in order",
+        ),
+        ([{"operation": 2}], "schedule: it does operation 2 before operation 1"),
+        (
+            [{"operation": 1}, {"operation": 2}, {"operation": 1, "undo": True}],
+            "schedule: it undoes operation 1 before operation 2, which came after it",
+        ),
+        ([{"operation": 1, "undo": True}], "schedule: it undoes operation 1, which is not done"),
+        ([{"operation": 1}, {"operation": 1}], "schedule: it does operation 1 again, which is done"),
+        ([{"operation": 4}], "schedule entry 1, operation: an operation from 1 to 3 is needed"),
+        ([HALF], "schedule entry 1: the key 'quaternion_wxyz' is missing"),
+        ([HALF | {"quaternion_wxyz": [2, 0, 0, 0]}], "quaternion_wxyz: a quaternion of length 1"),
+        ([{"operation": 1, "pose": 1}], "unknown key 'pose'"),
+        ([3], "schedule entry 1: an object with named keys"),
+    ],
+)
+def test_a_schedule_that_makes_no_sense_is_refused(schedule: Any, words: str, tmp_path: Path) -> None:
+    plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
+    files.write_form(files.plan_form(plan, "stick_in_tower") | {"schedule": schedule}, tmp_path / "plan.json")
+    with pytest.raises(InputError) as refused:
+        files.read_plan(tmp_path / "plan.json")
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_files_speak_mm_degrees_and_count_from_one() -> None:
+    goals = SCENARIO.goals.copy()
+    goals[2, :3, 3] = [0.1, -0.2, 0.3]
+    covariance = np.tile(np.diag([1e-6] * 3 + [np.radians(2.0) ** 2] * 3), (N, 1, 1))
+    seen = Observation(SCENARIO.assembly, SCENARIO.start, goals, covariance, np.ones(N, dtype=bool))
+    entry = files.observation_form(seen, "stick_in_tower")["operations"][2]
+    assert (entry["operation"], entry["part"]) == (3, "stick")
+    assert entry["position_mm"] == pytest.approx([100.0, -200.0, 300.0])
+    assert np.diag(entry["covariance_mm_deg"]) == pytest.approx([1.0] * 3 + [4.0] * 3)
+
+
+def test_a_measured_file_may_be_short(tmp_path: Path) -> None:
+    document = form()
+    del document["start"], document["gap_mm"]
+    for entry in document["operations"]:
+        del entry["covariance_mm_deg"], entry["seen"]
+        entry |= {"deviation_mm": 2.0, "deviation_deg": 0.5}
+    back = read(tmp_path, document)
+    assert np.diag(back.covariance[0]) == pytest.approx([4e-6] * 3 + [np.radians(0.5) ** 2] * 3)
+    assert back.seen.all()
+    assert back.gap_m == SCENARIO.gap_mm * 1e-3
+    np.testing.assert_array_equal(back.start["castle1"], SCENARIO.start["castle1"])
+    lowered = SCENARIO.start["stick"][2, 3] - back.start["stick"][2, 3]
+    assert lowered == pytest.approx(SCENARIO.clearance_mm * 1e-3)
+
+
+def test_a_scenario_file_is_found_beside_the_observation(tmp_path: Path) -> None:
+    from apo_bench.resources import folder
+
+    (tmp_path / "mine.toml").write_text((folder("scenarios") / "stick_in_tower.toml").read_text())
+    back = read(tmp_path, form() | {"scenario": "mine.toml"}, None)
+    assert [operation.main for operation in back.assembly.operations] == ["castle1", "castle2", "stick"]
+
+
+def test_the_scenario_must_be_the_one_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "seen.json"
+    path.write_text(json.dumps(form()))
+    assert files.read_observation(path, SCENARIO).assembly is SCENARIO.assembly
+    with pytest.raises(InputError, match=r"scenario: .*stick_on_castles.*was given"):
+        files.read_observation(path, load_scenario("stick_on_castles"))
+
+
+def test_a_scenario_by_name_is_loaded(tmp_path: Path) -> None:
+    assert set(read(tmp_path, form(), None).start) == set(SCENARIO.start)
+    with pytest.raises(InputError, match="did you mean 'stick_in_tower'"):
+        read(tmp_path, form() | {"scenario": "stick_in_towr"}, None)
+
+
+def _set(*keys: Any, to: Any) -> Callable[[dict[str, Any]], None]:
+    def edit(document: Any) -> None:
+        for key in keys[:-1]:
+            document = document[key]
+        document[keys[-1]] = to
+
+    return edit
+
+
+def _drop(*keys: Any) -> Callable[[dict[str, Any]], None]:
+    def edit(document: Any) -> None:
+        for key in keys[:-1]:
+            document = document[key]
+        del document[keys[-1]]
+
+    return edit
+
+
+def _lopsided(document: dict[str, Any]) -> None:
+    document["operations"][0]["covariance_mm_deg"][0][1] += 1.0
+
+
+BROKEN = {
+    "other schema": (_set("schema", to="apo-bench/observation/2"), "schema"),
+    "no schema": (_drop("schema"), "'schema' is missing"),
+    "form of a plan": (_set("schema", to=files.PLAN), "schema"),
+    "unknown key": (_set("coment", to="x"), "unknown key 'coment'"),
+    "unknown key in operation": (_set("operations", 1, "sen", to=True), "operation 2: unknown key 'sen'; did you mean"),
+    "other scenario": (_set("scenario", to="stick_in_towr"), 'the scenario "stick_in_tower" was asked for'),
+    "scenario is a number": (_set("scenario", to=3), "scenario"),
+    "an operation too few": (_drop("operations", 2), "3 entries are needed, 2 were given"),
+    "operations are no list": (_set("operations", to={}), "operations: a list is needed"),
+    "wrong number": (_set("operations", 0, "operation", to=0), "operation 1, operation: 1 is needed"),
+    "wrong part": (_set("operations", 0, "part", to="stick"), 'operation 1, part: "castle1" is needed'),
+    "no position": (_drop("operations", 0, "position_mm"), "operation 1: the key 'position_mm' is missing"),
+    "short position": (_set("operations", 0, "position_mm", to=[1.0, 2.0]), "position_mm: 3 finite numbers"),
+    "text in position": (_set("operations", 0, "position_mm", to=[1.0, 2.0, "3"]), "position_mm"),
+    "true in position": (_set("operations", 0, "position_mm", to=[1.0, 2.0, True]), "position_mm"),
+    "null in position": (_set("operations", 0, "position_mm", to=[1.0, 2.0, None]), "position_mm"),
+    "long quaternion": (_set("operations", 0, "quaternion_wxyz", to=[1.0, 0.1, 0.0, 0.0]), "length 1"),
+    "zero quaternion": (_set("operations", 0, "quaternion_wxyz", to=[0, 0, 0, 0]), "quaternion_wxyz"),
+    "lopsided covariance": (_lopsided, "covariance_mm_deg: a symmetric"),
+    "zero covariance": (
+        _set("operations", 0, "covariance_mm_deg", to=[[0.0] * 6] * 6),
+        "covariance_mm_deg: a positive definite",
+    ),
+    "small covariance": (_set("operations", 0, "covariance_mm_deg", to=[[1.0]]), "6 x 6 finite numbers"),
+    "no covariance": (_drop("operations", 0, "covariance_mm_deg"), "operation 1: state either"),
+    "tiny covariance": (
+        _set("operations", 0, "covariance_mm_deg", to=(1e-9 * np.eye(6)).tolist()),
+        "covariance_mm_deg: the square root of a variance is out of range; standard deviations from 0.0001 to 10000 mm",
+    ),
+    "huge covariance": (
+        _set("operations", 0, "covariance_mm_deg", to=np.diag([1.0] * 5 + [181.0**2]).tolist()),
+        "covariance_mm_deg: the square root of a variance is out of range",
+    ),
+    "both kinds": (_set("operations", 0, "deviation_mm", to=1.0), "operation 1: state either"),
+    "seen is a number": (_set("operations", 0, "seen", to=1), "seen: true or false"),
+    "unknown part at start": (_set("start", "castle3", to=None), "unknown part 'castle3'"),
+    "a part without start": (_drop("start", "stick"), "'stick' is missing"),
+    "start is a list": (_set("start", to=[]), "start"),
+    "no gap": (_set("gap_mm", to=0), "gap_mm: a finite number above 0"),
+    "negative play": (_set("play_mm", to=-0.1), "play_mm: a finite number from 0"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_observation_is_refused_in_one_sentence(case: str, tmp_path: Path) -> None:
+    edit, words = BROKEN[case]
+    document = copy.deepcopy(form())
+    edit(document)
+    with pytest.raises(InputError) as refused:
+        read(tmp_path, document)
+    message = str(refused.value)
+    assert words in message
+    assert "\n" not in message
+    assert message.endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "not JSON"),
+        ("", "not JSON"),
+        ("[]", "an object with named keys"),
+        ('{"schema": NaN}', "finite, NaN was given"),
+        ('{"schema": 1, "schema": 2}', "'schema' stands twice"),
+        ("[" * 100_000, "cannot be read|can be read"),
+        ('{"schema": ' + "9" * 5000 + "}", "can be read"),
+        (" " * 2_000_000, "larger than 1 MB"),
+    ],
+)
+def test_text_that_is_no_document_is_refused(text: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words):
+        read(tmp_path, text)
+
+
+def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
+    document = form()
+    del document["operations"][0]["covariance_mm_deg"]
+    first, second = document["operations"][1], document["operations"][2]
+    del second["covariance_mm_deg"]
+    second["deviation_mm"] = 3.0
+    path = tmp_path / "some.json"
+    path.write_text(json.dumps(document), encoding="utf-8-sig")
+    seen, assumed = files.read_observed(path, SCENARIO, (2.0, 0.5))
+    assert assumed
+    found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
+    np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.5)]])
+    np.testing.assert_allclose(found[1, 0], 1e-3 * np.sqrt(first["covariance_mm_deg"][0][0]))
+    with pytest.raises(InputError, match="operation 1: state either"):
+        files.read_observation(path, SCENARIO)
+    second["deviation_deg"] = 200.0
+    with pytest.raises(InputError, match=r"a standard deviation from 0.0001 to 180 is needed"):
+        read(tmp_path, document | {"operations": [*form()["operations"][:2], second]})
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.json: the JSON file cannot be read"):
+        files.read_observation(tmp_path / "none.json")
+    with pytest.raises(InputError, match="a folder was given"):
+        files.read_observation(tmp_path)
+    (tmp_path / "latin.json").write_bytes(b"\xe4")
+    with pytest.raises(InputError, match="not UTF-8"):
+        files.read_observation(tmp_path / "latin.json")
+    with pytest.raises(InputError, match="cannot be written"):
+        files.write_form({}, tmp_path / "no" / "where.json")
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=7) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=10,
+)
+
+
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(value=JSON, data=st.data())
+def test_any_value_anywhere_is_read_or_refused(value: Any, data: st.DataObject, tmp_path: Path) -> None:
+    document = form()
+    place: Any = document
+    key: Any = data.draw(st.sampled_from(sorted(document)))
+    while isinstance(place[key], (dict, list)) and data.draw(st.booleans()):
+        place = place[key]
+        key = data.draw(st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place))))
+    place[key] = value
+    try:
+        back = read(tmp_path, document)
+    except InputError as refused:
+        event("refused")
+        if "\n" in str(refused):
+            raise
+    else:
+        event("read")
+        assert np.isfinite(back.goals).all()
+        assert (np.linalg.eigvalsh(back.covariance) > 0).all()

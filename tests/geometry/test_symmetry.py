@@ -1,0 +1,126 @@
+"""The turns after which a part looks the same: golden orders, the laws of a group, and voxels that are turned."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.symmetry import folds, nearest, quarter_turns, symmetries
+from apo_bench.scenario.file import load_scenario
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+UNIT_M = 0.01
+"""Side of a voxel."""
+CORNERS = st.tuples(*[st.integers(0, 3)] * 3)
+SIZES = st.tuples(*[st.integers(1, 2)] * 3)
+
+
+def voxels(boxes: list[tuple[tuple[int, ...], tuple[int, ...]]]) -> set[tuple[int, ...]]:
+    """The unit cells of a union of boxes, each a lowest corner and a size."""
+    return {
+        tuple(np.add(corner, cell).tolist()) for corner, size in boxes for cell in product(*(range(s) for s in size))
+    }
+
+
+def solid_of(boxes: list[tuple[tuple[int, ...], tuple[int, ...]]]) -> Solid:
+    middles = (np.array(sorted(voxels(boxes))) + 0.5) * UNIT_M
+    made = tuple(
+        Box(f"box{i}", (np.array(c) + np.array(s) / 2) * UNIT_M, np.array(s) / 2 * UNIT_M)
+        for i, (c, s) in enumerate(boxes)
+    )
+    return Solid("random", {}, made, middles.mean(axis=0), len(middles) * UNIT_M**3)
+
+
+def in_the_corner(cells: Array) -> set[tuple[int, ...]]:
+    """Doubled middles of cells, shifted so that the lowest of each axis is zero."""
+    return {tuple(cell) for cell in np.rint(cells - cells.min(axis=0)).astype(int).tolist()}
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.lists(st.tuples(CORNERS, SIZES), min_size=1, max_size=4))
+def test_a_turn_is_a_symmetry_exactly_if_it_maps_the_voxels_onto_themselves(boxes) -> None:
+    """The oracle turns whole cells and shifts them back; it knows neither centroids nor grids of cuts."""
+    cells = 2.0 * np.array(sorted(voxels(boxes))) + 1.0
+    expected = [R for R in quarter_turns() if in_the_corner(cells @ R.T) == in_the_corner(cells)]
+    found = symmetries(solid_of(boxes))
+    assert_allclose(found[:, :3, :3], expected)
+    middles = cells / 2 * UNIT_M
+    for g in found:
+        turned = in_the_corner(pose.apply(g, middles) / UNIT_M * 2)
+        assert turned == in_the_corner(cells)
+        assert_allclose(pose.apply(g, middles).min(axis=0), middles.min(axis=0), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("part", "order", "fold"),
+    [
+        (scenes.stick(), 8, (4, 2, 2)),
+        (scenes.castle(), 2, (1, 1, 2)),
+        (scenes.cube(), 8, (4, 2, 2)),
+        (scenes.block(), 24, (4, 4, 4)),
+        (scenes.cuboid("brick", (50, 25, 10)), 4, (2, 2, 2)),
+        (scenes.solid("corner", [], ((0, 0, 0), (20, 10, 5)), ((15, 25, 0), (5, 15, 5))), 1, (1, 1, 1)),
+        (scenes.solid("propeller", [], ((0, 0, 0), (30, 5, 5)), ((0, 0, 15), (5, 30, 10))), 2, (1, 1, 2)),
+    ],
+)
+def test_known_parts(part: Solid, order: int, fold: tuple[int, ...]) -> None:
+    found = symmetries(part)
+    assert len(found) == order
+    assert tuple(folds(found)) == fold
+    assert_allclose(found[0], np.eye(4))
+
+
+def test_a_mirror_image_is_not_a_turn() -> None:
+    """A part that differs from its mirror image only by handedness, an S of two steps, has its half turn alone."""
+    screw = scenes.solid("S", [], ((0, 0, 0), (10, 10, 10)), ((20, 0, 5), (10, 10, 5)), ((-20, 0, -5), (10, 10, 5)))
+    assert len(symmetries(screw)) == 2
+    assert_allclose(symmetries(screw)[1][:3, :3], np.diag([-1.0, 1.0, -1.0]))
+
+
+@pytest.mark.parametrize("part", [scenes.stick(), scenes.castle(), scenes.cube(), scenes.block()])
+def test_symmetries_are_a_group(part: Solid) -> None:
+    found = symmetries(part)
+    for a in found:
+        for b in found:
+            assert np.abs(found - a @ b).max(axis=(1, 2)).min() < 1e-12
+        assert np.abs(found - pose.inverse(a)).max(axis=(1, 2)).min() < 1e-12
+
+
+def test_the_shipped_parts_are_as_symmetric_as_their_cards_say() -> None:
+    scenario = load_scenario("stick_in_tower")
+    assert {part: len(symmetries(scenario.assembly.solids[part])) for part in ("stick", "castle1")} == {
+        "stick": 8,
+        "castle1": 2,
+    }
+    assert len(symmetries(load_scenario("block_on_block").assembly.solids["A"])) == 24
+
+
+def test_the_nearest_is_the_one_that_undoes_a_symmetry() -> None:
+    group = symmetries(scenes.block())
+    rng = np.random.default_rng(1)
+    small = pose.exp(np.concatenate([np.zeros((24, 3)), 0.2 * rng.uniform(-1, 1, (24, 3))], axis=1))
+    undone = nearest(group, small @ group)
+    assert_allclose(group @ undone, np.tile(np.eye(4), (24, 1, 1)), atol=1e-12)
+    assert_allclose(nearest(group, np.eye(4)[None])[0], np.eye(4))
+
+
+def test_no_turn_is_farther_than_half_the_way_to_an_equal_pose() -> None:
+    """Of a stick: 45 degrees about its axis; every rotation is within 90 degrees of one of the eight."""
+    group, rng = symmetries(scenes.stick()), np.random.default_rng(2)
+    w = rng.standard_normal((500, 3)) * 2.0
+    off = pose.exp(np.concatenate([np.zeros((500, 3)), w], axis=1))
+    left = np.degrees(np.linalg.norm(pose.log(off @ nearest(group, off))[:, 3:], axis=1))
+    every = [np.degrees(np.linalg.norm(pose.log(off @ g)[:, 3:], axis=1)) for g in group]
+    assert_allclose(left, np.min(every, axis=0), atol=1e-6)
+    roll = pose.exp(np.array([[0.0, 0.0, 0.0, angle, 0.0, 0.0] for angle in np.radians(np.arange(0.0, 360.0, 7.0))]))
+    assert np.degrees(np.abs(pose.log(roll @ nearest(group, roll))[:, 3])).max() <= 45.0 + 1e-9

@@ -1,0 +1,307 @@
+"""Macros by peeling, and ways checked by what boxes sweep; against sampling, and on small assemblies of every state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.intrusion import depths
+from apo_bench.geometry.solid import Box, Solid
+from apo_bench.insertion.arrival import Arrival, arrive
+from apo_bench.insertion.line import Preference
+from apo_bench.insertion.macros import Chain, Way, chain, departs
+from apo_bench.insertion.peeling import peel
+from apo_bench.insertion.states import State
+from apo_bench.insertion.swept import Posed, exit_after, free, meetings
+from tests import scenes
+
+X, Y, Z = np.eye(3)
+
+
+def out(along: Array, walls: tuple[int, ...]) -> Way:
+    """Along the first axis there is, a decimetre."""
+    return Way(along[0], 0.1, True)
+
+
+def made(*normals: Array) -> Chain:
+    return chain(np.array(normals).reshape(-1, 3), out)
+
+
+def names(found: Chain) -> list[str]:
+    return [macro.name for macro in found.macros]
+
+
+@pytest.mark.parametrize(
+    ("letter", "normals", "macros"),
+    [
+        ("S", [], []),
+        ("A", [Z], ["move-to-contact"]),
+        ("B", [Y, -Y], ["insert-between"]),
+        ("C", [X, Z], ["move-to-contact", "slide-to-contact"]),
+        ("D", [Y, Z, -Y], ["insert-into-slot", "move-to-contact"]),
+        ("E", [Y, -Y, Z, -Z], ["insert-into"]),
+        ("F", [X, Y, Z], ["move-to-contact", "slide-to-contact", "slide-to-contact"]),
+        ("G", [X, Y, -Y, Z], ["insert-into-slot", "move-to-contact", "slide-to-contact"]),
+        ("H", [X, -X, Y, -Y, Z], ["insert-into", "move-to-bottom"]),
+        ("I", [X, -X, Y, -Y, Z, -Z], []),
+    ],
+)
+def test_the_procedure_tree(letter: str, normals: list[Array], macros: list[str]) -> None:
+    found = made(*normals)
+    assert (found.state.letter, names(found)) == (letter, macros)
+    assert found.locked == (letter == "I")
+    closed = [i for macro in found.macros for i in macro.makes]
+    assert sorted(closed) == ([] if found.locked else list(range(len(normals)))), "every contact is made once"
+    for macro in found.macros:
+        n = np.array(normals)
+        assert np.abs(n[list(macro.keeps)] @ macro.direction).max(initial=0.0) < 1e-9, "along what was made before"
+        if macro.guarded:
+            assert (n[list(macro.makes)] @ macro.direction < -1e-3).all(), "onto what it makes"
+        else:
+            assert np.abs(n[list(macro.makes)] @ macro.direction).max() < 1e-9, "between its walls"
+
+
+def test_what_carries_is_met_first_and_from_above() -> None:
+    for normals in ([X, Z], [Z, X], [Y, X, Z]):
+        np.testing.assert_array_equal(made(*normals).macros[0].direction, -Z)
+    groove = [(Z + X) / 2**0.5, (Z - X) / 2**0.5]
+    (down,) = made(*groove).macros
+    np.testing.assert_array_equal(down.direction, -Z)
+    assert down.makes == (0, 1)
+    (up,) = made(-Z).macros
+    np.testing.assert_array_equal(up.direction, Z)
+
+
+def test_a_part_leaves_the_way_it_came() -> None:
+    """Sides first, then out of walls; from supports alone it is just lifted."""
+    assert departs(made(Z), (0,)) == ()
+    (off,) = departs(made(Z, X), (0,))
+    assert (off.name, off.direction.tolist(), off.makes) == ("depart", [1.0, 0.0, 0.0], (1,))
+    (pulled,) = departs(made(Y, -Y, Z, -Z), (2,))
+    assert pulled.length_m == 0.1
+    assert abs(pulled.direction[0]) == pytest.approx(1.0)
+    back = departs(made(X, Y, -Y, Z), (3,))
+    assert back[0].makes == (0,), "off the end of the slot first"
+
+
+def test_peeling_takes_off_everything_that_is_not_locked() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        n = rng.standard_normal((rng.integers(1, 5), 3))
+        normals = n / np.linalg.norm(n, axis=1)[:, None]
+        if rng.integers(2):
+            normals = np.concatenate([normals, -normals[:1]])
+        layers = peel(normals)
+        assert sorted(i for layer in layers for i in layer.breaks) == list(range(len(normals)))
+        assert [layer.locked for layer in layers[:-1]] == [False] * (len(layers) - 1)
+        for layer in layers:
+            if layer.cone.state.detaching:
+                t = layer.cone.direction
+                assert (normals[list(layer.breaks)] @ t > 0.0).all()
+                assert np.abs(normals[list(layer.keeps)] @ t).max(initial=0.0) < 1e-6
+
+
+def boxes(rng: np.random.Generator) -> Posed:
+    """One to three boxes of some centimetres, turned and shifted at random."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.random(random_state=rng).as_matrix() if rng.integers(3) else np.eye(3)
+    T[:3, 3] = rng.uniform(-0.1, 0.1, 3)
+    many = [Box(f"b{i}", rng.uniform(-0.03, 0.03, 3), rng.uniform(0.005, 0.03, 3)) for i in range(rng.integers(1, 4))]
+    return Posed(tuple(many), T)
+
+
+def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
+    rng, met = np.random.default_rng(1), 0
+    for _ in range(250):
+        a, b, slack = boxes(rng), boxes(rng), rng.choice([5e-5, -5e-5])
+        way = rng.standard_normal(3) if rng.integers(2) else np.eye(3)[rng.integers(3)]
+        way = way / np.linalg.norm(way)
+        s = np.linspace(-0.3, 0.3, 301)
+        deep = depths(a.boxes, a.T[:3, :3], a.T[:3, 3] + np.outer(s, way), b.boxes, b.T) - slack
+        spans = meetings(a, way, b, slack)
+        inside = ((s[:, None] > spans[:, 0]) & (s[:, None] < spans[:, 1])).any(axis=1)
+        clear = np.abs(deep) > 1e-9
+        np.testing.assert_array_equal(inside[clear], deep[clear] > 0.0)
+        met += bool(inside.any())
+    assert met > 40
+
+
+def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
+    """The same without separating axes: by a programme for a point in both boxes."""
+    rng, met = np.random.default_rng(2), 0
+    for _ in range(60):
+        a, b = boxes(rng), boxes(rng)
+        a, b = Posed(a.boxes[:1], a.T), Posed(b.boxes[:1], b.T)
+        way = (b.T - a.T)[:3, 3] + rng.uniform(-0.02, 0.02, 3)
+        way = way / np.linalg.norm(way)
+        spans = meetings(a, way, b, 0.0)
+        for s in rng.uniform(0.0, 0.3, 4):
+            moved = Posed(a.boxes, pose.at(s * way) @ a.T)
+            if np.abs(spans - s).min(initial=1.0) > 1e-6:
+                assert common_point(moved, b) == bool(((spans[:, 0] < s) & (s < spans[:, 1])).any())
+                met += common_point(moved, b)
+    assert met > 20
+
+
+def common_point(a: Posed, b: Posed) -> bool:
+    A, limits = [], []
+    for posed in (a, b):
+        (box,) = posed.boxes
+        R, middle = posed.T[:3, :3], posed.T[:3, :3] @ box.center + posed.T[:3, 3]
+        A += [R.T, -R.T]
+        limits += [box.half + R.T @ middle, box.half - R.T @ middle]
+    scale = 100.0
+    found = linprog(np.zeros(3), A_ub=np.concatenate(A), b_ub=scale * np.concatenate(limits), bounds=[(None, None)] * 3)
+    return bool(found.status == 0)
+
+
+def posed(solid: Solid, T: Array) -> Posed:
+    return Posed(solid.boxes, T)
+
+
+def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
+    stick, cube = posed(scenes.stick(), scenes.mm(0, 0, 25)), posed(scenes.cube(), scenes.mm(0, 0, 25))
+    assert free([stick], X, 0.5, [cube])
+    assert free([stick], -X, 0.5, [cube])
+    assert not free([stick], Z, 0.05, [cube])
+    assert not free([stick], (X + 0.01 * Y) / np.linalg.norm(X + 0.01 * Y), 0.5, [cube])
+    assert exit_after([stick], X, [cube]) == pytest.approx(0.135, abs=1e-9)
+    assert exit_after([stick], X, []) == 0.0
+    second = posed(scenes.cube(), scenes.mm(60, 0, 25))
+    assert exit_after([stick], X, [cube, second]) == pytest.approx(0.195, abs=1e-9)
+    assert exit_after([stick], -X, [cube, second]) == pytest.approx(0.135, abs=1e-9)
+    beyond = posed(scenes.block(), scenes.mm(300, 0, 25))
+    assert free([stick], X, 0.1649, [cube, beyond])
+    assert not free([stick], X, 0.1652, [cube, beyond])
+
+
+def assembly(contacts: dict[str, Sequence[str]], **parts: tuple[Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
+    """One movable part called `part`, all others fixed, and where everything is."""
+    touched = [c for other, pairs in contacts.items() for c in scenes.touch("part", other, *pairs)]
+    solids = {name: solid for name, (solid, _) in parts.items()}
+    fixed = frozenset(parts) - {"part"}
+    return Assembly(solids, (Operation("part", tuple(touched)),), fixed), {name: T for name, (_, T) in parts.items()}
+
+
+def arrival(built: tuple[Assembly, dict[str, Array]], stated: Preference | None = None) -> Arrival:
+    of, poses = built
+    return arrive(of, ("part",), of.operations[0].contacts, poses, stated or Preference())
+
+
+TABLE = (scenes.table(), np.eye(4))
+ON = {"table": ("nz-top",)}
+
+
+def test_a_block_in_a_corner() -> None:
+    found = arrival(
+        assembly(
+            {"left": ("px-nx",), **ON, "back": ("py-ny",)},
+            table=TABLE,
+            left=(scenes.block(), scenes.mm(50, 0, 25)),
+            back=(scenes.block(), scenes.mm(0, 50, 25)),
+            part=(scenes.block(), scenes.mm(0, 0, 25)),
+        )
+    )
+    assert found.state == State(0, 3, 0)
+    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
+        ("move-to-contact", [0, 0, -1]),
+        ("slide-to-contact", [1, 0, 0]),
+        ("slide-to-contact", [0, 1, 0]),
+    ]
+    assert (found.line.direction.tolist(), found.line.travel_m, found.free) == ([0, 0, -1], 0.03, True)
+
+
+def between(height_mm: float = 80.0) -> tuple[Assembly, dict[str, Array]]:
+    return assembly(
+        {"left": ("py-ny",), "right": ("ny-py",)},
+        left=(scenes.block(), scenes.mm(0, 50, height_mm)),
+        right=(scenes.block(), scenes.mm(0, -50, height_mm)),
+        part=(scenes.block(), scenes.mm(0, 0, height_mm)),
+    )
+
+
+def test_a_block_between_two_walls_comes_from_above_unless_told_otherwise() -> None:
+    found = arrival(between())
+    (macro,) = found.macros
+    assert (found.state.letter, macro.name, macro.direction.tolist()) == ("B", "insert-between", [0, 0, -1])
+    assert macro.length_m == pytest.approx(0.05)
+    assert (found.line.travel_m, found.free) == (pytest.approx(0.07), True)
+    (level,) = arrival(between(), Preference(X)).macros
+    assert (level.name, level.direction.tolist()) == ("insert-between", [1, 0, 0])
+    through = arrival(between(), Preference(Y))
+    assert through.macros[0].direction.tolist() == [0, 0, -1], "a line through a wall is not followed"
+
+
+def slot(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
+    contacts = {"castle": scenes.SLOT} | {name: pairs for name, pairs, _, _ in more if pairs}
+    parts = {name: (solid, T) for name, _, solid, T in more}
+    at = scenes.mm(0, 0, 40)
+    return assembly(contacts, castle=(scenes.castle(), np.eye(4)), part=(scenes.stick(), at), **parts)
+
+
+def test_a_stick_in_a_slot_against_a_stop() -> None:
+    stop = scenes.cuboid("stop", (10, 10, 10))
+    found = arrival(slot(("stop", ("px-nx",), stop, scenes.mm(120, 0, 40))))
+    assert found.state.letter == "G"
+    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
+        ("insert-into-slot", [0, 0, -1]),
+        ("move-to-contact", [0, 0, -1]),
+        ("slide-to-contact", [1, 0, 0]),
+    ]
+    assert [m.direction.tolist() for m in found.departs] == [[-1, 0, 0], [0, 0, 1]]
+
+
+def test_a_slot_under_a_roof_is_entered_from_its_end() -> None:
+    roof = scenes.cuboid("roof", (30, 30, 5))
+    found = arrival(slot(("roof", (), roof, scenes.mm(0, 0, 58))))
+    assert found.free
+    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
+        ("insert-into-slot", [1, 0, 0]),
+        ("move-to-contact", [0, 0, -1]),
+    ]
+    assert found.macros[0].length_m == pytest.approx(0.14)
+
+
+def hole(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
+    parts = {name: (solid, T) for name, _, solid, T in more}
+    contacts = {"cube": scenes.HOLE} | {name: pairs for name, pairs, _, _ in more if pairs}
+    return assembly(contacts, cube=(scenes.cube(), np.eye(4)), part=(scenes.stick(), np.eye(4)), **parts)
+
+
+def test_the_end_of_a_hole_that_is_free_is_taken() -> None:
+    """Along the axis of the stick, forwards; backwards if something stands there, or above where it would begin."""
+    forwards, travel = arrival(hole()).line.direction, arrival(hole()).line.travel_m
+    assert (forwards.tolist(), travel) == ([1, 0, 0], 0.155)
+    for x, z in ((-200, 0), (-250, 100)):
+        found = arrival(hole(("stop", (), scenes.block(), scenes.mm(x, 0, z))))
+        assert (found.line.direction.tolist(), found.free) == ([-1, 0, 0], True)
+    stops = [(f"stop{x}", (), scenes.block(), scenes.mm(x, 0, 0)) for x in (-200, 200)]
+    assert not arrival(hole(*stops)).free
+    assert arrival(hole(), Preference(-X)).line.direction.tolist() == [-1, 0, 0]
+    assert arrival(hole(), Preference(None, 0.2)).line.travel_m == 0.2
+
+
+def test_a_blind_hole_is_entered_to_its_bottom() -> None:
+    bottom = scenes.cuboid("bottom", (10, 25, 25))
+    found = arrival(hole(("bottom", ("px-nx",), bottom, scenes.mm(120, 0, 0))))
+    assert found.state.letter == "H"
+    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
+        ("insert-into", [1, 0, 0]),
+        ("move-to-bottom", [1, 0, 0]),
+    ]
+    assert found.free
+
+
+def test_what_is_held_on_all_sides_is_locked() -> None:
+    ends = [
+        (f"end{s}", (f"{f}x-{g}x",), scenes.block(), scenes.mm(135 * s, 0, 0)) for s, f, g in ((1, *"pn"), (-1, *"np"))
+    ]
+    found = arrival(hole(*ends))
+    assert (found.state.letter, found.chain.locked, found.free, found.macros) == ("I", True, False, ())

@@ -1,0 +1,80 @@
+"""The audit of the judge: what it says of states whose verdict a person gave before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.symmetry import symmetries
+from apo_bench.judging.finished import fixtures
+from tests import scenes
+from tests.audited_states import DIFFERS, LOOSE, STATES, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
+from tests.end_states import Edit, moved, verdict
+from tests.judging.test_verdict import FLIPPED
+
+
+@pytest.mark.parametrize("seen", STATES, ids=lambda seen: seen.what)
+def test_a_person_says_the_same_unless_the_rule_says_otherwise(seen: Seen) -> None:
+    assert verdict(seen.scene(), seen.edits).success == (seen.right != (seen.what in DIFFERS))
+
+
+def test_every_difference_is_of_a_state() -> None:
+    names = [seen.what for seen in STATES]
+    assert len(names) >= 60
+    assert len(set(names)) == len(names)
+    assert set(DIFFERS) <= set(names)
+
+
+@pytest.mark.parametrize("seen", LOOSE, ids=lambda seen: seen.what)
+def test_a_person_says_nearly(seen: Loose) -> None:
+    found = verdict(seen.scene(), seen.edits)
+    assert (found.success, found.loose_success) == (False, seen.nearly)
+
+
+def test_the_page_says_what_was_audited_and_why_the_rule_says_otherwise() -> None:
+    """It is written by `python docs/verdict.py`."""
+    page = (Path(__file__).parents[2] / "docs" / "verdict.md").read_text(encoding="utf-8")
+    for seen in STATES:
+        assert f"| {seen.what} | {'right' if seen.right else 'wrong'} |" in page
+    for what, reason in (DIFFERS | FLIPPED).items():
+        assert any(line.startswith(f"| {what} |") and line.endswith(f"| {reason} |") for line in page.splitlines())
+
+
+def test_a_part_whose_last_contact_another_part_broke_is_no_fixture() -> None:
+    found = {build: fixtures(build().assembly) for build in (kept, used_later, aligned_twice, stop_for_two)}
+    assert found == {kept: set(), used_later: set(), aligned_twice: {"D"}, stop_for_two: {"D"}}
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_symmetries_and_the_place_on_the_table_do_not_matter(name: str) -> None:
+    """Every part put in by any of its symmetries, all of it elsewhere, turned by up to 40 degrees."""
+    rng, scene = np.random.default_rng(7), scenes.ALL[name]()
+    for _ in range(4):
+        loose = scene.assembly.solids.keys() - scene.assembly.fixed
+        edits = [turned(part, rng.choice(symmetries(scene.assembly.solids[part]))) for part in sorted(loose)]
+        if name != "pockets":
+            x, y, turn = rng.uniform([-200, -200, -40], [200, 200, 40])
+            edits.append(moved(1, scenes.mm(x, y, 0, (0, 0, turn))))
+        found = verdict(scene, edits)
+        assert (found.success, found.finished.why) == (True, "")
+
+
+def turned(part: str, g: np.ndarray) -> Edit:
+    """The part is turned, from the beginning."""
+
+    def edit(states: list[dict]) -> None:
+        for state in states:
+            state[part] = state[part] @ g
+
+    return edit
+
+
+@pytest.mark.parametrize("name", ["bridge", "stick_on_castles", "stick_in_tower", "pockets"])
+def test_a_turn_that_is_no_symmetry_is_seen(name: str) -> None:
+    """The law above is not empty: the last part, turned on by 20 degrees about an axis across its contacts."""
+    scene = scenes.ALL[name]()
+    last = scene.assembly.operations[-1].main
+    assert not verdict(scene, [turned(last, pose.at((0, 0, 0), (0, 20, 0)))]).success

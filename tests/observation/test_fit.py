@@ -1,0 +1,217 @@
+"""Noise fitted to residuals: known parameters come back, figures of published estimates, files, and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import kstest
+
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+from apo_bench.files.bop import read_results
+from apo_bench.files.bop_truth import read_truth
+from apo_bench.observation.fitting.fit import compared, fit, fit_split
+from apo_bench.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, split_of_quantiles
+from apo_bench.observation.models.fitted import Measured
+from apo_bench.observation.models.residuals import Residuals, compare
+from apo_bench.observation.models.tails import Split, Tail
+from apo_bench.observation.noise_file import noise_text, presets, read_noise
+from apo_bench.show.fit_picture import draw_fit
+from apo_bench.show.fit_text import fit_form, fit_lines
+from tests import bop_made as made_of
+from tests.bop_made import Known
+
+SPLITS = (
+    Split(Tail(2.0, 4.0), Tail(8.0, 3.0), 50.0),
+    Split(Tail(0.5, 2.0), Tail(13.0, 0.9), 50.0),
+    Split(Tail(3.0), Tail(40.0), 30.0),
+)
+
+
+def compared_files(estimates: Path, truth: Path) -> Residuals:
+    seen = read_results(estimates)
+    return compare(seen, read_truth(truth, seen))
+
+
+@pytest.fixture(scope="module")
+def known_file(tmp_path_factory: pytest.TempPathFactory) -> Residuals:
+    """40,000 parts with known errors, through the files."""
+    made = made_of.draw(40_000, Known(), np.random.default_rng(3))
+    return compared_files(*made_of.files(tmp_path_factory.mktemp("known"), made))
+
+
+def test_known_parameters_are_recovered_within_five_percent(known_file: Residuals) -> None:
+    known, measured = Known(), fit(known_file, "made")
+    for split, tails in ((measured.shift_mm, known.shift), (measured.turn_deg, known.turn)):
+        assert_allclose([*split.across, *split.along], tails, rtol=0.05)
+    assert_allclose([measured.missed, measured.outliers], [known.missed, known.outliers], rtol=0.05)
+    assert_allclose(measured.farthest_mm, known.farthest, rtol=0.1)
+
+
+def test_a_right_fit_is_close_everywhere(known_file: Residuals) -> None:
+    """The largest difference is what chance makes of so many (1.95 / sqrt(n): one in a thousand)."""
+    for figures in compared(known_file, fit(known_file, "made")):
+        assert figures.distance < 1.95 / np.sqrt(known_file.upright.sum())
+        assert_allclose(figures.fitted, figures.observed, rtol=0.05)
+
+
+def test_a_wrong_fit_is_told(known_file: Residuals) -> None:
+    wrong = Measured("wrong", Split(Tail(4.0, 4.0), Tail(8.0, 3.0), 50.0), fit(known_file, "").turn_deg, 0.1, 0.1, 800)
+    across, along, turn = compared(known_file, wrong)
+    assert across.distance > 0.2
+    assert max(along.distance, turn.distance) < 0.03
+
+
+def test_the_limit_is_no_sign_of_short_tails() -> None:
+    """Errors that are mostly beyond the limit: the scale is that of the whole, not of what is left."""
+    split = Split(Tail(4.0), Tail(30.0), 50.0)
+    found = fit_split(split.draw(40_000, np.random.default_rng(5)), 50.0)
+    assert_allclose([found.across.scale, found.along.scale], [4.0, 30.0], rtol=0.05)
+
+
+@pytest.mark.parametrize("split", SPLITS)
+def test_the_distribution_is_what_is_drawn(split: Split) -> None:
+    drawn = split.draw(20_000, np.random.default_rng(0))
+    length = np.linalg.norm(drawn, axis=1)
+    assert length.max() < split.limit
+    for sizes, cdf in (
+        (np.linalg.norm(drawn[:, :2], axis=1), split.cdf_across),
+        (np.abs(drawn[:, 2]), split.cdf_along),
+        (length, split.cdf_length),
+    ):
+        grid = np.linspace(0.0, split.limit, 4001)
+        assert kstest(sizes, lambda x, cdf=cdf, grid=grid: np.interp(x, grid, cdf(grid))).pvalue > 1e-3
+        assert cdf(split.limit) == pytest.approx(1.0, abs=1e-6)
+    across, along = split.variances
+    for squares, variance in ((drawn[:, :2] ** 2, across), (drawn[:, 2] ** 2, along)):
+        assert abs(squares.mean() - variance) < 5.0 * squares.std() / np.sqrt(len(drawn))
+
+
+def test_too_few_estimates_and_perfect_ones_are_refused(tmp_path: Path) -> None:
+    made = made_of.draw(100, Known(missed=0.0, outliers=0.0), np.random.default_rng(0))
+    truth = made_of.results(tmp_path / "truth.csv", made.where, made.R, made.t)
+    with pytest.raises(InputError, match="the places that were estimated are the true ones, or nearly"):
+        fit(compared_files(truth, truth), "")
+    unturned = made_of.results(tmp_path / "unturned.csv", made.where, made.R, made.t_seen)
+    with pytest.raises(InputError, match="the rotations that were estimated are the true ones, or nearly"):
+        fit(compared_files(unturned, truth), "")
+    few = made_of.results(tmp_path / "few.csv", made.where[:20], made.R_seen[:20], made.t_seen[:20])
+    with pytest.raises(InputError, match="20 of 100 parts have an estimate within 50 mm; at least 30 are needed"):
+        fit(compared_files(few, truth), "")
+
+
+def test_errors_in_one_direction_only_can_be_fitted_read_and_drawn(tmp_path: Path) -> None:
+    """A scale at its bound is written and read again."""
+    made = made_of.draw(200, Known(outliers=0.0), np.random.default_rng(0))
+    shift = made.shift * [0.0, 0.0, 1.0]
+    t = made.t + np.einsum("nij,nj->ni", made_of.ray_frames(made.t), shift)
+    found = compared_files(*made_of.files(tmp_path, made._replace(t_seen=t)))
+    measured = fit(found, "")
+    assert measured.shift_mm.across.scale < 0.006
+    path = tmp_path / "noise.toml"
+    path.write_text(noise_text(measured), encoding="utf-8")
+    assert_allclose([*read_noise(path)[0].shift_mm.along], [*measured.shift_mm.along], rtol=1e-4)
+    draw_fit(found, measured, tmp_path / "fit.png")
+
+
+@pytest.fixture(scope="module")
+def lmo(request: pytest.FixtureRequest) -> Residuals:
+    folder = request.config.getoption("--bop-dir")
+    if folder is None:
+        pytest.skip("needs --bop-dir, the folder of the published estimates and the truth of LM-O")
+    (estimates,) = folder.glob("cnos-fastsammegapose_lmo-test*.csv")
+    return compared_files(estimates, folder / "gt_lmo-test.csv")
+
+
+def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> None:
+    """Median and more of MegaPose on LM-O. Angles by the trace of matrices as written are what was published of it;
+    the truth is scaled by up to half a percent, so nearest rotations are farther apart in the lower quartile."""
+    measured = fit(lmo, "LM-O")
+    form = fit_form(lmo, measured, compared(lmo, measured))
+    assert (form["found"], form["parts"]) == (1205, 1445)
+    assert form["inliers"] / form["found"] == pytest.approx(0.82, rel=0.01)
+    assert_allclose(form["inlier_across_mm"][1:4], [4.2, 6.5, 9.4], rtol=0.1)
+    assert_allclose(form["inlier_along_mm"][1:4], [10.4, 20.9, 31.5], rtol=0.1)
+    assert form["along_over_across"] == pytest.approx(2.4, rel=0.1)
+    assert_allclose(form["inlier_turn_by_trace_deg"][:2], [2.6, 5.2], rtol=0.1)
+    assert form["inlier_turn_deg"][1] == pytest.approx(5.2, rel=0.1)
+    assert_allclose(form["fit"]["across the ray"]["fitted"][1:4], [4.2, 6.5, 9.4], rtol=0.1)
+    assert_allclose(form["fit"]["along the ray"]["fitted"][1:4], [10.4, 20.9, 31.5], rtol=0.1)
+
+
+def test_the_preset_is_the_fit(lmo: Residuals) -> None:
+    shipped, measured = read_noise(presets()["megapose-lmo"])[0], fit(lmo, "")
+    for mine, made in ((shipped.shift_mm, measured.shift_mm), (shipped.turn_deg, measured.turn_deg)):
+        assert_allclose([*mine.across, *mine.along, mine.limit], [*made.across, *made.along, made.limit], rtol=1e-3)
+    assert_allclose(
+        [shipped.missed, shipped.outliers, shipped.farthest_mm],
+        [measured.missed, measured.outliers, measured.farthest_mm],
+        rtol=1e-3,
+    )
+
+
+def test_the_preset_of_quantiles_is_the_fit_to_them() -> None:
+    """T-LESS: p50, p75 and p90 of inliers; a Student t meets them within 10 %."""
+    across, along = {50: 0.8, 75: 1.2, 90: 2.3}, {50: 5.3, 75: 9.5, 90: 16.5}
+    shipped, made = read_noise(presets()["megapose-tless"])[0], split_of_quantiles(across, along, 50.0)
+    found = [*shipped.shift_mm.across, *shipped.shift_mm.along]
+    assert_allclose(found, [*made.across, *made.along], rtol=0.01)
+    drawn = shipped.shift_mm.draw(200_000, np.random.default_rng(0))
+    for sizes, given in ((np.linalg.norm(drawn[:, :2], axis=1), across), (np.abs(drawn[:, 2]), along)):
+        assert_allclose(np.percentile(sizes, [*given]), [*given.values()], rtol=0.1)
+    turns = np.linalg.norm(shipped.turn_deg.draw(200_000, np.random.default_rng(1)), axis=1)
+    assert np.percentile(turns, 25) == pytest.approx(2.0, rel=0.01)
+    assert np.percentile(np.linalg.norm(np.random.default_rng(2).standard_normal((400_000, 3)), axis=1), 25) == (
+        pytest.approx(LOWER_QUARTILE_OF_THREE, rel=0.01)
+    )
+
+
+@pytest.mark.parametrize(
+    ("across", "along"), [({50: 1.0}, {50: 1.0, 90: 2.0}), ({50: 2.0, 90: 1.0}, {50: 1.0, 90: 2.0}), ({}, {})]
+)
+def test_quantiles_that_make_no_sense_are_refused(across: Any, along: Any) -> None:
+    with pytest.raises(InputError, match="at least two are needed, which grow"):
+        split_of_quantiles(across, along, 50.0)
+
+
+@pytest.mark.parametrize("name", ["megapose-lmo", "megapose-tless"])
+def test_presets_name_their_source_and_come_without_outliers_too(name: str) -> None:
+    whole, inliers = read_noise(presets()[name])[0], read_noise(presets()[f"{name}-inliers"])[0]
+    assert "BOP toolkit (MIT)" in whole.source
+    assert whole.missed > 0.1 < whole.outliers
+    assert (inliers.missed, inliers.outliers) == (0.0, 0.0)
+    assert (inliers.shift_mm, inliers.turn_deg) == (whole.shift_mm, whole.turn_deg)
+
+
+def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = made_of.draw(1000, Known(), np.random.default_rng(2))
+    estimates, truth = made_of.files(tmp_path, made)
+    out, picture, samples = tmp_path / "noise.toml", tmp_path / "fit.png", tmp_path / "residuals.csv"
+    asked = ["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]
+    written = ["--out", str(out), "--picture", str(picture), "--residuals", str(samples), "--source", 'a "new"\none']
+    assert main([*asked, *written, "--json"]) == 0
+    form = json.loads(capsys.readouterr().out)
+    found = compared_files(estimates, truth)
+    measured = fit(found, 'a "new" one')
+    assert form == json.loads(json.dumps(fit_form(found, measured, compared(found, measured))))
+    assert out.read_text(encoding="utf-8") == noise_text(measured)
+    read, _ = read_noise(out)
+    assert read.source == 'a "new" one'
+    assert_allclose([*read.shift_mm.across, read.missed], [*measured.shift_mm.across, measured.missed], rtol=1e-4)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert len(samples.read_text(encoding="utf-8").splitlines()) == 1001
+    assert main([*asked, "--scene-id", "1"]) == 0
+    said = capsys.readouterr().out
+    measured = fit(found, "estimates.csv against truth.csv")
+    assert said == "\n".join(fit_lines(found, measured, compared(found, measured))) + "\n"
+    assert main([*asked, "--scene-id", "2"]) == 2
+    assert "no image of scene 2 has an estimate" in capsys.readouterr().err
+    for option, name in (("--out", "noise.csv"), ("--picture", "no/fit.png"), ("--residuals", "truth.csv")):
+        assert main([*asked, option, str(tmp_path / name)]) == 2
+        assert option in capsys.readouterr().err
+    assert truth.read_text(encoding="utf-8").startswith(made_of.HEADER)

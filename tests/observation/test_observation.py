@@ -1,0 +1,199 @@
+"""Noise: its distribution, its frame, what it states about itself, and what `observe` refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.isotropic import FLOOR, Isotropic, floored
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.observing import observe
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
+CARELESS = np.zeros((3, 6, 6))
+CARELESS[1, 1, 1] = 0.0029**2
+
+
+def errors(level: Level, draws: int) -> Array:
+    """Body twists of what was seen, from what was shown, (draws * n, 6)."""
+    rng, shown = np.random.default_rng(11), scenes.shown(TOWER)
+    seen = [Isotropic(level)(shown.assembly, shown, rng).goals for _ in range(draws)]
+    return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
+
+
+def test_mean_is_zero_and_covariance_is_the_stated_one() -> None:
+    xi, level = errors(Level(2.0, 0.5), 500), Level(2.0, 0.5)
+    unit = xi / np.repeat([2e-3, np.radians(0.5)], 3)
+    assert np.abs(unit.mean(axis=0)).max() < 4 / np.sqrt(len(unit))
+    assert_allclose(unit.T @ unit / len(unit), np.eye(6), atol=5 / np.sqrt(len(unit)))
+    stated = observe(scenes.shown(TOWER), Isotropic(level), np.random.default_rng(0)).covariance
+    assert_allclose(stated, np.tile(np.diag([2e-3**2] * 3 + [np.radians(0.5) ** 2] * 3), (3, 1, 1)), rtol=1e-12)
+
+
+def test_errors_are_gaussian() -> None:
+    from scipy.stats import kstest
+
+    unit = errors(Level(1.0, 1.0), 200) / np.repeat([1e-3, np.radians(1.0)], 3)
+    assert kstest(unit.ravel(), "norm").pvalue > 1e-3
+
+
+def test_the_frame_of_the_part_counts_not_the_world() -> None:
+    """The same draws in another world frame give the same observation, seen from there."""
+    W = pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0))
+    here, there = scenes.shown(TOWER), scenes.shown(scenes.turned(TOWER, W))
+    noise = Isotropic(Level(3.0, 4.0))
+    seen = observe(here, noise, np.random.default_rng(1))
+    assert_allclose(observe(there, noise, np.random.default_rng(1)).goals, W @ seen.goals, atol=1e-12)
+
+
+def test_level_zero_is_exact_bit_for_bit() -> None:
+    for careless in (None, CARELESS):
+        shown = scenes.shown(TOWER, careless)
+        seen = observe(shown, Isotropic(Level(0.0, 0.0)), np.random.default_rng(5))
+        assert seen.goals.tobytes() == shown.goals.tobytes()
+
+
+def test_levels_only_scale_the_same_unit_draws() -> None:
+    shown = scenes.shown(TOWER)
+    twist = {
+        level: pose.log(pose.inverse(TOWER.goals) @ observe(shown, Isotropic(level), np.random.default_rng(2)).goals)
+        for level in (Level(1.0, 1.0), Level(3.0, 0.5))
+    }
+    ratio = twist[Level(3.0, 0.5)] / twist[Level(1.0, 1.0)]
+    assert_allclose(ratio[:, 3:], 0.5, rtol=1e-6)
+    # The translation of exp(xi) depends on its rotation, the twist does not.
+    assert_allclose(ratio[:, :3], 3.0, rtol=1e-6)
+
+
+def test_levels_consume_the_generator_alike() -> None:
+    shown, states = scenes.shown(TOWER), set()
+    for mm in (0.0, 1.0):
+        rng = np.random.default_rng(3)
+        observe(shown, Isotropic(Level(mm, mm)), rng)
+        states.add(rng.random())
+    assert len(states) == 1
+
+
+def test_carelessness_is_stated_but_not_drawn() -> None:
+    level = Level(1.0, 1.0)
+    plain = observe(scenes.shown(TOWER), Isotropic(level), np.random.default_rng(0))
+    careless = observe(scenes.shown(TOWER, CARELESS), Isotropic(level), np.random.default_rng(0))
+    assert_array_equal(careless.goals, plain.goals)
+    assert_allclose(careless.covariance - plain.covariance, CARELESS, atol=1e-18)
+
+
+def test_nothing_is_stated_below_the_floor() -> None:
+    seen = observe(scenes.shown(TOWER, CARELESS), Isotropic(Level(0.0, 0.0)), np.random.default_rng(0))
+    expected = np.tile(np.diag(FLOOR**2), (3, 1, 1))
+    expected[1, 1, 1] = 0.0029**2
+    assert_allclose(seen.covariance, expected, rtol=1e-9, atol=1e-20)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    axis = rng.standard_normal(6) * FLOOR * 20
+    C = np.outer(axis, axis)[None]
+    raised = floored(C)
+    assert_array_equal(raised, np.swapaxes(raised, 1, 2))
+    unit = np.outer(FLOOR, FLOOR)
+    assert np.linalg.eigvalsh(raised[0] / unit).min() > 1 - 1e-9
+    assert np.linalg.eigvalsh((raised - C)[0] / unit).min() > -1e-9
+    assert (np.sqrt(np.diagonal(raised[0])) >= FLOOR * (1 - 1e-12)).all()
+
+
+def test_what_is_above_the_floor_is_left_alone() -> None:
+    C = np.tile(np.diag((3 * FLOOR) ** 2), (2, 1, 1))
+    assert_array_equal(floored(C), C)
+
+
+def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
+    shown = scenes.shown(TOWER)
+    seen = observe(shown, Isotropic(Level(1.0, 1.0)), np.random.default_rng(0), gap_m=3e-4)
+    assert seen.assembly is shown.assembly
+    assert dict(seen.start).keys() == dict(shown.start).keys()
+    assert seen.seen.tolist() == [True, True, True]
+    assert seen.gap_m == 3e-4
+
+
+def test_make_noise_by_name_class_function_and_object() -> None:
+    level, rng = Level(2.0, 1.0), np.random.default_rng(0)
+
+    def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        return scenes.seen(TOWER, shown.goals)
+
+    assert make_noise("isotropic", level) == Isotropic(level)
+    assert make_noise("apo_bench.observation.models.isotropic:Isotropic", level) == Isotropic(level)
+    assert make_noise(Isotropic, level) == Isotropic(level)
+    assert make_noise(Isotropic(Level(9.0, 9.0)), level) == Isotropic(Level(9.0, 9.0))
+    assert make_noise(plain, level) is plain
+    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).goals, TOWER.goals)
+
+
+@pytest.mark.parametrize(
+    ("given", "level", "message"),
+    [
+        ("isotropc", Level(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
+        ("megapose", Level(1, 1), "did you mean 'megapose-lmo'"),
+        ("megapose-lmo-inlier", Level(1, 1), "did you mean 'megapose-lmo-inliers'"),
+        ("isotropc", Level(1, 1), "FILE.toml, anisotropic, "),
+        ("isotropc", Level(1, 1), "empirical:FILE.csv, heavy-tailed, isotropic, megapose-lmo, megapose-lmo-inliers"),
+        ("empirical", Level(1, 1), "did you mean 'empirical:FILE.csv'"),
+        ("here/mine.csv", Level(1, 1), "did you mean 'empirical:here/mine.csv'"),
+        ("isotropic", Level(-1, 1), "noise level -1 mm is not possible"),
+        ("isotropic", Level(1, float("nan")), "noise level nan degrees is not possible"),
+        (lambda goals: goals, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
+        (7, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
+        (object, Level(1, 1), "cannot be made with one argument, the level"),
+    ],
+)
+def test_what_make_noise_refuses(given: object, level: Level, message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        make_noise(given, level)
+    assert message in str(refused.value)
+
+
+GOOD = scenes.seen(TOWER, TOWER.goals)
+SKEWED = GOOD.covariance.copy()
+SKEWED[1, 0, 1] = 1e-7
+FLAT = GOOD.covariance.copy()
+FLAT[2, 3, 3] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.goals.Observation"),
+        (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
+        (replace(GOOD, start={}), "changed which parts have a start pose"),
+        (replace(GOOD, goals=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),
+        (replace(GOOD, covariance=SKEWED), "covariance for operation 2 that is not symmetric and positive definite"),
+        (replace(GOOD, covariance=FLAT), "covariance for operation 3 that is not symmetric and positive definite"),
+        (replace(GOOD, covariance=-GOOD.covariance), "covariance for operation 1"),
+    ],
+)
+def test_what_observe_refuses(returned: object, message: str) -> None:
+    with pytest.raises(InputError, match="the noise model 'mine'") as refused:
+        observe(scenes.shown(TOWER), named(lambda *_: returned), np.random.default_rng(0))
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("goals", [TOWER.goals[:2], np.full((3, 4, 4), np.nan)])
+def test_an_observation_that_cannot_be_made_is_an_input_error(goals: Array) -> None:
+    with pytest.raises(InputError, match="the noise model 'mine' failed: "):
+        observe(scenes.shown(TOWER), named(lambda *_: replace(GOOD, goals=goals)), np.random.default_rng(0))
+
+
+def named(noise):
+    noise.__name__ = "mine"
+    return noise

@@ -1,0 +1,210 @@
+"""What a plan says about itself before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench.assembly.goals import Plan, Step
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.insertion.line import Attach
+from apo_bench.prediction.failure import Prediction, predict
+from apo_bench.prediction.resting import is_support, residual, settled
+from apo_bench.records.thresholds import Thresholds
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+CLEARANCE_MM = 0.25
+ALLOWED_MM = CLEARANCE_MM + Thresholds().fit_margin_mm
+DOWN, AWAY = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
+ALONG = (1.0, 0.0, 0.0)
+
+
+def ways(scene: scenes.Scene) -> list[Attach]:
+    """From above in the world; a stick that goes through holes, along its own x axis."""
+    made = []
+    for operation, goal in zip(scene.assembly.operations, scene.goals, strict=True):
+        holes = [c for c in operation.contacts if c.manipulated.part == "stick" and c.manipulated.face == "pz"]
+        upright = goal[2, 2] > 0
+        made.append(Attach(np.array(ALONG), 0.2) if holes else Attach(np.array(DOWN if upright else AWAY), 0.05))
+    return made
+
+
+def said(scene: scenes.Scene, goals: Array, attach: Sequence[Attach] | None = None, **plan: object) -> Prediction:
+    asked = Plan(scene.assembly, scene.start, goals, **plan)
+    return predict(asked, CLEARANCE_MM, Thresholds(), ways(scene) if attach is None else attach)
+
+
+def off(scene: scenes.Scene, operation: int, T: Array) -> Array:
+    """The true goals, that of one operation (from 1) wrong by a body displacement."""
+    goals = scene.goals.copy()
+    goals[operation - 1] = goals[operation - 1] @ T
+    return goals
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_the_examples_of_the_paper_fit(name: str) -> None:
+    found = said(scenes.ALL[name](), scenes.ALL[name]().goals)
+    assert (found.fails, found.operation, found.code) == (False, None, "ok")
+    assert found.size_mm == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "shift", "fails"),
+    [
+        ("stick_on_castles", (2,), (0, 2, 0), 3),
+        ("stick_in_tower", (2,), (0, -2, 0), 3),
+        ("subassembly_on_castles", (2,), (0, 2, 0), 5),
+        ("fixture", (2, 3), (0, -2, 0), 5),
+        ("pockets", (2,), (2, 0, 0), 6),
+    ],
+)
+def test_careless_placing_fails_where_the_paper_says(
+    name: str, wrong: tuple[int, ...], shift: tuple[float, float, float], fails: int
+) -> None:
+    """Fig. 3 and 6, examples 5.1 to 5.3: one part 2 mm aside, seen exactly; everything before still fits."""
+    scene = scenes.ALL[name]()
+    goals = scene.goals.copy()
+    goals[[k - 1 for k in wrong]] = goals[[k - 1 for k in wrong]] @ scenes.mm(*shift)
+    found = said(scene, goals)
+    assert (found.fails, found.operation, found.code) == (True, fails - 1, "residual")
+    assert found.size_mm == pytest.approx(2.0, abs=1e-9)
+    assert found.sentence.startswith(f"operation {fails} ({scene.assembly.operations[fails - 1].main}) will fail: ")
+
+
+@settings(max_examples=30, deadline=None)
+@given(mm=st.floats(-1.0, 1.0).filter(lambda mm: abs(abs(mm) - ALLOWED_MM) > 1e-6))
+def test_clearance_and_margin_are_the_border(mm: float) -> None:
+    found = said(scenes.stick_in_tower(), off(scenes.stick_in_tower(), 2, scenes.mm(0, mm, 0)))
+    assert found.fails == (abs(mm) > ALLOWED_MM)
+    assert found.size_mm == pytest.approx(abs(mm), abs=1e-9)
+
+
+@pytest.mark.parametrize("mm", [-4.0, 3.0])
+def test_what_is_found_by_touch_tells_nothing(mm: float) -> None:
+    """Too deep or too high: a support is no fit contact, and the floor of a slot lies along the way in."""
+    scene = scenes.stick_on_castles()
+    assert said(scene, scene.goals @ scenes.mm(0, 0, mm)).code == "ok"
+    laid = off(scene, 3, scenes.mm(0, 0, mm))
+    assert said(scene, laid).code == "ok"
+    assert (said(scene, laid, []).code, said(scene, laid, []).operation) == ("residual", 2)
+
+
+def test_a_side_contact_tells_nothing() -> None:
+    """Example 5.3: castle 2 planned 1 mm into the fixture, or off it, is slid onto it."""
+    for mm in (1.0, -1.0):
+        assert said(scenes.fixture(), off(scenes.fixture(), 3, scenes.mm(0, mm, 0))).operation == 4
+
+
+@pytest.mark.parametrize(("yaw_deg", "fails"), [(0.1, False), (-0.1, False), (0.2, True), (-0.5, True)])
+def test_a_slide_does_not_turn_the_part(yaw_deg: float, fails: bool) -> None:
+    """Fig. 5: a 50 mm side that is not parallel touches with one corner; the other stays off by 50 mm times the yaw."""
+    scene = scenes.fixture_alignment()
+    found = said(scene, off(scene, 2, pose.at((0, 0, 0), (0, 0, yaw_deg))))
+    assert (found.fails, found.operation) == (fails, 1 if fails else None)
+    if fails:
+        assert found.size_mm == pytest.approx(50.0 * abs(np.sin(np.radians(yaw_deg))), rel=0.02)
+
+
+def test_what_lies_flat_after_all_tells_nothing() -> None:
+    """Tilts of a degree and heights of a millimetre are gone once the blocks of Fig. 5 rest on the table."""
+    scene = scenes.fixture_alignment()
+    goals = scene.goals @ pose.at((0, 0, 0.001), (1.0, 0, 0))
+    goals[0] = goals[0] @ pose.at((0, 0, 0), (0, -1.0, 0))
+    assert said(scene, goals).code == "ok"
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
+    """Supports close, of sides one corner, and settling again changes nothing."""
+    scene = scenes.ALL[name]()
+    poses = dict(scene.start)
+    goals = scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0)
+    for operation, goal in zip(scene.assembly.operations, goals, strict=True):
+        alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
+        (brought,) = placed(alone, poses, goal[None])
+        rests = settled(alone, operation, brought)
+        touched = [c for c in operation.contacts if not alone.is_fit(c)]
+        sides = [c for c in touched if not is_support(alone, c, rests)]
+        for contact in touched:
+            e, _ = residual(alone, contact, rests)
+            assert (e.min() if contact in sides else np.abs(e).max()) == pytest.approx(0.0, abs=2e-5)
+        for part, T in rests.items():
+            assert part in operation.moves or T is brought[part]
+            relative = pose.inverse(rests[operation.main]) @ T
+            if part in operation.moves:
+                np.testing.assert_allclose(relative, pose.inverse(brought[operation.main]) @ brought[part], atol=1e-12)
+        again = settled(alone, operation, rests)
+        np.testing.assert_allclose(again[operation.main], rests[operation.main], rtol=0, atol=2e-5)
+        poses = dict(rests)
+
+
+def test_parts_in_one_another_interfere() -> None:
+    """Example 5.3: the fixture is put away where castle 2 stands."""
+    scene = scenes.fixture()
+    found = said(scene, off(scene, 4, scenes.mm(0, -100, 0)))
+    assert (found.fails, found.operation, found.code) == (True, 3, "interference")
+    assert found.size_mm == pytest.approx(15.0)
+    assert said(scene, off(scene, 4, scenes.mm(0, -85.0 - 0.5, 0))).code == "ok"
+
+
+def test_the_way_in_may_be_barred() -> None:
+    """The fixture slides to its place through castle 2, which neither the goal nor the way from above meets."""
+    scene = scenes.fixture()
+    attach = ways(scene)
+    attach[3] = Attach(np.array([0.0, 1.0, 0.0]), 0.18)
+    found = said(scene, scene.goals, attach)
+    assert (found.operation, found.code) == (3, "interference")
+
+
+def test_an_unstable_goal_comes_before_everything() -> None:
+    scene = scenes.stick_on_castles()
+    goals = off(scene, 3, scenes.mm(150, 0, 0))
+    goals[1] = goals[1] @ scenes.mm(0, 3, 0)
+    found = said(scene, goals)
+    assert (found.operation, found.code, found.size_mm) == (2, "unstable_goal", None)
+
+
+def test_faces_that_miss_each_other_do_not_fit() -> None:
+    scene = scenes.stick_in_tower()
+    assert said(scene, off(scene, 2, scenes.mm(0, 0, -60))).code != "ok"
+
+
+def test_work_that_is_taken_apart_is_looked_at_as_it_is_redone() -> None:
+    """Example 5.1: castle 2 is put down wrongly, taken off, put down rightly; only then comes the stick."""
+    scene = scenes.stick_in_tower()
+    wrong = off(scene, 2, scenes.mm(0, 3, 0))
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = np.array([scene.goals[0], wrong[1], wrong[1], scene.goals[1], scene.goals[2]])
+    assert said(scene, scene.goals, schedule=schedule, targets=targets).code == "ok"
+    targets[3] = wrong[1]
+    found = said(scene, wrong, schedule=schedule, targets=targets)
+    assert (found.operation, found.code) == (2, "residual")
+
+
+def test_undoing_brings_back_what_was_carried() -> None:
+    """Fig. 6: the group comes out of the pockets and the stick out of the cubes, and all of it goes in again."""
+    scene = scenes.pockets()
+    schedule = (*(Step(k) for k in range(6)), Step(5, True), Step(4, True), Step(4), Step(5))
+    assert said(scene, scene.goals, schedule=schedule).code == "ok"
+    skipped = (*(Step(k) for k in range(6)), Step(4))
+    assert said(scene, scene.goals, schedule=skipped).operation == 4
+
+
+def test_the_frame_of_the_world_does_not_matter_and_nothing_is_changed() -> None:
+    scene = scenes.pockets()
+    turned = scenes.turned(scene, pose.at((0.1, -0.2, 0.0), (0, 0, 35.0)))
+    goals = off(turned, 2, scenes.mm(1, 0, 0))
+    kept = goals.copy()
+    found, plain = said(turned, goals), said(scene, off(scene, 2, scenes.mm(1, 0, 0)))
+    assert (found.operation, found.code) == (plain.operation, plain.code) == (5, "residual")
+    assert found.size_mm == pytest.approx(plain.size_mm)
+    np.testing.assert_array_equal(goals, kept)

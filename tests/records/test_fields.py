@@ -1,0 +1,92 @@
+"""The table of fields: what is written has just these, and can be read again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.records.checked import row_of, timing_of, unwritable
+from apo_bench.records.fields import REQUIRED, ROW_FIELDS, TIMING_FIELDS
+from apo_bench.records.settings import TrialSpec
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.sweeps.worker import lost, misbehaved, timing
+from apo_bench.trial.trial import run_trial
+
+SPEC = TrialSpec("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)
+
+
+@pytest.fixture(scope="module")
+def made() -> list[dict[str, Any]]:
+    """Rows of every way in which a trial ends: run, of a corrector that misbehaved, of a process that died."""
+    scene = build_scene(load_scenario("block_on_block"))
+    return [
+        run_trial(SPEC, scene),
+        misbehaved(SPEC, "0", "ok", "it raised\n\x1b" + "x" * 5000),
+        lost(SPEC, "0", "time_limit"),
+    ]
+
+
+def test_every_field_of_a_row_is_in_the_table(made: list[dict[str, Any]]) -> None:
+    for row in made:
+        assert set(ROW_FIELDS) == set(row)
+        assert unwritable(row) == ""
+
+
+def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
+    for row in made:
+        line = json.dumps(row, allow_nan=False).encode()
+        assert row_of(line, "line 1") == dict.fromkeys(ROW_FIELDS) | row
+        times = timing(row, 0, None, 0.1, 0.2)
+        assert timing_of(json.dumps(times).encode(), "line 1") == times
+        assert set(times) == set(TIMING_FIELDS)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"invented": 1}, "field invented: no such field is in the table of fields"),
+        ({"worst_gap_mm": float("nan")}, "field worst_gap_mm: a number"),
+        ({"worst_gap_mm": float("inf")}, "field worst_gap_mm: a number"),
+        ({"success": 1}, "field success: true or false"),
+        ({"dropped": [3]}, "field dropped[0]: text is needed"),
+        ({"dropped": ["a\ud800"]}, "field dropped[0]: text without half letters"),
+        ({"p_value": 2.0}, "field p_value: a number"),
+    ],
+)
+def test_a_row_that_could_not_be_read_is_not_written(
+    changed: dict[str, Any], said: str, made: list[dict[str, Any]]
+) -> None:
+    assert unwritable(made[0] | changed).startswith(said)
+
+
+@pytest.mark.parametrize("name", REQUIRED)
+def test_what_every_row_says_is_needed(name: str, made: list[dict[str, Any]]) -> None:
+    row = {key: value for key, value in made[0].items() if key != name}
+    assert unwritable(row) == f"field {name}: it is missing"
+
+
+def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from apo_bench.sweeps import worker
+    from apo_bench.trial.stages import show
+
+    scene = build_scene(load_scenario("block_on_block"))
+    shown = show(scene, SPEC.careless, SPEC.seed)
+    right = run_trial(SPEC, scene, shown=shown)
+    monkeypatch.setattr(worker, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
+    mine = TrialSpec("block_on_block", method="mine:correct")
+    row = worker.row_of(mine, scene, shown, "0")
+    assert (row["failure_stage"], row["failure_code"]) == ("correct", "raised")
+    assert "returned what no row can hold (field p_value:" in row["sentence"]
+
+
+def test_folders_that_were_kept_can_be_read() -> None:
+    import lzma
+
+    kept = Path(__file__).parents[2] / "benchmarks" / "results" / "headline" / "rows.jsonl.xz"
+    with lzma.open(kept) as file:
+        for number, line in zip(range(1, 201), file, strict=False):
+            assert row_of(line, f"line {number}")["schema"].startswith("apo-bench/row/")

@@ -1,0 +1,330 @@
+"""The folder of a sweep: whole rows, whatever kills the process that writes, fills the disk, or changes in between.
+
+Trials cost nothing here; processes that are killed are forked, so that twenty deaths take a second.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.records import run_folder as journals
+from apo_bench.records.key import KEY
+from apo_bench.records.run_file import run_record
+from apo_bench.records.run_folder import Journal, read_rows
+from apo_bench.records.settings import ROW
+from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.trial.code_version import code_files
+from apo_bench.trial.row import result
+from apo_bench.trial.stages import Ending
+
+GRID = {"scenarios": ["block_on_block"], "levels": [1.0], "trials": 60}
+CONTENT = {"block_on_block, scenario": "11", "block_on_block, part cube": "22"}
+VERSIONS = versions()
+CODE = {"simulation/attach.py": "33", "judge.py": "44"}
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+
+
+def run(**changed: Any) -> dict[str, Any]:
+    said = {"grids": [GRID], "content": CONTENT, "code": CODE, "files": {}, "command": "apo-bench sweep"} | changed
+    return run_record(terms=Terms({}, VERSIONS), **said)
+
+
+def row(seed: int) -> dict[str, Any]:
+    key = ("block_on_block", 0.25, seed, 1.0, 1.0, 1.0, "isotropic", "given", "friction", "none")
+    ended = {"demonstration": "ok", **result(Ending("done", "ok", None, "all was done"), success=True)}
+    ended |= {"sim_seconds": 20.0, "extra_operations": 0}
+    reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
+    return {"schema": ROW, "spec_hash": "ab", **dict(zip(KEY, key, strict=True)), **ended, "reached": reached}
+
+
+def line(seed: int) -> bytes:
+    return json.dumps(row(seed)).encode() + b"\n"
+
+
+@pytest.mark.parametrize("what", ["folder", "file", "other"])
+def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "run"
+    with Journal(folder, run()) as journal:
+        for seed in range(4):
+            journal.append(row(seed), {"seed": seed})
+            if what == "folder" and seed in (1, 3):
+                shutil.rmtree(folder.parent)
+            elif what == "file" and seed == 2:
+                (folder / "trials.jsonl").unlink()
+            elif what == "other" and seed == 2:
+                (folder / "trials.jsonl").replace(folder / "elsewhere")
+                (folder / "trials.jsonl").write_text("forged")
+        assert [one["seed"] for one in journal.rows()] == [0, 1, 2, 3]
+    assert (folder / "trials.jsonl").read_bytes() == b"".join(map(line, range(4)))
+    assert (folder / "timing.jsonl").read_bytes().count(b"\n") == 4
+    with Journal(folder, run()) as journal:
+        assert len(journal.finished) == 4
+
+
+def test_rows_are_put_back_where_the_current_folder_is_gone_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with Journal(Path("run"), run()) as journal:
+        journal.append(row(0), {})
+        shutil.rmtree(tmp_path / "here")
+        assert [one["seed"] for one in journal.rows()] == [0]
+    assert (tmp_path / "here" / "run" / "trials.jsonl").read_bytes() == line(0)
+
+
+def test_rows_that_are_cut_off_meanwhile_are_said_to_be_lost(tmp_path: Path) -> None:
+    with Journal(tmp_path, run()) as journal:
+        journal.append(row(0), {})
+        os.truncate(tmp_path / "trials.jsonl", 10)
+        with pytest.raises(RuntimeError, match=r"were removed from .* by somebody else, and are lost"):
+            journal.append(row(1), {})
+
+
+def test_a_place_where_nothing_can_be_put_back_is_one_sentence(tmp_path: Path) -> None:
+    with Journal(tmp_path / "run", run()) as journal:
+        journal.append(row(0), {})
+        shutil.rmtree(tmp_path / "run")
+        (tmp_path / "run").write_text("a file stands here")
+        with pytest.raises(RuntimeError, match=r"cannot be put back \("):
+            journal.append(row(1), {})
+
+
+def write(folder: Path, seeds: range, pause_s: float = 0.0) -> None:
+    """What a sweep does: the rows that are not there yet."""
+    with Journal(folder, run()) as journal:
+        there = {key[2] for key in journal.finished}
+        for seed in seeds:
+            if seed not in there:
+                journal.append(row(seed), {"seed": seed, "trial_s": 1.0})
+                time.sleep(pause_s)
+
+
+def forked(act: Callable[[], None]) -> int:
+    """Run something in a process of its own, which ends without cleaning up."""
+    pid = os.fork()
+    if pid:
+        return pid
+    try:
+        act()
+    except BaseException:
+        os._exit(1)
+    os._exit(0)
+
+
+def ended(pid: int) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def test_twenty_kills_lose_no_row_and_leave_no_wrong_one(tmp_path: Path) -> None:
+    rng = random.Random(3)
+    wanted = [line(seed) for seed in range(60)]
+    before: list[bytes] = []
+    for _ in range(20):
+        pid = forked(lambda: write(tmp_path, range(60), pause_s=0.002))
+        time.sleep(rng.uniform(0.0, 0.02))
+        os.kill(pid, signal.SIGKILL)
+        ended(pid)
+        path = tmp_path / "trials.jsonl"
+        now = path.read_bytes().splitlines(keepends=True) if path.exists() else []
+        assert now[: len(before)] == before
+        assert now == wanted[: len(now)]
+        before = now
+    write(tmp_path, range(60))
+    assert (tmp_path / "trials.jsonl").read_bytes() == b"".join(wanted)
+
+
+def test_the_last_line_may_be_cut_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "fsync", lambda file: None)
+    write(tmp_path, range(3))
+    path, aside = tmp_path / "trials.jsonl", tmp_path / "torn.txt"
+    whole = path.read_bytes()
+    for left in range(len(line(0) + line(1)), len(whole)):
+        path.write_bytes(whole[:left])
+        aside.unlink(missing_ok=True)
+        assert len(read_rows(tmp_path)) == 2
+        write(tmp_path, range(3))
+        assert path.read_bytes() == whole
+        torn = whole[len(line(0) + line(1)) : left]
+        assert (aside.read_bytes() if aside.exists() else b"") == (torn + b"\n" if torn else b"")
+
+
+def test_a_torn_tail_may_be_longer_than_is_read_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(journals, "CHUNK", 7)
+    write(tmp_path, range(2))
+    with (tmp_path / "trials.jsonl").open("ab") as file:
+        file.write(b"\0" * 100)
+    write(tmp_path, range(3))
+    assert (tmp_path / "trials.jsonl").read_bytes() == line(0) + line(1) + line(2)
+    assert (tmp_path / "torn.txt").read_bytes() == b"\0" * 100 + b"\n"
+
+
+def test_timing_does_not_matter(tmp_path: Path) -> None:
+    write(tmp_path, range(3))
+    (tmp_path / "timing.jsonl").write_bytes(b'{"seed": 0}\n{"se')
+    write(tmp_path, range(5))
+    assert len(read_rows(tmp_path)) == 5
+    seeds = [json.loads(text)["seed"] for text in (tmp_path / "timing.jsonl").read_text().splitlines()]
+    assert seeds == [0, 3, 4]
+
+
+@pytest.mark.parametrize("room", [0, 1, 700, 1500, 3000])
+def test_a_full_disk_takes_back_half_a_row(room: int, tmp_path: Path) -> None:
+    write(tmp_path, range(2))
+    size = (tmp_path / "trials.jsonl").stat().st_size
+
+    def filling() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size + room, size + room))
+        with pytest.raises(
+            RuntimeError, match=r"could not be written to .*File too large\); the \d+ before it are kept"
+        ):
+            write(tmp_path, range(60))
+
+    assert ended(forked(filling)) == 0
+    now = (tmp_path / "trials.jsonl").read_bytes()
+    fit = [n for n in range(60) if len(b"".join(map(line, range(n)))) <= size + room]
+    assert now == b"".join(map(line, range(fit[-1])))
+    write(tmp_path, range(60))
+    assert (tmp_path / "trials.jsonl").read_bytes() == b"".join(line(seed) for seed in range(60))
+    assert not (tmp_path / "torn.txt").exists()
+
+
+def test_a_write_may_take_several_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The system may write less than it is given; what follows belongs to the same line."""
+    write_some = os.write
+    monkeypatch.setattr(os, "write", lambda file, text: write_some(file, text[:11]))
+    write(tmp_path, range(3))
+    assert (tmp_path / "trials.jsonl").read_bytes() == b"".join(line(seed) for seed in range(3))
+
+
+def test_only_one_process_writes(tmp_path: Path) -> None:
+    with Journal(tmp_path, run()), pytest.raises(InputError, match="another sweep is writing to"):
+        Journal(tmp_path, run())
+    write(tmp_path, range(1))
+
+
+def test_the_lock_dies_with_its_process(tmp_path: Path) -> None:
+    pid = forked(lambda: write(tmp_path, range(60), pause_s=60.0))
+    end = time.monotonic() + 20.0
+    while not (tmp_path / "timing.jsonl").exists() and time.monotonic() < end:
+        time.sleep(0.005)
+    with pytest.raises(InputError, match="wait until it has ended"):
+        write(tmp_path, range(1))
+    os.kill(pid, signal.SIGKILL)
+    ended(pid)
+    write(tmp_path, range(4))
+    assert len(read_rows(tmp_path)) == 4
+
+
+def test_a_file_system_without_locks_is_no_obstacle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import fcntl
+
+    def no_locks(*_: Any) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    write(tmp_path, range(2))
+    assert len(read_rows(tmp_path)) == 2
+
+
+def test_run_json_is_the_old_one_or_the_new_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path, range(1))
+    before = (tmp_path / "run.json").read_bytes()
+
+    def dies(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", dies)
+    with pytest.raises(InputError, match=r"cannot be written \(No space left on device\)"):
+        Journal(tmp_path, run(grids=[GRID | {"trials": 80}]))
+    assert (tmp_path / "run.json").read_bytes() == before
+    monkeypatch.undo()
+    write(tmp_path, range(2))
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"code": CODE | {"simulation/attach.py": "99"}}, "(code: apo_bench/simulation/execution/attach.py changed)"),
+        ({"code": {**CODE, "new.py": "1", "a.py": "2"}}, "(code: apo_bench/a.py and 1 more changed)"),
+        ({"code": {}}, "(code: apo_bench/judging/verdict.py and 1 more changed)"),
+        (
+            {"content": CONTENT | {"block_on_block, part cube": "0"}},
+            'content: block_on_block, part cube was "22", now "0"',
+        ),
+        ({"content": CONTENT | {"method mine:fit": "0"}}, 'content: method mine:fit was null, now "0"'),
+        ({"grids": [GRID | {"levels": [2.0]}]}, "(grid: levels was [1.0], now [2.0])"),
+        ({"grids": [GRID | {"trials": 59}]}, "(grid: trials was 60, now 59)"),
+        ({"grids": [GRID, GRID]}, "(it had 1 grids, now 2)"),
+    ],
+)
+def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Path) -> None:
+    write(tmp_path, range(2))
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(InputError) as refused:
+        Journal(tmp_path, run(**changed))
+    assert words in str(refused.value)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert Journal(tmp_path, run(grids=[GRID | {"trials": 99}])).finished
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("run.json", "{", "has trials but no readable run.json"),
+        ("run.json", "[]", "has trials but no readable run.json"),
+        ("run.json", '{"schema": "apo-bench/run/2"}', "'apo-bench/run/3' is needed"),
+        ("run.json", '{"schema": "apo-bench/run/3"}', "it had 0 grids, now 1"),
+        (
+            "trials.jsonl",
+            json.dumps(row(1) | {"schema": "apo-bench/row/4"}) + "\n",
+            "this version writes 'apo-bench/row/6'",
+        ),
+        (
+            "trials.jsonl",
+            json.dumps(row(1) | {"schema": "apo-bench/row/9"}) + "\n",
+            "apo-bench/row/5, apo-bench/row/6 can be read",
+        ),
+        ("trials.jsonl", "{}\n", "line 1, field schema: it is missing"),
+        ("trials.jsonl", "[1, 2]\n", "line 1: an object is needed, a list was given"),
+        ("trials.jsonl", "\xff\n", "line 1: this is not a row of a sweep"),
+    ],
+)
+def test_a_folder_of_something_else(name: str, text: str, words: str, tmp_path: Path) -> None:
+    write(tmp_path, range(2))
+    (tmp_path / name).write_bytes(text.encode("latin-1"))
+    with pytest.raises(InputError) as refused:
+        write(tmp_path, range(3))
+    assert words in str(refused.value)
+    assert (tmp_path / name).read_bytes() == text.encode("latin-1")
+
+
+def test_a_folder_without_rows_is_anybodys(tmp_path: Path) -> None:
+    with Journal(tmp_path, run()):
+        pass
+    with Journal(tmp_path, run(grids=[GRID | {"levels": [3.0]}])) as journal:
+        assert not journal.finished
+
+
+def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for folder in (tmp_path / "file" / "run", Path("/proc/none"), Path("/sys/kernel")):
+        with pytest.raises(InputError, match="cannot be written"):
+            Journal(folder, run())
+
+
+def test_the_real_code_is_named_by_its_files() -> None:
+    assert {"simulation/execution/controller.py", "judging/verdict.py", "trial/trial.py"} <= set(code_files())

@@ -1,0 +1,273 @@
+"""The salt of a sweep: who does not have it cannot draw the trials; who has it draws the same ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import shlex
+import stat
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.cli import app as cli
+from apo_bench.errors import InputError
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.records import salt as module
+from apo_bench.records.replay_command import replay_command
+from apo_bench.records.salt import Salt, make_salt, read_salt, salt_of_sweep
+from apo_bench.records.settings import TrialSpec
+from apo_bench.report.compare import compare
+from apo_bench.report.report import report
+from apo_bench.show.failure_pictures import failure_pictures
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.statistics.rates import tally
+from apo_bench.sweeps.grid import SweepSpec, load_all, units
+from apo_bench.sweeps.sweep import sweep
+from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.trial.stages import ARM, OBSERVATION, see, show, stream
+from tests import pages
+from tests.statistics.test_rates import row, write
+
+HERE, THERE = Salt(bytes(range(16))), Salt(bytes(range(1, 33)))
+HEX = "8d217488cd5974580ccd50092e6d071ae625d86a6e19b8fc95ab5f4914f76f02"
+"""What a salt may look like; the same in every process, so that workers collect the same tests."""
+HOPELESS = 40.0
+"""A level [mm, degrees] at which plans are refused before the arm moves, so that a trial costs little."""
+GRID = SweepSpec(("block_on_block",), (HOPELESS,), (0.0,), ("none", "paper"), trials=2, seed=3, grasps=("weld",))
+
+
+def state(seed: int, which: int, salt: Salt | None = None) -> Any:
+    return stream(seed, which, salt).bit_generator.state
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**32, 2**53 - 1])
+def test_without_a_salt_the_streams_are_those_of_seed_and_stage(seed: int) -> None:
+    for which in range(6):
+        assert state(seed, which) == np.random.default_rng([seed, which]).bit_generator.state
+
+
+def test_a_salt_makes_every_stream_another_one() -> None:
+    drawn = [
+        int(stream(seed, which, salt).integers(2**63))
+        for seed in (0, 1, 2**33 + 5)
+        for which in range(6)
+        for salt in (None, HERE, THERE)
+    ]
+    assert len(set(drawn)) == len(drawn)
+    assert state(3, ARM, HERE) == state(3, ARM, Salt(bytes(range(16))))
+
+
+def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
+    noise = make_noise("isotropic", Level(1.0, 1.0))
+    plain, salted = show(tower, 1.0, 3), show(tower, 1.0, 3, salt=HERE)
+    assert not np.array_equal(plain.layout.goals, salted.layout.goals)
+    off = [shown.demonstration.goals[1] - shown.layout.goals[1] for shown in (plain, salted)]
+    assert not np.allclose(*off, rtol=0, atol=1e-5)
+    seen = [see(tower, plain, noise, 3, salt) for salt in (None, HERE, THERE, HERE)]
+    assert not any(np.array_equal(seen[0].goals, other.goals) for other in seen[1:])
+    np.testing.assert_array_equal(seen[1].goals, seen[3].goals)
+    expected = noise(tower.scenario.assembly, plain.demonstration, stream(3, OBSERVATION, HERE))
+    np.testing.assert_array_equal(seen[1].goals, expected.goals)
+
+
+def test_nothing_that_is_printed_or_written_shows_the_salt() -> None:
+    spec = TrialSpec("block_on_block", salt=HERE)
+    for text in (repr(spec), str(spec), repr(HERE), f"{HERE}", HERE.hash):
+        assert HERE.secret.hex() not in text
+        assert repr(HERE.secret)[2:-1] not in text
+    with pytest.raises(TypeError, match="bytes is not JSON serializable"):
+        json.dumps(asdict(spec))
+    assert pickle.loads(pickle.dumps(spec)) == spec != replace(spec, salt=THERE)
+
+
+def test_rows_of_two_salts_have_two_hashes() -> None:
+    specs = [TrialSpec("block_on_block", salt=salt) for salt in (None, HERE, THERE)]
+    assert len({spec_hash(spec, "content") for spec in specs}) == 3
+    again = TrialSpec("block_on_block", salt=Salt(HERE.secret), seed=9, method="paper")
+    assert spec_hash(again, "content") == spec_hash(specs[1], "content")
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\r\n"])
+def test_a_salt_file_is_one_line_of_hexadecimal_digits(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "salt"
+    path.write_bytes((HERE.secret.hex() + end).encode())
+    assert read_salt(path) == HERE
+    path.write_bytes((HERE.secret.hex().upper() + end).encode())
+    assert read_salt(path) == HERE
+    linked = tmp_path / "linked"
+    linked.symlink_to(path)
+    assert read_salt(linked) == HERE
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\n",
+        HEX[:30].encode(),
+        HEX.encode() + b"0",
+        (HEX * 17)[:1026].encode(),
+        b"0" * 64,
+        b"0123" * 16,
+        b"xy" + HEX.encode(),
+        b" " + HEX.encode(),
+        HEX.encode() + b"\n\n",
+        HEX.encode() + b"\n" + HEX.encode(),
+        b"\xef\xbb\xbf" + HEX.encode(),
+        b"\x00" * 64,
+    ],
+)
+def test_anything_else_is_no_salt_and_is_not_repeated(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "salt"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="is not a salt file; it must hold one line of 32 to 1024") as error:
+        read_salt(path)
+    assert len(content) < 20 or content.decode(errors="replace").strip() not in str(error.value)
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFOs here")
+@pytest.mark.parametrize("make", [fifo, Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_what_is_no_file_is_no_salt(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / "salt")
+    with pytest.raises(InputError, match="was given; give a salt file"):
+        salt_of_sweep(tmp_path / "salt", tmp_path / "out")
+
+
+def test_a_salt_is_made_once_for_its_owner_alone(tmp_path: Path) -> None:
+    path = tmp_path / "salt"
+    made = salt_of_sweep(path, tmp_path / "out")
+    assert len(made.secret) == 32
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert os.listdir(tmp_path) == ["salt"]
+    assert salt_of_sweep(path, tmp_path / "out") == made
+    make_salt(path)
+    assert read_salt(path) == made
+    assert salt_of_sweep(tmp_path / "other", tmp_path / "out") != made
+
+
+def test_a_salt_is_not_made_through_a_link(tmp_path: Path) -> None:
+    (tmp_path / "salt").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="cannot be read"):
+        salt_of_sweep(tmp_path / "salt", tmp_path / "out")
+    make_salt(tmp_path / "salt")
+    assert os.listdir(tmp_path) == ["salt"]
+
+
+def test_a_salt_that_cannot_be_made_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot be made .*; name a file in a folder that exists"):
+        salt_of_sweep(tmp_path / "nowhere" / "salt", tmp_path / "out")
+
+
+def test_a_salt_that_is_lost_is_not_made_again(tmp_path: Path) -> None:
+    out = write(tmp_path / "out", [row("none", 1, True)])
+    with pytest.raises(InputError, match=r"is not there, and .* holds trials already"):
+        salt_of_sweep(tmp_path / "salt", out)
+    assert not (tmp_path / "salt").exists()
+
+
+def test_every_trial_of_a_sweep_has_the_salt() -> None:
+    trials = [trial for unit in units([GRID], load_all([GRID]), HERE) for trial in unit.trials]
+    assert {trial.salt for trial in trials} == {HERE}
+    assert {trial.salt for unit in units([GRID], load_all([GRID])) for trial in unit.trials} == {None}
+
+
+def of_salt(salt: str | None, methods: tuple[str, ...] = ("none",)) -> list[dict[str, Any]]:
+    return [row(method, seed, seed % 2 == 0) | {"salt": salt} for method in methods for seed in range(6)]
+
+
+def test_rows_of_different_salts_are_neither_counted_nor_paired(tmp_path: Path) -> None:
+    plain, salted = of_salt(None), of_salt(HERE.hash)
+    with pytest.raises(InputError, match=f"drawn without a salt and with the salt {HERE.hash}; count"):
+        tally([*plain, *({**one, "seed": one["seed"] + 10} for one in salted)])
+    assert tally(salted)[0].trials == tally(plain)[0].trials == 6
+    folders = {name: write(tmp_path / name, rows) for name, rows in (("a", plain), ("b", salted))}
+    other = write(tmp_path / "c", of_salt(THERE.hash))
+    for first, second in (("a", "b"), ("b", "a")):
+        with pytest.raises(InputError, match="so that they have no trial in common, whatever their seeds"):
+            compare(folders[first], folders[second])
+    with pytest.raises(InputError, match=f"the salt {HERE.hash} and .* with the salt {THERE.hash}"):
+        compare(folders["b"], other)
+    assert compare(folders["b"], folders["b"]).shared == 6
+
+
+def test_the_report_says_which_salt_and_how_to_run_a_trial_again(tmp_path: Path) -> None:
+    out = write(tmp_path / "out", of_salt(HERE.hash))
+    (tmp_path / "salt").write_text(THERE.secret.hex())
+    said = pages.words(report(out).page)
+    assert f"drawn with the salt of hash {HERE.hash}: FILE in a command stands for its file" in said
+    with pytest.raises(InputError, match=f"drawn with the salt {HERE.hash}, and the salt .* of {THERE.hash}; give"):
+        report(out, salt_file=tmp_path / "salt")
+    with pytest.raises(InputError, match="drawn without a salt; leave --salt-file out"):
+        report(write(tmp_path / "plain", of_salt(None)), salt_file=tmp_path / "salt")
+    assert "of hash" not in pages.words(report(tmp_path / "plain").page)
+
+
+def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["replay", "block_on_block", "--salt-file", str(tmp_path / "salt")]) == 2
+    assert "the salt file cannot be read (No such file or directory); check the path" in capsys.readouterr().err
+    assert not (tmp_path / "salt").exists()
+    assert cli.main(["replay", "block_on_block", "--observation", "seen.json", "--salt-file", "salt"]) == 2
+    assert "--salt-file was given together with --observation, which draws nothing" in capsys.readouterr().err
+
+
+def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same rows in this process and in two others; resumed and replayed with its salt, which nothing shows."""
+    file, here, there = tmp_path / "salt", tmp_path / "here", tmp_path / "there"
+    rows = sweep(GRID, here, salt_file=file)
+    salt = read_salt(file)
+    assert len(rows) == 4
+    assert {one["salt"] for one in rows} == {salt.hash}
+    assert json.loads((here / "run.json").read_text())["salt"] == salt.hash
+    spread = sweep(GRID, there, salt_file=file, workers=2)
+    assert sorted(map(json.dumps, spread)) == sorted(map(json.dumps, rows))
+    before = (here / "trials.jsonl").read_bytes()
+    assert sweep(GRID, here, salt_file=file) == rows
+    with pytest.raises(InputError, match=f"drawn with the salt {salt.hash}, and no salt file was given; give"):
+        sweep(GRID, here)
+    make_salt(tmp_path / "other")
+    with pytest.raises(InputError, match=f"drawn with the salt {salt.hash}, and the salt file given is that of"):
+        sweep(GRID, here, salt_file=tmp_path / "other")
+    assert (here / "trials.jsonl").read_bytes() == before
+    capsys.readouterr()
+    command = shlex.split(replay_command(rows[0]))[1:]
+    assert command[command.index("--salt-file") + 1] == "FILE"
+    assert cli.main([word if word != "FILE" else str(file) for word in command] + ["--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == rows[0]
+    report(here)
+    for path in (*here.rglob("*"), *there.rglob("*")):
+        if path.is_file():
+            content = path.read_bytes()
+            assert salt.secret not in content
+            assert salt.secret.hex().encode() not in content.lower()
+
+
+def test_pictures_are_of_the_salted_trial(tmp_path: Path) -> None:
+    grid = replace(GRID, levels=(0.0,), methods=("none",), trials=1)
+    (made,) = sweep(grid, tmp_path / "out", salt_file=tmp_path / "salt")
+    given = read_salt(tmp_path / "salt")
+    for salt, words in ((given, "run again for this"), (None, "was not given (--salt-file), so")):
+        (picture,), missed = failure_pictures([made], tmp_path / "out", salt=salt)
+        assert words in picture.words
+        assert not missed
+
+
+def test_the_name_of_a_salt_says_nothing_of_the_streams() -> None:
+    assert HERE.hash != THERE.hash
+    assert len(HERE.hash) == 16
+    words = HERE.words(3, 1)
+    assert len(words) == 8
+    assert all(0 <= word < 2**32 for word in words)
+    assert HERE.hash not in "".join(f"{word:08x}" for word in words)
+    assert words != HERE.words(3, 2) != HERE.words(31, 2)
+    assert HERE.words(3, 11) != HERE.words(31, 1)
+    assert module.FEWEST * 8 == 128

@@ -1,0 +1,269 @@
+"""The folder of a sweep that a stranger made: nothing in it is run, obeyed, or written through."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.cli import app as cli
+from apo_bench.cli.terminal import print_cells, print_report
+from apo_bench.errors import InputError
+from apo_bench.io.csv_file import write_csv
+from apo_bench.io.parquet import parquet_beside
+from apo_bench.io.plain_text import clean
+from apo_bench.records.own_code import own_code
+from apo_bench.records.replay_command import replay_command
+from apo_bench.records.run_folder import read_rows
+from apo_bench.report import report as reports
+from apo_bench.report.failures import sample
+from apo_bench.report.report import report
+from apo_bench.show.failure_pictures import failure_pictures
+from apo_bench.statistics.rates import tally
+from apo_bench.sweeps.progress import Rates
+from tests import pages
+from tests.statistics.test_rates import row, write
+
+EVIL = """from pathlib import Path
+Path("touched").write_text("evil code ran")
+raise SystemExit
+"""
+NAMES = (
+    {"arm": "evil:arm"},
+    {"method": "evil:correct"},
+    {"noise": "evil:noise"},
+    {"noise": "evil.sub:noise.toml"},
+    {"relations": "evil:told"},
+    {"method": "empirical:evil"},
+    {"arm": "missed:evil"},
+    {"arm": "os:abort"},
+)
+DANGEROUS = (
+    *('<script>alert("1")</script>', "$(touch x)", "; rm -r .", "`touch x`", "'; touch x; '", "-x", "a b", "&&"),
+    *("[/red]", "--video=x.mp4"),
+)
+
+
+def failed(seed: int, **more: Any) -> dict[str, Any]:
+    return row(str(more.pop("method", "contact")), seed, False, scenario="block_on_block", **more)
+
+
+@pytest.fixture
+def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Rows that name code that lies beside them, from where the report is made."""
+    folder = write(tmp_path / "run", [failed(seed, **names) for seed, names in enumerate(NAMES)])
+    for name in ("evil", "missed", "empirical"):
+        (folder / f"{name}.py").write_text(EVIL, encoding="utf-8")
+    (folder / "run.json").write_text(json.dumps({"files": {"evil": "evil:scenario"}, "command": "os:abort"}))
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "path", [*sys.path, str(folder)])
+    return folder
+
+
+def test_nothing_that_rows_name_is_imported(hostile: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["report", ".", "--pictures", "9"]) == 0
+    assert "8 failed trials name code that does not come with the package (evil:arm, " in capsys.readouterr().out
+    assert cli.main(["compare", ".", ".", "--out", "made"]) == 0
+    assert not {"evil", "missed", "empirical"} & set(sys.modules)
+    assert not (hostile / "touched").exists()
+    assert "a report runs it only with --trust-code" in pages.words(hostile / "report.html")
+
+
+def test_pictures_are_asked_for_one_by_one_and_still_run_nothing(hostile: Path) -> None:
+    rows = [failed(seed, **names) for seed, names in enumerate(NAMES)]
+    assert sample(rows, 9) == []
+    assert len(sample(rows, 9, trust_code=True)) == len(rows)
+    made, missed = failure_pictures(rows, hostile)
+    assert not made
+    assert all("--trust-code" in said for said in missed)
+    assert not (hostile / "touched").exists()
+
+
+def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
+    """So the tests above would see it."""
+    with pytest.raises(SystemExit):
+        failure_pictures([failed(0, arm="evil:arm", spec_hash="0")], hostile, trust_code=True)
+    assert (hostile / "touched").exists()
+
+
+def test_a_scenario_is_one_of_ours_or_a_file_that_the_run_names(tmp_path: Path) -> None:
+    other = [failed(0) | {"scenario": name} for name in ("../x.toml", "/dev/zero", "nowhere")]
+    made, missed = failure_pictures(other, tmp_path)
+    assert not made
+    assert [f"no file of the scenario '{r['scenario']}'" in said for r, said in zip(other, missed, strict=True)] == [
+        True
+    ] * 3
+
+
+@pytest.mark.parametrize(
+    ("names", "own"),
+    [
+        ({"noise": "my noise.toml"}, ()),
+        ({"noise": "empirical:mine.csv", "relations": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
+        *((names, tuple(names.values())) for names in NAMES),
+    ],
+)
+def test_what_is_code_of_ones_own(names: dict[str, str], own: tuple[str, ...]) -> None:
+    assert own_code(row() | names) == own
+
+
+def dangerous(seed: int, evil: str) -> dict[str, Any]:
+    more = {"scenario": evil, "noise": evil, "arm": evil, "relations": f"x:{evil}", "method": evil, "sentence": evil}
+    return row(seed=seed, success=False) | more
+
+
+@pytest.mark.parametrize("evil", DANGEROUS)
+def test_commands_are_quoted(evil: str) -> None:
+    said = shlex.split(replay_command(dangerous(3, evil)))
+    assert said[:2] == ["apo-bench", "replay"]
+    assert said[2] == (f"./{evil}" if evil.startswith("-") else evil)
+    for option, value in (("--noise", evil), ("--arm", evil), ("--relations", f"x:{evil}"), ("--method", evil)):
+        assert said[said.index(option) + 1] == value
+
+
+def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [dangerous(seed, evil) for seed, evil in enumerate(DANGEROUS)]
+    folder = write(tmp_path / "run", rows)
+    page = report(folder).page
+    assert "<script>alert" not in page.read_text(encoding="utf-8")
+    assert all(evil in pages.lines(page) for evil in DANGEROUS)
+    assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 0
+    assert "<script>alert" not in (tmp_path / "made" / "compare.html").read_text(encoding="utf-8")
+    print_cells(tally(rows))
+    rates = Rates()
+    for one in rows:
+        rates.count(one)
+    rates.table(30)
+    assert "[/red]" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["scenario", "noise", "relations", "grasp", "arm", "method"])
+@pytest.mark.parametrize("evil", ["two\nlines", "\x1b[201~rm", "\x9b2J", "\u202etxt", "\x00"])
+def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"line 1, field {name}: text without control characters is needed"):
+        report(write(tmp_path / "run", [row("contact") | {name: evil}]))
+
+
+def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert clean("a\x1b[2J\nb\x07\x9b\u202e\ud800é") == "a\\x1b[2J\\nb\\x07\\x9b\\u202e\\ud800é"
+    print_cells(tally([row("contact", 0, False, scenario="\x1b]0;title\x07")]))
+    rates = Rates()
+    rates.count(row("contact", 0, False, scenario="\x1b[2J"))
+    rates.count(row("contact", 0, False, scenario="b"))
+    from rich.console import Console
+
+    shown = io.StringIO()
+    Console(file=shown, markup=False).print(rates.table(3))
+    assert cli.main(["report", str(tmp_path / "no\x1b[31mwhere")]) == 2
+    said = capsys.readouterr()
+    for text in (said.out, said.err, shown.getvalue()):
+        assert "\x1b" not in text
+        assert "\\x1b" in text
+
+
+def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench.cli.terminal import print_row
+    from apo_bench.trial.row import result
+    from apo_bench.trial.stages import Ending
+
+    end = result(Ending("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
+    print_row(row("contact", 0, False, eye="noise") | end)
+    assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
+    assert end["sentence"] == "\\x1b[31mraised\\nmore"
+    folder = write(tmp_path / "run", [row("contact", 0, False) | {"sentence": "\x1b[31m\x07\r\u202e"}])
+    assert [one["sentence"] for one in read_rows(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
+
+
+@pytest.mark.parametrize(("count", "said"), [(0, "0 failures were"), (1, "1 failure was"), (2, "2 failures were")])
+def test_pictures_that_are_missing_are_said_in_sentences(
+    count: int, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reports, "_drawn", lambda *_: {})  # figures take a second each
+    made = report(write(tmp_path / "run", [row("contact")]))
+    print_report(made._replace(pictures=count, no_pictures=("no file; check the path", "2 failed trials name code")))
+    assert f"{said} drawn. Not drawn: no file; check the path; 2 failed trials name code.\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_level.svg"]
+)
+def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> None:
+    folder, target = write(tmp_path / "run", [row("contact")]), tmp_path / "target"
+    (folder / name).parent.mkdir(exist_ok=True)
+    target.mkdir() if name in ("tables", "figures") else target.write_text("mine", encoding="utf-8")
+    (folder / name).symlink_to(target)
+    with pytest.raises(InputError, match=f"{name} is a symbolic link"):
+        report(folder)
+    assert list(target.iterdir()) == [] if target.is_dir() else target.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json.new", "torn.txt"])
+def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
+    from apo_bench.records.run_folder import Journal
+
+    folder, target = tmp_path / "run", tmp_path / "target"
+    folder.mkdir()
+    target.write_bytes(b"")
+    if name == "torn.txt":
+        (folder / "trials.jsonl").write_text('{"torn', encoding="utf-8")
+    (folder / name).symlink_to(target)
+    with pytest.raises(InputError, match="is a symbolic link"):
+        Journal(folder, {})
+    assert target.read_bytes() == b""
+
+
+def test_outputs_of_commands_are_not_written_through_links(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "target"
+    target.write_text("mine", encoding="utf-8")
+    (tmp_path / "graph.svg").symlink_to(target)
+    assert cli.main(["graph", "block_on_block", "--out", str(tmp_path / "graph.svg")]) == 2
+    folder = write(tmp_path / "run", [row("contact")])
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made" / "compare.html").symlink_to(target)
+    assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 2
+    assert capsys.readouterr().err.count("is a symbolic link") == 2
+    assert target.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
+@pytest.mark.parametrize("name", ["trials.jsonl", "run.json", "timing.jsonl"])
+@pytest.mark.parametrize("kind", ["a pipe", "a folder", "a device"])
+def test_what_is_no_file_is_refused_at_once(kind: str, name: str, tmp_path: Path) -> None:
+    folder = write(tmp_path / "run", [row("contact")])
+    (folder / name).unlink(missing_ok=True)
+    if kind == "a pipe":
+        os.mkfifo(folder / name)
+    elif kind == "a folder":
+        (folder / name).mkdir()
+    else:
+        (folder / name).symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=f"{name}: {kind} was given; give a"):
+        report(folder)
+
+
+def test_cells_of_a_table_are_no_formulas(tmp_path: Path) -> None:
+    lines = [("=1+1", -0.5, "-0.5"), ("+1.0 (2)", 1.0, "-1e3"), ("@a", 2.0, "1"), ("-x", None, "2"), ("\tq", 3.0, "+3")]
+    lines += [("'=x", 4.0, "4"), ("'plain", 5.0, "5"), ("\r=", 6.0, "6")]
+    write_csv(tmp_path / "table.csv", ("text", "number", "said"), lines)
+    with (tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
+        read = list(csv.reader(file))[1:]
+    assert [cells[0] for cells in read] == ["'=1+1", "'+1.0 (2)", "'@a", "'-x", "'\tq", "''=x", "'plain", "'\r="]
+    assert [cells[1] for cells in read] == ["-0.5", "1.0", "2.0", "", "3.0", "4.0", "5.0", "6.0"]
+    assert [cells[2] for cells in read] == [said for _, _, said in lines]
+    import pandas as pd
+
+    kept = pd.read_parquet(parquet_beside(tmp_path / "table.csv"))
+    assert list(kept["text"]) == [text for text, _, _ in lines]
+
+
+def test_a_report_of_formulas(tmp_path: Path) -> None:
+    made = report(write(tmp_path / "run", [row("=cmd|calc", scenario="@SUM(A1)")]))
+    (line,) = csv.DictReader(made.table.open(newline="", encoding="utf-8"))
+    assert (line["scenario"], line["method"]) == ("'@SUM(A1)", "'=cmd|calc")

@@ -1,0 +1,332 @@
+"""The page of a sweep as a browser shows it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from apo_bench.cli.app import main
+from apo_bench.report.report import Report, report
+from tests import pages
+from tests.browser import browser, opened, overflow
+from tests.statistics.test_rates import row, write
+
+EVIL = '<script>document.title="broken"</script>"><img src=x onerror="document.title=1">'
+METHODS = ("none", "contact", "paper", "mine:<b>correct</b>")
+SEEDS = 120
+
+
+def rows() -> list[dict[str, Any]]:
+    """Two levels, four methods, a name and a sentence that are markup, a demonstration that failed."""
+    made = [row("oracle", seed) for seed in range(SEEDS)]
+    for level in (1.0, 2.0):
+        for method in METHODS:
+            for seed in range(SEEDS):
+                success = None if seed == 7 else (seed * 31 + len(method) * int(level)) % 5 > METHODS.index(method) % 3
+                made.append(row(method, seed, success, level=level, level_deg=level, **numbers(seed, method)))
+    made += [row("contact", seed, False, scenario=f"evil {EVIL}", sentence=f"why {EVIL}") for seed in range(3)]
+    return made
+
+
+def numbers(seed: int, method: str) -> dict[str, Any]:
+    corrected = {} if method == "none" else {"gap_after_mm": 1e-9 * (seed + 1)}
+    return {"sentence": "said so", "gap_before_mm": 2.0 + seed / 100, "worst_gap_mm": 0.1 + seed * 1e-3, **corrected}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    folder = write(tmp_path_factory.mktemp("page") / "run", rows())
+    keys = ("scenario", "method", "seed", "level")
+    lines = [{**{k: r[k] for k in keys}, "trial_s": 1.0 + r["seed"] / 100, "host": "here", "worker": 0} for r in rows()]
+    text = "".join(json.dumps(line) + "\n" for line in lines) + '{"torn'
+    (folder / "timing.jsonl").write_text(text, encoding="utf-8")
+    run = {"schema": "apo-bench/run/3", "command": "apo-bench sweep x", "versions": {"mujoco": "3.17.0"}, "grids": [{}]}
+    (folder / "run.json").write_text(json.dumps(run), encoding="utf-8")
+    return report(folder)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as started:
+        yield started
+
+
+def test_the_page_asks_for_nothing_and_says_every_number(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page) as (page, said, asked):
+        assert said == []
+        assert asked == [made.page.resolve().as_uri()]
+        assert page.title() == "Sweep run"
+        text = page.inner_text("body")
+        for line in csv.DictReader(made.table.open(encoding="utf-8")):
+            low, high = (f"{100 * float(line[name]):.1f}" for name in ("low_95", "high_95"))
+            assert f"{low} to {high} %" in text
+            assert f"n {line['trials']}" in text
+        for line in csv.DictReader(made.paired.open(encoding="utf-8")):
+            d, low, high = (100 * float(line[name]) for name in ("difference", "low_95", "high_95"))
+            assert f"{d:+.1f} ({low:+.1f} to {high:+.1f})" in text
+        assert "3.17.0" in text
+        assert "apo-bench sweep x" in text
+        assert not re.search(r"https?://(?!www\.w3\.org)", made.page.read_text(encoding="utf-8"))
+
+
+def test_markup_in_names_and_sentences_is_text(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page) as (page, said, _):
+        page.locator("h3", has_text="evil").wait_for()
+        page.locator("tr:has(th:text-is('contact')) button.cell[data-title^='evil']").click()
+        page.locator(".behind tbody tr").first.wait_for()
+        assert f"why {EVIL}" in page.locator(".behind tbody").inner_text()
+        assert page.title() == "Sweep run"
+        assert page.locator("img[src='x'], body b script").count() == 0
+        assert "mine:<b>correct</b>" in page.inner_text("body")
+        assert said == []
+
+
+def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page) as (page, said, asked):
+        button = page.locator("button.cell[data-title*='paper, level 2']")
+        button.focus()
+        page.keyboard.press("Enter")
+        lines = page.locator(".behind tbody tr")
+        lines.first.wait_for()
+        assert button.get_attribute("aria-expanded") == "true"
+        assert lines.count() == 100
+        page.locator(".behind .more").click()
+        assert lines.count() == SEEDS
+        first = lines.nth(3).inner_text()
+        assert first.startswith("3")
+        assert "2.03" in first
+        want = "apo-bench replay stick_in_tower --level 2 --method paper --seed 3"
+        assert lines.nth(3).locator("code").inner_text() == want
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        lines.nth(3).locator("button.copy").click()
+        page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
+        assert page.evaluate("navigator.clipboard.readText()") == want
+        page.locator(".behind input").check()
+        failed = [r for r in rows() if (r["method"], r["level"], r["success"]) == ("paper", 2.0, False)]
+        assert lines.count() == len(failed)
+        page.keyboard.press("Escape")
+        assert button.get_attribute("aria-expanded") == "false"
+        assert page.locator(".behind").is_hidden()
+        assert (said, len(asked)) == ([], 1)
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, True)])
+def test_nothing_is_wider_than_the_window(made: Report, chromium: Any, width: int, dark: bool) -> None:
+    with opened(chromium, made.page, width, dark, "#cell-1") as (page, said, _):
+        page.locator(".behind tbody tr").first.wait_for()
+        page.evaluate("document.querySelectorAll('details').forEach((box) => { box.open = true; })")
+        assert overflow(page) <= 0
+        paper, ink = page.evaluate(
+            "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"
+        )
+        bright = [sum(map(int, re.findall(r"\d+", color)[:3])) for color in (paper, ink)]
+        assert (bright[0] < bright[1]) == dark
+        assert said == []
+
+
+def test_tables_that_go_on_to_the_right_fade_there(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page, 390) as (page, _, _):
+        page.wait_for_function("document.querySelector('.scroll.cut') !== null")
+        box = page.query_selector(".scroll.cut")
+        box.evaluate("(box) => { box.scrollLeft = box.scrollWidth; }")
+        page.wait_for_function("(box) => !box.classList.contains('cut')", arg=box)
+        assert overflow(page) <= 0
+
+
+def test_names_of_methods_and_levels_do_not_lie_on_each_other(tmp_path: Path, chromium: Any) -> None:
+    """Where both are long, the name stands above its bars."""
+    long = [row(m, i, level=0.5, level_deg=1.25) for m in ("none", "mine:corrector_of_mine") for i in range(3)]
+    short = [row(m, i) for m in ("none", "paper-track") for i in range(3)]
+    for name, some in (("long", long), ("short", short)):
+        page = report(write(tmp_path / name, some)).page
+        with opened(chromium, page) as (tab, _, _):
+            boxes = tab.evaluate(
+                "[...document.querySelectorAll('#stages ~ * svg.chart text')]"
+                ".map((t) => { const b = t.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"
+            )
+        assert boxes
+        assert not [
+            (a, b)
+            for i, a in enumerate(boxes)
+            for b in boxes[:i]
+            if a[0] < b[2] - 0.5 and b[0] < a[2] - 0.5 and a[1] < b[3] - 4 and b[1] < a[3] - 4
+        ]
+
+
+def test_only_what_was_lost_is_replayed_in_a_process_of_its_own(tmp_path: Path) -> None:
+    lost = {"failure_stage": "worker", "failure_code": "worker_died", "success": False}
+    some = [row("paper", i, i not in (1, 2)) | (lost if i in (1, 2) else {}) for i in range(4)]
+    kept = pages.behind(report(write(tmp_path / "run", some)).page)
+    words = [kept["words"]["command"][i] for i in kept["columns"]["command"]]
+    alone = [seed for seed, said in zip(kept["columns"]["seed"], words, strict=True) if "--trial-limit 600" in said]
+    assert alone == [1, 2]
+
+
+def test_a_folder_whose_name_is_no_text_has_a_page(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/n\xf6"))
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("names of files are text here")
+    write(folder / "run", [row("contact", i) for i in range(3)])
+    write(folder / "b\udcf6", [row("contact", i) for i in range(3)])
+    for name in ("run", "b\udcf6"):
+        assert main(["report", str(folder / name), "--pictures", "0"]) == 0
+        assert (folder / name / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert main(["compare", str(folder / "run"), str(folder / "b\udcf6"), "--out", str(folder / "both")]) == 0
+    assert (folder / "both" / "compare.html").exists()
+
+
+def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:
+    kept = pages.behind(made.page)
+    assert kept["ends"][-1] == len(rows())
+    cells = list(csv.DictReader(made.table.open(encoding="utf-8")))
+    first = 0
+    for cell, end in zip(cells, kept["ends"], strict=True):
+        verdicts = [kept["words"]["verdict"][v] for v in kept["columns"]["verdict"][first:end]]
+        assert verdicts.count("right") == int(cell["successes"])
+        assert verdicts.count("excluded") == int(cell["excluded"])
+        assert kept["columns"]["seed"][first:end] == sorted(kept["columns"]["seed"][first:end])
+        first = end
+
+
+def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
+    page = pages.words(report(write(tmp_path / "one", [row("contact", i) for i in range(3)])).page)
+    for sentence in (
+        "No level varied: every trial was at level 1",
+        "No two methods share a cell",
+        "No picture: None was asked for",
+        "No method that corrects had a plan",
+        "all were given",
+        "There is no timing.jsonl",
+        "There is no run.json",
+    ):
+        assert sentence in page
+
+
+def test_figures_are_files_that_stand_alone(made: Report) -> None:
+    names = {path.stem for path in made.figures}
+    assert {"success_over_level", "difference_to_paper", "failure_stages", "gap_before_and_after", "timing"} <= names
+    for path in made.figures:
+        root = ElementTree.parse(path).getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert "http" not in path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
+
+
+def test_tables_are_the_same_as_parquet(made: Report) -> None:
+    from pyarrow import parquet
+
+    for path in made.tables:
+        lines = list(csv.DictReader(path.open(encoding="utf-8")))
+        table = parquet.read_table(path.with_suffix(".parquet"))
+        assert table.column_names == list(lines[0])
+        assert table.num_rows == len(lines)
+    cells = parquet.read_table(made.table.with_suffix(".parquet")).to_pylist()
+    assert [cell["rate"] for cell in cells] == [
+        float(r["rate"]) for r in csv.DictReader(made.table.open(encoding="utf-8"))
+    ]
+    kept = parquet.read_table(made.table.with_name("rows.parquet"))
+    assert kept.num_rows == len(rows())
+    assert sum(x is True for x in kept["success"].to_pylist()) == sum(r["success"] is True for r in rows())
+
+
+def test_the_same_rows_in_another_order_make_the_same_tables_and_commands(made: Report, tmp_path: Path) -> None:
+    other = report(write(tmp_path / "run", rows()[::-1]))
+    for a, b in zip(made.tables, other.tables, strict=False):
+        if a.name not in ("times.csv", "confusion.csv"):
+            assert a.read_bytes() == b.read_bytes()
+    assert pages.behind(made.page)["words"]["command"] == pages.behind(other.page)["words"]["command"]
+
+
+def test_many_rows_take_little_room(tmp_path: Path) -> None:
+    """A page grows by some 60 bytes a trial."""
+    many = [row(m, i, i % 3 > 0, worst_gap_mm=0.1 + i * 1.7e-5) for m in ("none", "contact") for i in range(4000)]
+    made = report(write(tmp_path / "many", many))
+    assert made.page.stat().st_size < 8000 * 60 + 200_000
+    assert len(pages.behind(made.page)["columns"]["seed"]) == 8000
+
+
+def test_rows_that_lack_something_are_refused(tmp_path: Path) -> None:
+    from apo_bench.errors import InputError
+
+    broken = row("contact")
+    del broken["success"]
+    with pytest.raises(InputError, match="line 1, field success: it is missing"):
+        report(write(tmp_path / "broken", [broken]))
+    with pytest.raises(InputError, match="line 1, field worst_gap_mm: a number or null is needed, text was given"):
+        report(write(tmp_path / "wrong", [row("contact", worst_gap_mm="much")]))
+    with pytest.raises(InputError, match="line 1: this is not a row of a sweep"):
+        report(write(tmp_path / "nan", [row("contact", worst_gap_mm=float("nan"))]))
+
+
+def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench.cli import app as cli
+
+    folder = write(tmp_path / "run", [row("contact", 0), row("contact", 1, scenario="two | and bars")])
+    for number in ("-1", "101", "many"):
+        assert cli.main(["report", str(folder), "--pictures", number]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    (folder / "tables").write_text("in the way", encoding="utf-8")
+    assert cli.main(["report", str(folder)]) == 2
+    assert "tables is a file, where a folder is needed" in capsys.readouterr().err
+    (folder / "tables").unlink()
+    assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
+    assert "two | and bars" in pages.words(folder / "report.html")
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [row("contact", i, None) for i in range(3)],
+        [row("oracle", i) for i in range(3)],
+        [row("none", 0), row("contact", 0, relations="missed"), row("contact", 0, grasp="weld", fidelity="contact")],
+        [row("contact", 0, level=x, level_deg=y) for x, y in ((1.0, 2.0), (1.0, 1.0), (0.5, 0.25))],
+        [row(f"mine:m{k}") for k in range(20)],
+        [row("contact", 2**53 - 1), row("contact", 0, level=None, level_deg=None, careless=None)],
+    ],
+    ids=["excluded", "oracle", "conditions", "pairs of levels", "methods", "measured beside"],
+)
+def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
+    made = report(write(tmp_path / "run", trials))
+    assert len(pages.behind(made.page)["columns"]["seed"]) == sum(r["level"] is not None for r in trials)
+
+
+def test_measured_demonstrations_alone_are_no_sweep(tmp_path: Path) -> None:
+    from apo_bench.errors import InputError
+
+    with pytest.raises(InputError, match="belong to no cell"):
+        report(write(tmp_path / "run", [row("contact", level=None, level_deg=None, careless=None)]))
+
+
+def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
+    two = [row("contact", level=x, level_deg=x) for x in (1.0, 2.0)]
+    folder = write(tmp_path / "run", two)
+    older = set(report(folder).figures)
+    newer = set(report(write(folder, two[:1])).figures)
+    assert {path.name for path in older - newer} == {"success_over_level.svg"}
+    assert not any(path.exists() for path in older - newer)
+
+
+def test_trials_whose_worker_died_are_failures_of_a_stage_of_their_own(tmp_path: Path) -> None:
+    lost = {"failure_stage": "worker", "failure_code": "time_limit", "failure_operation": None, "predicted": None}
+    made = report(write(tmp_path / "run", [row("contact", 0), row("contact", 1, False, **lost)]))
+    page = pages.lines(made.page)
+    assert "50.0 % 9.5 to 90.5 % n 2 executed: 100.0 %, n 1" in page
+    assert "worker: time_limit" in pages.behind(made.page)["words"]["why"]
+    assert "worker 1 of 2 (50.0 %)" in made.page.read_text(encoding="utf-8")
+
+
+def test_commands_are_split_by_a_shell_as_they_were_meant(made: Report) -> None:
+    commands = pages.behind(made.page)["words"]["command"]
+    evil = next(c for c in commands if "evil" in c)
+    assert shlex.split(evil)[2] == f"evil {EVIL}"
+    assert all(shlex.split(c)[:2] == ["apo-bench", "replay"] for c in commands)

@@ -1,0 +1,195 @@
+"""Kinds of contact in scenario files: what is asked reaches the corrector, and what makes no sense is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.graph import relation_graph
+from apo_bench.assembly.topology import Contact, Gap, PartFace
+from apo_bench.correction.baselines.no_history import no_history
+from apo_bench.correction.correctors import correct
+from apo_bench.errors import InputError
+from apo_bench.observation.relations import Shifted, false, missed
+from apo_bench.resources import folder
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.show.card import card
+from apo_bench.show.graph.text import graph_lines
+
+SLOTS = (folder("scenarios") / "stick_on_castles.toml").read_text(encoding="utf-8")
+PAIR = '["py", "castle1.spy"]'
+WALLS = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
+FLOOR = '["bottom", "table.top"]'
+SPY = Contact(PartFace("stick", "py"), PartFace("castle1", "spy"))
+
+
+def load(tmp_path: Path, *changes: tuple[str, str]) -> Scenario:
+    text = SLOTS
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_scenario(path)
+
+
+def seen(scenario: Scenario, goals: np.ndarray | None = None) -> Observation:
+    n = len(scenario.assembly)
+    covariance = np.tile(np.diag(np.repeat([1e-3, np.radians(1.0)], 3) ** 2), (n, 1, 1))
+    goals = scenario.goals if goals is None else goals
+    play_m = 1e-3 * scenario.clearance_mm
+    return Observation(scenario.assembly, scenario.start, goals, covariance, np.ones(n, dtype=np.bool_), 1e-4, play_m)
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_what_comes_with_the_package_asks_for_nothing_but_centred(name: str) -> None:
+    assert not load_scenario(name).assembly.gaps
+
+
+@pytest.mark.parametrize(
+    ("given", "asked", "interval_mm"),
+    [
+        (PAIR, Gap(), (0.0, 0.0)),
+        ('{ faces = ["py", "castle1.spy"] }', Gap(), (0.0, 0.0)),
+        ('{ faces = ["py", "castle1.spy"], kind = "centred" }', Gap(), (0.0, 0.0)),
+        ('{ faces = ["py", "castle1.spy"], kind = "contact" }', Gap("contact"), (-0.25, -0.25)),
+        (WALLS, Gap("clearance"), (-0.25, 0.25)),
+        (
+            '{ faces = ["py", "castle1.spy"], kind = "clearance", gap_mm = [-0.1, 0.3] }',
+            Gap("clearance", -1e-4, 3e-4),
+            (-0.1, 0.3),
+        ),
+        (
+            '{ faces = ["py", "castle1.spy"], kind = "clearance", gap_mm = [0, 1] }',
+            Gap("clearance", 0.0, 1e-3),
+            (0.0, 1.0),
+        ),
+    ],
+)
+def test_the_kinds(given: str, asked: Gap, interval_mm: tuple[float, float], tmp_path: Path) -> None:
+    scenario = load(tmp_path, (PAIR, given))
+    plain = load_scenario("stick_on_castles")
+    assert scenario.assembly.operations == plain.assembly.operations
+    found = scenario.assembly.gaps.get(SPY, Gap())
+    assert found.kind == asked.kind
+    assert found[1:] == pytest.approx(asked[1:])
+    assert set(scenario.assembly.gaps) == (set() if asked == Gap() else {SPY})
+    assert scenario.assembly.interval(SPY, 0.25e-3) == pytest.approx(tuple(1e-3 * x for x in interval_mm))
+
+
+def test_the_kinds_of_faces_without_play(tmp_path: Path) -> None:
+    wide = '{ faces = ["bottom", "table.top"], kind = "clearance", gap_mm = [-0.5, 0.5] }'
+    floor = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
+    assert load(tmp_path, (FLOOR, wide)).assembly.interval(floor, 0.25e-3) == pytest.approx((-0.5e-3, 0.5e-3))
+    touching = '{ faces = ["bottom", "table.top"], kind = "contact" }'
+    assert load(tmp_path, (FLOOR, touching)).assembly.interval(floor, 0.25e-3) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (PAIR, WALLS.replace("clearance", "loose"), ["kind", "contact, centred or clearance", '"loose" was given']),
+        (PAIR, WALLS.replace('"clearance"', "3"), ["operation 3, contacts, contact 2, kind", "3 was given"]),
+        (PAIR, WALLS.replace("kind", "kinds"), ["'kinds'", "did you mean 'kind'"]),
+        (PAIR, '{ kind = "clearance" }', ["'faces' is missing"]),
+        (PAIR, '{ faces = ["py"] }', ["contact 2, faces", "a pair is needed"]),
+        (PAIR, "3", ["contact 2", "a pair is needed", "or a table"]),
+        (PAIR, WALLS.replace("spy", "spz"), ["contact 2, faces, second", "face of part 'castle1'"]),
+        (PAIR, WALLS.replace(" }", ", gap_mm = [0.1, 0.2] }"), ["gap_mm", "up to 0", "[0.1, 0.2] was given"]),
+        (PAIR, WALLS.replace(" }", ", gap_mm = [-0.2, -0.1] }"), ["gap_mm", "[-0.2, -0.1] was given"]),
+        (PAIR, WALLS.replace(" }", ", gap_mm = [0, 0] }"), ["gap_mm", "[0, 0] was given"]),
+        (PAIR, WALLS.replace(" }", ", gap_mm = [0.1, -0.1] }"), ["gap_mm", "a lowest and a highest"]),
+        (PAIR, WALLS.replace(" }", ", gap_mm = [-inf, 1] }"), ["gap_mm", "finite"]),
+        (PAIR, '{ faces = ["py", "castle1.spy"], gap_mm = [-1, 1] }', ["gap_mm", '"centred" has no interval']),
+        (PAIR, WALLS.replace("clearance", "contact").replace(" }", ", gap_mm = [-1, 1] }"), ['"contact" has no']),
+        (FLOOR, '{ faces = ["bottom", "table.top"], kind = "clearance" }', ["without play", "say gap_mm"]),
+        (PAIR, f"{PAIR}, {WALLS}", ["contact 3", "stands here twice"]),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_sentence(old: str, new: str, words: list[str], tmp_path: Path) -> None:
+    with pytest.raises(InputError) as error:
+        load(tmp_path, (old, new))
+    message = str(error.value)
+    assert "\n" not in message
+    assert message.startswith(str(tmp_path / "mine.toml"))
+    assert message.endswith(".")
+    for word in words:
+        assert word in message
+
+
+def test_a_contact_that_is_made_twice_is_asked_for_once(tmp_path: Path) -> None:
+    """Example 5.3: the cube stands on the table before and after castle 2 is pushed against it."""
+    text = (folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8")
+    pair, path = '["nz", "table.top"]', tmp_path / "mine.toml"
+    assert text.count(pair) == 2
+    loose = f'{{ faces = {pair}, kind = "clearance", gap_mm = [-1, 1] }}'
+    path.write_text(text.replace(pair, loose, 1), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load_scenario(path)
+    assert (
+        "operation 4, contacts: 'cube.nz on table.top' is asked to be centred here and clearance from -1 to 1 mm in "
+        "operation 2; ask for the same in both."
+    ) in str(error.value)
+    path.write_text(text.replace(pair, loose), encoding="utf-8")
+    assert list(load_scenario(path).assembly.gaps.values()) == [Gap("clearance", -1e-3, 1e-3)]
+
+
+def test_card_and_graph_say_what_is_not_centred(tmp_path: Path) -> None:
+    named = WALLS.replace(" }", ", gap_mm = [-0.1, 0.3] }")
+    scenario = load(tmp_path, (PAIR, named), ('["ny", "castle1.sny"]', WALLS.replace("py", "ny")))
+    words = "py-spy (clearance from -0.1 to 0.3 mm)", "ny-sny (clearance)"
+    assert f"R3 stick -> castle1 (nz-sfl, {', '.join(words)})" in card(scenario)
+    text = "\n".join(graph_lines("mine", relation_graph(scenario.assembly)))
+    assert f"[nz-sfl {' '.join(words)}]" in text
+    plain = load_scenario("stick_on_castles")
+    assert "(clearance" not in card(plain) + "\n".join(graph_lines("plain", relation_graph(plain.assembly)))
+
+
+def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> None:
+    scenario = load(tmp_path, (PAIR, WALLS))
+    assembly, rng = scenario.assembly, np.random.default_rng(0)
+    for wrong in (missed, false):
+        assert wrong(assembly, scenario.start, scenario.goals, rng).gaps == assembly.gaps
+    assert assembly.first(2).gaps == assembly.gaps
+    alone = replace(
+        assembly,
+        operations=tuple(replace(o, contacts=tuple(c for c in o.contacts if c == SPY)) for o in assembly.operations),
+    )
+    shifted = Shifted(1e-3)(alone, scenario.start, scenario.goals, rng)
+    contact = shifted.relations()[0].contact
+    assert contact.environment.face == "spy_shifted"
+    assert shifted.interval(contact, 0.25e-3) == (-0.25e-3, 0.25e-3)
+
+
+def test_correctors_that_know_no_walls_are_not_moved_by_them(tmp_path: Path) -> None:
+    walls, plain = load(tmp_path, (PAIR, WALLS)), load_scenario("stick_on_castles")
+    goals = plain.goals @ np.eye(4)
+    goals[2, 1, 3] += 1e-3
+    for corrector in ("paper", no_history):
+        a, b = correct(seen(walls, goals), corrector), correct(seen(plain, goals), corrector)
+        np.testing.assert_array_equal(a.goals, b.goals)
+
+
+def test_the_corrector_stays_within_the_walls_of_the_file(tmp_path: Path) -> None:
+    """Seen 1 mm aside, the stick comes to the nearer wall, not to the middle."""
+    both = (PAIR, WALLS), ('["ny", "castle1.sny"]', WALLS.replace("py", "ny"))
+    second = (
+        ('["py", "castle2.spy"]', WALLS.replace("castle1", "castle2")),
+        (
+            '["ny", "castle2.sny"]',
+            WALLS.replace("py", "ny").replace("castle1", "castle2"),
+        ),
+    )
+    scenario = load(tmp_path, *both, *second)
+    assert len(scenario.assembly.gaps) == 4
+    goals = np.array(scenario.goals)
+    goals[2, 1, 3] += 1e-3
+    made = correct(seen(scenario, goals), "contact")
+    assert made.ok, made.sentence
+    aside = made.goals[2, 1, 3] - made.goals[:2, 1, 3]
+    np.testing.assert_allclose(aside, 0.25e-3, atol=1e-9)

@@ -1,0 +1,100 @@
+"""How an error spreads: what is put against a displaced part goes along with it, as far as the face leads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench.assembly.goals import Layout
+from apo_bench.assembly.placement import placed
+from apo_bench.geometry import pose
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.scenario import Carelessness, Scenario
+
+SCENARIOS = {name: load_scenario(name) for name in scenario_names()}
+CARELESS = sorted(name for name, scenario in SCENARIOS.items() if scenario.careless)
+ALIKE = {"vanished_fixture": {1, 2}}
+"""Operations, counted from 0, that show the error; elsewhere it is operation 1 alone."""
+LEFT = {"pocket_table": ("cube2",)}
+"""What is wrong until the last step; elsewhere it is castle 2."""
+
+
+def layout(scenario: Scenario, seed: int = 3) -> Layout:
+    return draw_layout(scenario, np.random.default_rng([seed, 0]))
+
+
+@pytest.mark.parametrize("name", CARELESS)
+@pytest.mark.parametrize("size_m", [-0.004, 0.0015])
+def test_which_operations_show_the_error_and_what_is_left_of_it(name: str, size_m: float):
+    scenario = SCENARIOS[name]
+    found = spread(scenario, layout(scenario), size_m * scenario.careless.axis)
+    expected = np.zeros((len(scenario.assembly), 3))
+    for k in ALIKE.get(name, {1}):
+        expected[k] = size_m * scenario.careless.axis
+    assert found.offsets == pytest.approx(expected, abs=1e-15)
+    assert found.left == LEFT.get(name, ("castle2",))
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_without_an_error_nothing_is_displaced(name: str):
+    scenario = SCENARIOS[name]
+    found = spread(scenario, layout(scenario), np.zeros(3))
+    assert not found.offsets.any()
+    assert found.left == ()
+
+
+@given(st.floats(-0.01, 0.01), st.floats(-0.01, 0.01), st.integers(0, 20))
+@settings(max_examples=30, deadline=None)
+def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, seed: int):
+    """Whatever the direction of the error, the castle follows by what the face says and by nothing else.
+
+    An error below `NOTHING_M` is none, so it may stay open.
+    """
+    scenario = SCENARIOS["vanished_fixture"]
+    truth = layout(scenario, seed)
+    allowed = 1e-12 if np.hypot(x, y) > 2.0 * NOTHING_M else 2.0 * NOTHING_M
+    offsets = spread(scenario, truth, np.array([x, y, 0.0])).offsets
+    shown = truth.goals @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
+    poses = placed(scenario.assembly, truth.start, shown)[2]
+    face, on = (scenario.assembly.face(of) for of in scenario.assembly.operations[2].contacts[1])
+    corner = pose.apply(pose.inverse(poses["cube"]) @ poses["castle2"], face.outline[:1])[0]
+    assert on.plane[:3] @ corner + on.plane[3] == pytest.approx(0.0, abs=allowed)
+    assert offsets[2] == pytest.approx((0.0, y, 0.0), abs=allowed)
+
+
+@given(st.floats(-3.0, 3.0))
+@settings(max_examples=20, deadline=None)
+def test_twice_the_error_is_twice_as_far_everywhere(factor: float):
+    scenario = SCENARIOS["vanished_fixture"]
+    once, more = (spread(scenario, layout(scenario), f * 1e-3 * scenario.careless.axis) for f in (1.0, factor))
+    assert more.offsets == pytest.approx(factor * once.offsets, abs=2e-9)
+
+
+def test_what_stands_on_a_displaced_part_and_moves_with_it_becomes_right_with_it():
+    """Example 5.2 with the cube put down wrong: taken up and moved on, it and the stick in it are where they should."""
+    scenario = SCENARIOS["carried_bridge"]
+    wrong = replace(scenario, careless=Carelessness(2, np.array([0.0, 1.0, 0.0]), 1e-3, 2e-3))
+    found = spread(wrong, layout(wrong), np.array([0.0, 1e-3, 0.0]))
+    assert found.offsets[2] == pytest.approx((0.0, 1e-3, 0.0))
+    assert found.offsets[3] == pytest.approx((0.0, 1e-3, 0.0)), "the hole leads the stick"
+    assert found.offsets[4] == pytest.approx((0.0, 0.0, 0.0))
+    assert found.left == ()
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_covariance_is_the_mean_square_of_every_operation_that_errs(name: str):
+    scenario = SCENARIOS[name]
+    covariance = careless_covariance(scenario, 2.0)
+    expected = np.zeros_like(covariance)
+    if scenario.careless is not None:
+        square = np.outer(scenario.careless.axis, scenario.careless.axis) * (2.0 * scenario.careless.rms_m) ** 2
+        for k in ALIKE.get(name, {1}):
+            expected[k, :3, :3] = square
+    assert covariance == pytest.approx(expected, abs=1e-18)
+    assert not careless_covariance(scenario, 0.0).any()

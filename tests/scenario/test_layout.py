@@ -1,0 +1,311 @@
+"""Layouts: whatever a seed draws, every contact stays closed, starts stay put, and the same seed draws the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import MultiPoint
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.placement import placed
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.solid import Box, Solid
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.layout import draw_layout, layout_at
+from apo_bench.scenario.scenario import Grasp, Scenario, Site
+from tests import scenes
+
+NAMES = scenario_names()
+SCENARIOS = {name: load_scenario(name) for name in NAMES}
+BASE_M = np.array([-0.42, 0.0])
+"""Where the robot stands."""
+GENERATOR_SEEDS = range(200)
+FINGERS_M = (0.06, 0.025)
+"""Half of what the open gripper takes up along its closing direction and across it."""
+
+
+def gap_m(assembly: Assembly, contact: Contact, poses: Poses) -> float:
+    """The largest distance of a corner of the upper face from the plane of the lower one."""
+    face, on = assembly.face(contact.manipulated), assembly.face(contact.environment)
+    corners = pose.apply(poses[contact.manipulated.part], face.outline)
+    local = pose.apply(pose.inverse(poses[contact.environment.part]), corners)
+    return float(np.abs(local @ on.plane[:3] + on.plane[3]).max())
+
+
+def overlap_m2(assembly: Assembly, contact: Contact, poses: Poses) -> float:
+    face, on = assembly.face(contact.manipulated), assembly.face(contact.environment)
+    return overlap(face, poses[contact.manipulated.part], on, poses[contact.environment.part]).area
+
+
+EXAMPLES = {
+    "bridge_cycle": scenes.bridge,
+    "stick_on_castles": scenes.stick_on_castles,
+    "stick_in_tower": scenes.stick_in_tower,
+    "carried_bridge": scenes.subassembly_on_castles,
+    "vanished_fixture": scenes.fixture,
+    "pocket_table": scenes.pockets,
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_scenes_of_the_paper_are_those_of_the_paper(name: str):
+    """Who moves, whom it carries, which faces meet and where: as written out by hand."""
+    scenario, example = SCENARIOS[name], EXAMPLES[name]()
+    assert [o.moves for o in scenario.assembly.operations] == [o.moves for o in example.assembly.operations]
+    for mine, paper in zip(scenario.assembly.operations, example.assembly.operations, strict=True):
+        assert set(mine.contacts) == set(paper.contacts)
+    assert scenario.assembly.odls() == example.assembly.odls()
+    assert scenario.goals == pytest.approx(example.goals, abs=1e-12)
+
+
+def test_all_eight_are_shipped():
+    assert set(NAMES) == {*EXAMPLES, "block_on_block", "fixture_alignment"}
+
+
+def test_who_is_careless_and_how():
+    """Along y at operation 2, along x where two pockets decide; nobody in the first figures."""
+    axes = {name: s.careless and (s.careless.operation, s.careless.axis.tolist()) for name, s in SCENARIOS.items()}
+    along_y = (1, [0.0, 1.0, 0.0])
+    assert axes == {
+        "block_on_block": None,
+        "bridge_cycle": None,
+        "fixture_alignment": None,
+        "stick_in_tower": along_y,
+        "stick_on_castles": along_y,
+        "carried_bridge": along_y,
+        "vanished_fixture": along_y,
+        "pocket_table": (1, [1.0, 0.0, 0.0]),
+    }
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
+    scenario = SCENARIOS[name]
+    stages = placed(scenario.assembly, scenario.start, scenario.goals)
+    gaps = [
+        gap_m(scenario.assembly, contact, stages[k])
+        for k, operation in enumerate(scenario.assembly.operations)
+        for contact in operation.contacts
+    ]
+    assert max(gaps) < 1e-9
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
+    scenario = SCENARIOS[name]
+    assembly = scenario.assembly
+    nominal = placed(assembly, scenario.start, scenario.goals)
+    for seed in GENERATOR_SEEDS:
+        layout = draw_layout(scenario, np.random.default_rng([seed, 0]))
+        stages = placed(assembly, layout.start, layout.goals)
+        for k, operation in enumerate(assembly.operations):
+            for contact in operation.contacts:
+                assert gap_m(assembly, contact, stages[k]) < 1e-9
+                if seed < 40:
+                    part = overlap_m2(assembly, contact, stages[k]) / overlap_m2(assembly, contact, nominal[k])
+                    assert part >= 0.6
+            for other in set(assembly.solids) - {operation.main} if seed < 40 else ():
+                a, b = assembly.solids[operation.main], assembly.solids[other]
+                assert intrusion(a, stages[k][operation.main], b, stages[k][other]) < 1e-9
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_overlap_at_the_ends_of_every_shift(name: str):
+    scenario = SCENARIOS[name]
+    assembly = scenario.assembly
+    nominal = placed(assembly, scenario.start, scenario.goals)
+    for shifts in product(*[(s.low_m, s.high_m) for s in scenario.shifts]):
+        stages = placed(assembly, scenario.start, layout_at(scenario, 0, 0, 0, shifts).goals)
+        for k, operation in enumerate(assembly.operations):
+            for contact in operation.contacts:
+                assert overlap_m2(assembly, contact, stages[k]) >= 0.6 * overlap_m2(assembly, contact, nominal[k])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_draws_fill_their_ranges_and_stay_inside(name: str):
+    scenario = SCENARIOS[name]
+    site = scenario.site
+    layouts = [draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in GENERATOR_SEEDS]
+    first = np.array([layout.goals[0] @ pose.inverse(scenario.goals[0]) for layout in layouts])
+    yaw = np.arctan2(first[:, 1, 0], first[:, 0, 0])
+    drawn = [first[:, 0, 3] - site.center_m[0], first[:, 1, 3] - site.center_m[1], yaw - np.mean(site.yaw_rad)]
+    half = [*site.spread_m, np.ptp(site.yaw_rad) / 2]
+    for shift in scenario.shifts:
+        moved = [pose.inverse(T @ scenario.goals[shift.operation]) for T in first]
+        along = [(m @ layout.goals[shift.operation])[:3, 3] for m, layout in zip(moved, layouts, strict=True)]
+        drawn.append(np.array(along) @ shift.axis - (shift.low_m + shift.high_m) / 2)
+        half.append((shift.high_m - shift.low_m) / 2)
+    for values, width in zip(drawn, half, strict=True):
+        assert np.abs(values).max() <= width + 1e-12
+        assert np.ptp(values) > 1.8 * width, "200 uniform draws come near both ends"
+        assert abs(values.mean()) < 4 * width / np.sqrt(3 * len(values))
+    assert np.abs(np.corrcoef(drawn) - np.eye(len(drawn))).max() < 0.3, "draws are independent"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_goals_of_the_file_are_not_the_truth(name: str):
+    scenario = SCENARIOS[name]
+    for seed in GENERATOR_SEEDS:
+        goals = draw_layout(scenario, np.random.default_rng([seed, 0])).goals
+        assert np.linalg.norm(goals[0] - scenario.goals[0]) > 5e-3
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_draws_the_same_bytes(name: str):
+    scenario = SCENARIOS[name]
+    one, two, other = (draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in (7, 7, 8))
+    assert one.goals.tobytes() == two.goals.tobytes()
+    assert one.goals.tobytes() != other.goals.tobytes()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_starts_are_those_of_the_file(name: str):
+    """With a clearance the stick, which lies on a fit face, lies that much lower; nothing else moves."""
+    scenario = SCENARIOS[name]
+    for clearance_mm in (0.0, 0.25):
+        start = draw_layout(scenario, np.random.default_rng([5, 0]), clearance_mm).start
+        for part, T in scenario.start.items():
+            if part in scenario.follows_site:
+                continue
+            drop = 1e-3 * clearance_mm if part == "stick" else 0.0
+            assert start[part] == pytest.approx(pose.at((0, 0, -drop)) @ T, abs=1e-15)
+
+
+def test_only_fixed_parts_that_follow_the_site_start_elsewhere():
+    scenario = replace(SCENARIOS["stick_in_tower"], follows_site=frozenset({"table"}))
+    layout = draw_layout(scenario, np.random.default_rng([3, 0]), clearance_mm=0.0)
+    assert np.allclose(layout.start["table"] @ scenario.goals[0], layout.goals[0], atol=1e-15)
+    assert (layout.start["stick"] == scenario.start["stick"]).all()
+
+
+def test_a_scenario_without_a_site_stays_where_its_file_says():
+    scenario = replace(SCENARIOS["stick_in_tower"], site=Site(), shifts=())
+    layout = draw_layout(scenario, np.random.default_rng([3, 0]))
+    assert (layout.goals == scenario.goals).all()
+
+
+def footprint(solid: Solid, T: Array):
+    corners = np.array(list(product(*solid.bounds.T)))
+    return MultiPoint(pose.apply(T, corners)[:, :2]).convex_hull
+
+
+def extremes(scenario: Scenario):
+    """Layouts at the ends and the middle of everything that is drawn."""
+    site = scenario.site
+    for u, v, yaw in product((-1, 0, 1), (-1, 0, 1), np.linspace(*site.yaw_rad, 5)):
+        x, y = site.center_m[0] + u * site.spread_m[0], site.center_m[1] + v * site.spread_m[1]
+        for end in ("low_m", "high_m"):
+            yield layout_at(scenario, x, y, yaw, [getattr(shift, end) for shift in scenario.shifts])
+
+
+def open_fingers(grasp: Grasp, T: Array):
+    """What the open gripper takes up around a part at T, seen from above."""
+    x = (T[:3, :3] @ grasp.across)[:2]
+    y = np.array([-x[1], x[0]])
+    middle = pose.apply(T, grasp.point[None])[0, :2]
+    return MultiPoint(
+        [middle + u * FINGERS_M[0] * x + v * FINGERS_M[1] * y for u in (-1, 1) for v in (-1, 1)]
+    ).convex_hull
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_start_is_in_the_way_of_the_assembly(name: str):
+    """What has not been moved yet is clear of all that moves, on the line to its goal, and of the fingers there."""
+    scenario = SCENARIOS[name]
+    assembly = scenario.assembly
+    for layout in extremes(scenario):
+        stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        waiting = set(assembly.solids) - assembly.fixed
+        for k, operation in enumerate(assembly.operations):
+            waiting -= set(operation.moves)
+            T, attach = layout.goals[k], scenario.attach[k]
+            back = T @ pose.at(-attach.travel_m * attach.direction) @ pose.inverse(T)
+            fingers = open_fingers(scenario.grasps[k], T)
+            here = open_fingers(scenario.grasps[k], stages[k][operation.main])
+            for other in waiting:
+                standing = footprint(assembly.solids[other], layout.start[other])
+                for part in operation.moves:
+                    ends = [footprint(assembly.solids[part], each @ stages[k + 1][part]) for each in (np.eye(4), back)]
+                    assert ends[0].union(ends[1]).convex_hull.distance(standing) > 0.04
+                assert fingers.distance(standing) > 0.025
+                assert here.distance(standing) > 0.025
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_fingers_find_room_where_a_part_waits(name: str):
+    """Nothing that was put down before is within reach of the fingers that take a part from its start."""
+    scenario = SCENARIOS[name]
+    assembly = scenario.assembly
+    for layout in extremes(scenario):
+        stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        moved: set[str] = set()
+        for k, operation in enumerate(assembly.operations):
+            if operation.main not in moved:
+                fingers = open_fingers(scenario.grasps[k], stages[k][operation.main])
+                for other in moved:
+                    assert fingers.distance(footprint(assembly.solids[other], stages[k][other])) > 0.02
+            moved |= set(operation.moves)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everything_is_within_reach(name: str):
+    scenario = SCENARIOS[name]
+    operations = scenario.assembly.operations
+    held = [
+        T @ pose.at(grasp.point)
+        for layout in extremes(scenario)
+        for goal, operation, grasp, attach in zip(
+            layout.goals, operations, scenario.grasps, scenario.attach, strict=True
+        )
+        for T in (goal, goal @ pose.at(-attach.travel_m * attach.direction), scenario.start[operation.main])
+    ]
+    distance = np.linalg.norm(np.array(held)[:, :2, 3] - BASE_M, axis=1)
+    assert distance.min() > 0.25
+    assert distance.max() < 0.72
+
+
+coordinates = st.floats(-0.1, 0.1)
+turns = st.floats(-180, 180)
+poses = st.builds(pose.at, st.tuples(*[coordinates] * 3), st.tuples(*[turns] * 3))
+
+
+def block(*half: float) -> Solid:
+    return Solid("block", {}, (Box("block", np.zeros(3), np.array(half)),), np.zeros(3), 8 * float(np.prod(half)))
+
+
+@given(poses, poses)
+@settings(max_examples=100, deadline=None)
+def test_intrusion_is_symmetric_and_moves_with_the_pair(T: Array, T_both: Array):
+    a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
+    depth = intrusion(a, np.eye(4), b, T)
+    assert intrusion(b, T, a, np.eye(4)) == pytest.approx(depth, abs=1e-12)
+    assert intrusion(a, T_both, b, T_both @ T) == pytest.approx(depth, abs=1e-9)
+
+
+@given(poses)
+@settings(max_examples=100, deadline=None)
+def test_intrusion_agrees_with_points(T: Array):
+    """A common point well inside both boxes means intrusion; boxes pushed apart by the depth only touch."""
+    a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 9)] * 3), axis=-1).reshape(-1, 3)
+    inside = np.abs(pose.apply(pose.inverse(T), grid * a.boxes[0].half)) < 0.95 * b.boxes[0].half
+    depth = intrusion(a, np.eye(4), b, T)
+    if inside.all(axis=1).any():
+        assert depth > 0
+    if depth == 0:
+        assert not inside.all(axis=1).any()
+
+
+@pytest.mark.parametrize(("apart_mm", "depth_mm"), [(19.0, 1.0), (20.0, 0.0), (21.0, 0.0)])
+def test_the_depth_of_two_aligned_blocks(apart_mm: float, depth_mm: float):
+    a = block(0.05, 0.05, 0.01)
+    assert 1e3 * intrusion(a, np.eye(4), a, pose.at((0, 0, 1e-3 * apart_mm))) == pytest.approx(depth_mm, abs=1e-9)

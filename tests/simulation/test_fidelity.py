@@ -1,0 +1,247 @@
+"""Fidelity contact and shared beginnings: what may be left out, and that sharing changes nothing."""
+
+import json
+from functools import cache
+from itertools import groupby
+
+import mujoco
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.records.settings import TrialSpec
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest, replay
+from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.replay_cache import Branches, marks
+from apo_bench.simulation.robot import near, robot
+from apo_bench.simulation.robot.fast_forward import leap
+from apo_bench.simulation.robot.paths import Line, minimum_jerk, moved, smooth
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene.world import SLEEP, fresh, part_pose, sleeping, timestep
+from apo_bench.trial.stages import show
+from apo_bench.trial.trial import run_trial
+
+
+@cache
+def scene(name="stick_in_tower", grasp="friction"):
+    return build_scene(load_scenario(name), grasp=grasp)
+
+
+@cache
+def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
+    return show(scene(name, grasp), careless, seed)
+
+
+def row(method, fidelity, *, grasp="friction", level=1.0, branches=None):
+    spec = TrialSpec("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
+    return json.dumps(run_trial(spec, scene(grasp=grasp), shown=shown(grasp=grasp), branches=branches))
+
+
+@pytest.mark.parametrize(("fidelity", "grasp"), [("full", "friction"), ("contact", "friction"), ("full", "weld")])
+def test_shared_beginnings_change_no_byte(fidelity, grasp):
+    asked = [("paper", 1.0), ("paper-track", 1.0), ("none", 1.0), ("paper", 0.5), ("paper", 1.0)]
+    branches = Branches()
+    shared = [row(method, fidelity, grasp=grasp, level=level, branches=branches) for method, level in asked]
+    alone = [row(method, fidelity, grasp=grasp, level=level) for method, level in asked[:-1]]
+    assert shared == [*alone, alone[0]]
+
+
+def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
+    branches, plan = (
+        Branches(),
+        Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals),
+    )
+    first = replay(plan, scene(), fidelity="contact", branches=branches)
+    monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
+    assert replay(plan, scene(), fidelity="contact", branches=branches) is first
+
+
+def test_marks_differ_where_anything_that_led_there_differs():
+    layout = shown().layout
+    plan = Plan(load_scenario("stick_in_tower").assembly, layout.start, layout.goals)
+    later = np.array(layout.goals)
+    later[-1, :3, 3] += [0.0, 0.0, 1e-9]
+    other = Plan(plan.assembly, plan.start, later)
+    a, b = (marks(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
+    assert a[:-1] == b[:-1]
+    assert a[-1] != b[-1]
+    assert not set(a) & set(marks(scene(), layout.start, "contact", moves(plan, scene())))
+    elsewhere = {part: T @ pose.at((1e-9, 0.0, 0.0)) for part, T in layout.start.items()}
+    assert not set(a) & set(marks(scene(), elsewhere, "full", moves(plan, scene())))
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "vanished_fixture"])
+def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
+    """A full replay, in which every stretch that `contact` would leave out is looked at for contacts of what moves."""
+    its, met = scene(name), []
+    left_out: list[tuple[float, float]] = []
+    follow = Robot.follow
+
+    def looked_at(self, line, guard=None):
+        n = max(1, round(line.seconds / self.step_s))
+        s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
+        spans = near.near_spans(its, self.data, self._moving(self.opening()), self._held, line, s)
+        edges = [0, *(edge for span in spans for edge in span), n]
+        begin = float(self.data.time)
+        left_out[:] = [
+            (begin + a * self.step_s, begin + b * self.step_s) for a, b in zip(edges[::2], edges[1::2], strict=True)
+        ]
+        try:
+            return follow(self, line, guard)
+        finally:
+            left_out.clear()
+
+    def feel(data):
+        if any(a < data.time < b for a, b in left_out):
+            held = {its.work.free.index(part) for part in hand.get("held", ())}
+            for g1, g2 in data.contact.geom[data.contact.dist < 0.0]:
+                pair = [int(its.work.geom_part[g]) for g in (g1, g2)]
+                moving = [i == -1 or i in held for i in pair]
+                if moving[0] != moving[1] and not (-1 in pair and set(pair) & held):
+                    met.append((float(data.time), pair))
+
+    hand = {}
+    hold = Robot.hold
+
+    def holding(self, *parts):
+        hand["held"] = parts
+        hold(self, *parts)
+
+    monkeypatch.setattr(Robot, "follow", looked_at)
+    monkeypatch.setattr(Robot, "hold", holding)
+    monkeypatch.setattr(robot, "TICK_S", 0.005)
+    layout = shown(name).layout
+    done = replay(Plan(its.scenario.assembly, layout.start, layout.goals), its, feel)
+    assert done.outcome.code == "ok"
+    assert met == []
+
+
+def test_contact_simulates_less_and_passes_as_much_time():
+    layout = shown().layout
+    plan = Plan(scene().scenario.assembly, layout.start, layout.goals)
+    full, contact = (replay(plan, scene(), fidelity=fidelity) for fidelity in ("full", "contact"))
+    assert full.outcome.code == contact.outcome.code == "ok"
+    assert contact.sim_seconds == pytest.approx(full.sim_seconds, abs=0.5)
+    for part, T in full.reached.final.poses.items():
+        assert contact.reached.final.poses[part] == pytest.approx(T, abs=1e-3), f"{part}: more than it drifts in a hand"
+
+
+def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
+    its = scene()
+    data, kinematics = fresh(its.work, shown().layout.start), its.kinematics
+    model = its.work.model
+    joints = [model.joint(f"arm/{name}").id for name in its.arm.joints]
+    at, dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    data.qpos[at] = its.arm.home
+    held, others = ("stick",), [part for part in its.work.free if part != "stick"]
+    before, rest = kinematics.forward(data.qpos[at]), [part_pose(its.work, data, part) for part in others]
+    in_hand = pose.inverse(before) @ part_pose(its.work, data, "stick")
+    velocity = np.array([0.3, -0.2, 0.1, 0.4, -0.5, 0.6])
+    leap(its.work, data, kinematics.forward, (at, dof), np.full(6, 0.05), velocity, held)
+    assert data.qpos[at] == pytest.approx(np.asarray(its.arm.home) + 0.05)
+    after = kinematics.forward(data.qpos[at])
+    assert pose.inverse(after) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-9)
+    assert [part_pose(its.work, data, part).tolist() for part in others] == [T.tolist() for T in rest]
+    dt = 1e-5
+    mujoco.mj_integratePos(model, data.qpos, data.qvel, dt)
+    later = kinematics.forward(data.qpos[at])
+    assert pose.inverse(later) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-7)
+
+
+def test_what_is_near_is_told_from_what_is_far():
+    its = scene()
+    data = fresh(its.work, shown().layout.start)
+    stick = part_pose(its.work, data, "stick")
+    hand = [near.Moving(its.boxes["stick"], np.eye(4))]
+    held = ("stick",)
+
+    def spans(start, end):
+        line = smooth(start, end, 0.3)
+        s = minimum_jerk(np.linspace(0.0, 1.0, 1 + round(line.seconds * 1e3)))
+        return near.near_spans(its, data, hand, held, line, s), len(s) - 1
+
+    high = moved(stick, (0.0, 0.0, 1.0), 0.2)
+    up, n = spans(stick, high)
+    assert [begin for begin, _ in up] == [0]
+    assert up[0][1] < n / 2
+    down, n = spans(high, stick)
+    assert [end for _, end in down] == [n]
+    assert down[0][0] > n / 2
+    assert spans(high, moved(high, (1.0, 0.0, 0.0), 0.1))[0] == []
+    turned = high @ pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 40.0))
+    assert spans(high, turned)[0] == []
+    tipped = high @ pose.at((0.0, 0.0, 0.0), (0.0, 40.0, 0.0))
+    assert spans(high, tipped)[0] == [(0, spans(high, tipped)[1])], "a turn about a level axis is always simulated"
+
+
+def test_nothing_is_left_out_while_something_moves():
+    its = scene()
+    data = fresh(its.work, shown().layout.start)
+    stick = part_pose(its.work, data, "stick")
+    line = Line(moved(stick, (0, 0, 1), 0.2), moved(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
+    s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
+    hand = [near.Moving(its.boxes["stick"], np.eye(4))]
+    assert near.near_spans(its, data, hand, ("stick",), line, s) == []
+    other = next(part for part in its.work.free if part != "stick")
+    data.qvel[its.work.dof[other]] = 0.01
+    assert near.near_spans(its, data, hand, ("stick",), line, s) == [(0, 1000)]
+
+
+def test_sleep_ends_with_the_replay():
+    options = scene().work.model.opt
+    before = int(options.enableflags)
+    with sleeping(scene().work, True):
+        assert options.enableflags & SLEEP
+    assert options.enableflags == before
+    with pytest.raises(IndexError), sleeping(scene().work, True):
+        [][0]
+    assert options.enableflags == before
+    row("oracle", "contact")
+    assert options.enableflags == before
+
+
+def test_contact_is_refused_for_the_ideal_gripper():
+    with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
+        TrialSpec("stick_in_tower", grasp="weld", fidelity="contact")
+
+
+class Restless:
+    """A robot beside parts that move for so many waits."""
+
+    def __init__(self, waits: float):
+        self.scene, self.data, self.waits, self.parts = scene(), fresh(scene().work, shown().layout.start), waits, []
+        self.data.qvel[self.scene.work.dof["stick"]] = 1.0
+
+    def wait(self, seconds, parts=1):
+        assert seconds == LOOK_S
+        self.parts.append(parts)
+        if len(self.parts) >= self.waits:
+            self.data.qvel[:] = 0.0
+
+
+def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
+    forever, soon = Restless(np.inf), Restless(3)
+    for one in (forever, soon):
+        _until_rest(one)
+    assert len(forever.parts) == round(PATIENCE_S / LOOK_S)
+    lengths = [parts for parts, _ in groupby(forever.parts)]
+    assert lengths == [1, 4, 8, 2, 3]
+    assert forever.parts.count(1) * LOOK_S == pytest.approx(0.32)
+    assert soon.parts == [1] * 4, "two looks at rest in a row"
+
+
+@pytest.mark.parametrize(("method", "level", "seed"), [("contact", 4.0, 1), ("paper", 2.0, 64)])
+def test_sticks_that_rocked_for_ever_come_to_rest(method, level, seed):
+    spec = TrialSpec("stick_in_tower", level, level, 1.0, method=method, seed=seed)
+    assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
+
+
+def test_steps_of_another_length_are_for_a_while():
+    model = scene().work.model
+    with pytest.raises(IndexError), timestep(model, 0.0005):
+        [][round(model.opt.timestep / 0.0005) - 1]
+    assert model.opt.timestep == 0.001

@@ -1,0 +1,124 @@
+"""No graphics driver is loaded before the first picture; where none works, one sentence says so."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LOADED = """
+import re, sys
+
+def loaded():
+    libraries = re.findall(r"(?im)/[^/ ]*(?:egl|libgl|gallium|llvm|osmesa|swrast|_dri|libgbm)[^/ ]*$",
+                           open("/proc/self/maps").read())
+    return sorted({*libraries, *(name for name in sys.modules if name.split(".")[0] in ("OpenGL", "glfw"))})
+"""
+REPLAY = """
+import gymnasium, apo_bench
+env = gymnasium.make("APOReplay-v0", scenario="stick_in_tower", level=0.0, careless=0.0, render_mode=MODE)
+env.reset(seed=0)
+info = env.step(0 * env.action_space.sample())[-1]
+scene = env.unwrapped._scene
+"""
+COMPOSE = """
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import build_scene
+scene = build_scene(load_scenario("stick_in_tower"))
+"""
+DRAW = """
+from apo_bench.errors import InputError
+from apo_bench.simulation.scene.render import picture
+for _ in range(2):
+    try:
+        print(picture(scene, {}, 64, 48).shape)
+    except InputError as error:
+        print(error)
+"""
+linux = pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="libraries are read from /proc")
+
+
+def python(code: str, backend: str | None) -> subprocess.CompletedProcess[str]:
+    """Run it in a process without a display, MUJOCO_GL as given."""
+    kept = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY")}
+    kept.pop("WAYLAND_DISPLAY", None)
+    given = {} if backend is None else {"MUJOCO_GL": backend}
+    return subprocess.run(
+        [sys.executable, "-c", code], env={**kept, **given}, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@linux
+def test_a_replay_loads_no_graphics_driver_and_a_picture_is_drawn_afterwards() -> None:
+    code = f"MODE = None{LOADED}{REPLAY}print(loaded(), info['is_success'])\n{DRAW}"
+    code += "print(any('EGL' in name for name in loaded()))\n"
+    done = python(code, "egl")
+    assert (done.returncode, done.stderr) == (0, "")
+    replayed, *drawn = done.stdout.splitlines()
+    assert replayed == "[] True"
+    if "no picture can be drawn here" in drawn[0]:
+        pytest.skip(drawn[0])
+    assert drawn == ["(48, 64, 3)", "(48, 64, 3)", "True"]
+
+
+@linux
+@pytest.mark.parametrize("backend", [None, "osmesa", "glfw", "disable", "nonsense"])
+def test_a_scene_is_composed_under_any_backend_and_a_picture_is_drawn_or_refused(backend: str | None) -> None:
+    done = python(f"{LOADED}{COMPOSE}print(loaded())\n{DRAW}", backend)
+    assert (done.returncode, done.stderr) == (0, "")
+    composed, first, second = done.stdout.splitlines()
+    assert composed == "[]"
+    assert first == second
+    refused = first.startswith("no picture can be drawn here (") and first.endswith("set MUJOCO_GL=egl.")
+    assert refused or (first == "(48, 64, 3)" and backend in (None, "osmesa"))
+
+
+@linux
+def test_nothing_to_draw_with_is_one_sentence() -> None:
+    """Without libEGL, whose bindings then fail as they are imported."""
+    done = python(f"import sys\n{COMPOSE}sys.modules['mujoco.egl'] = None\n{DRAW}", None)
+    assert (done.returncode, done.stderr) == (0, "")
+    first, second = done.stdout.splitlines()
+    assert first == second
+    assert first.startswith("no picture can be drawn here (MUJOCO_GL=egl: ")
+
+
+@linux
+@pytest.mark.parametrize("first", ["mujoco", "mujoco.gl_context", "mujoco.rendering.classic.gl_context"])
+def test_a_context_is_there_for_whoever_asks_for_one(first: str) -> None:
+    """Whichever name is asked first, it is the same class; a name that is not there is none."""
+    ask = f"from {first} import GLContext as asked\n"
+    ask += "import mujoco, mujoco.gl_context\nfrom mujoco.rendering.classic import gl_context as own\n"
+    ask += "print(asked is mujoco.GLContext is mujoco.gl_context.GLContext is own.GLContext, asked.__module__)\n"
+    done = python(f"import apo_bench.simulation\n{ask}print(hasattr(mujoco, 'GLContexts'))\n", "egl")
+    if "libEGL" in done.stderr or "NoneType" in done.stderr:
+        pytest.skip("no EGL")
+    assert (done.returncode, done.stdout) == (0, "True mujoco.egl\nFalse\n"), done.stderr
+
+
+@linux
+def test_what_somebody_else_draws_with_dm_control_is_drawn_as_ever() -> None:
+    draw = (
+        "from dm_control import mjcf\n"
+        "physics = mjcf.Physics.from_mjcf_model(mjcf.RootElement())\n"
+        "try:\n"
+        "    print(physics.render(48, 64).shape)\n"
+        "except ImportError as error:\n"
+        "    print('no EGL')\n"
+    )
+    done = python(COMPOSE + draw, "egl")
+    if done.stdout == "no EGL\n":
+        pytest.skip("no EGL")
+    assert (done.returncode, done.stdout) == (0, "(48, 64, 3)\n"), done.stderr
+
+
+@linux
+def test_a_window_without_a_display_is_one_sentence_and_not_the_end_of_the_process() -> None:
+    code = f"MODE = 'human'\nfrom apo_bench.errors import InputError\ntry:{REPLAY.replace(chr(10), chr(10) + '    ')}\n"
+    done = python(f"{code}\nexcept InputError as error:\n    print(error)\n", None)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("no window can be opened here (")
+    assert done.stdout.count("\n") == 1

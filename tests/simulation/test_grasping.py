@@ -1,0 +1,171 @@
+"""Grasps are chosen from planned poses: nothing is struck, and where one grasp cannot do it two can."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan, Poses, Step
+from apo_bench.assembly.placement import placed
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.intrusion import depths, intrusion
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Grasp
+from apo_bench.simulation.execution.grasping import Place, grasp_at, obstacles, tip_frame
+from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.paths import turn_from, unwound
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from tests.scenes import block
+
+
+@pytest.fixture(scope="module")
+def pockets() -> Scene:
+    return build_scene(load_scenario("pocket_table"))
+
+
+@pytest.fixture(scope="module")
+def fixture() -> Scene:
+    return build_scene(load_scenario("vanished_fixture"))
+
+
+def nominal(scene: Scene, schedule: tuple[Step, ...] = ()) -> Plan:
+    site = scene.scenario.site
+    at = layout_at(scene.scenario, *site.center_m, sum(site.yaw_rad) / 2, clearance_mm=scene.clearance_mm)
+    return Plan(scene.scenario.assembly, at.start, at.goals, schedule)
+
+
+def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float, poses: Poses) -> float:
+    """How deep the gripper is in any part but the moved one."""
+    boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
+    T = T_part @ T_tip
+    around = obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
+    return max(float(depths(boxes, T[:3, :3], T[None, :3, 3], o.boxes, o.T)[0]) for o in around)
+
+
+def test_depths_of_boxes_at_many_places_are_those_of_the_solids() -> None:
+    a, b = block("a"), block("b")
+    T_a, T_b = pose.at((0, 0, 0), (0, 0, 30)), pose.at((0.02, 0.01, 0.03), (10, 0, 0))
+    at = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.01], [0.2, 0.0, 0.0]])
+    found = depths(a.boxes, T_a[:3, :3], at, b.boxes, T_b)
+    for p, depth_m in zip(at, found, strict=True):
+        T = np.array(T_a)
+        T[:3, 3] = p
+        assert max(0.0, depth_m) == pytest.approx(intrusion(a, T, b, T_b), abs=1e-12)
+    assert found[2] < -0.1
+
+
+def test_the_gripper_is_as_wide_as_its_fingers_are_open(pockets: Scene) -> None:
+    for opening in (0.0, 0.02, 0.04):
+        pads = [box for box in gripper_boxes(pockets.kinematics, pockets.arm, opening) if box.center[2] > -0.02]
+        inner = min(abs(box.center[0]) - box.half[0] for box in pads)
+        assert inner == pytest.approx(opening, abs=1e-6)
+
+
+def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
+    """Example of Fig. 6, step 5: no single grasp passes the cubes, so the grip changes between them."""
+    plan = nominal(pockets)
+    move = moves(plan, pockets)[4]
+    first, second = move.transfer.grips
+    left = move.transfer.into.left
+    assert left is not None
+    assert 0.01 < left < 0.05
+    assert first.T_part_tip[0, 3] < -0.05
+    assert abs(second.T_part_tip[0, 3]) < 0.025
+    poses = placed(plan.assembly, plan.start, plan.goals)[4]
+    goal = plan.goals[4]
+    for back in np.linspace(move.transfer.into.travel, left, 60):
+        at = goal @ pose.at((-back, 0, 0))
+        assert depth(pockets, move, at, first.T_part_tip, first.half_width, poses) <= 0.0
+    for back in np.linspace(left, 0.0, 20):
+        at = goal @ pose.at((-back, 0, 0))
+        assert depth(pockets, move, at, second.T_part_tip, second.half_width + 0.008, poses) <= 0.0
+
+
+def test_pulling_out_is_pushing_in_backwards(pockets: Scene) -> None:
+    schedule = (*(Step(k) for k in range(5)), Step(4, undo=True))
+    done = moves(nominal(pockets, schedule), pockets)
+    into, out = done[4].transfer, done[5].transfer
+    assert out.out.left == into.into.left
+    assert [g.T_part_tip[0, 3] for g in out.grips] == [g.T_part_tip[0, 3] for g in reversed(into.grips)]
+    np.testing.assert_allclose(out.T_world_goal, into.T_world_start)
+
+
+def test_a_part_beside_another_is_taken_where_there_is_room_for_the_fingers(fixture: Scene) -> None:
+    plan = nominal(fixture)
+    poses = placed(plan.assembly, plan.start, plan.goals)[2]
+    place = Place(poses["cube"], obstacles(plan.assembly.solids, poses, ("cube",)))
+    found = grasp_at(fixture, "cube", Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0])), [place])
+    assert abs(found.across[0]) == 1.0
+
+
+def test_a_clear_preferred_grasp_is_kept(fixture: Scene) -> None:
+    plan = nominal(fixture)
+    preferred = Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0]))
+    place = Place(plan.start["cube"], obstacles(plan.assembly.solids, plan.start, ("cube",)))
+    assert grasp_at(fixture, "cube", preferred, [place]) is preferred
+
+
+def test_the_tip_looks_down_however_the_part_lies() -> None:
+    for turn in ((0, 0, 30), (180, 0, 0), (0, 90, 0)):
+        T = pose.at((0, 0, 0), turn)
+        across = T[:3, :3].T @ np.array([0.6, 0.8, 0.0])
+        tip = T @ tip_frame(Grasp(np.zeros(3), across), T)
+        np.testing.assert_allclose(tip[:3, 2], [0, 0, -1], atol=1e-12)
+        np.testing.assert_allclose(tip[:3, 0], [0.6, 0.8, 0], atol=1e-12)
+        assert np.linalg.det(tip[:3, :3]) == pytest.approx(1.0)
+
+
+def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
+    schedule = (*(Step(k) for k in range(4)), Step(3, undo=True))
+    done = moves(nominal(fixture, schedule), fixture)
+    towards = fixture_side(fixture)
+    (side,) = done[2].transfer.sides
+    np.testing.assert_allclose(side, towards, atol=1e-9)
+    (back,) = done[4].transfer.sides
+    np.testing.assert_allclose(back, -towards, atol=1e-9)
+    assert not done[0].transfer.sides
+    assert not done[3].transfer.sides
+    (away,) = done[3].transfer.away
+    np.testing.assert_allclose(away, towards, atol=1e-9)
+    assert not any(move.transfer.away for move in (*done[:3], done[4]))
+
+
+def fixture_side(scene: Scene) -> Array:
+    """From castle 2 to the cube."""
+    return nominal(scene).goals[2][:3, 1]
+
+
+def test_a_part_that_matters_both_ways_is_centred_once_more(pockets: Scene) -> None:
+    """Cube 2 of Fig. 6: its place along the stick and across it; cube 3 is settled by fingers and slide."""
+    done = moves(nominal(pockets), pockets)
+    assert [len(move.transfer.centring) for move in done] == [0, 1, 0, 0, 0, 0]
+    held, centred = done[1].transfer.grips[0].T_part_tip, done[1].transfer.centring[0].T_part_tip
+    assert abs(held[:3, 0] @ centred[:3, 0]) < 1e-9
+
+
+def test_a_group_is_lifted_not_pulled_out(pockets: Scene) -> None:
+    done = moves(nominal(pockets), pockets)
+    assert done[5].transfer.carried == ("cube2", "cube3")
+    assert not done[5].transfer.out.level
+    assert done[5].transfer.weight_n == pytest.approx(9.81 * (0.0528 + 2 * 0.063), rel=0.06)
+
+
+def test_undoing_and_doing_again_at_once_is_one_move(fixture: Scene) -> None:
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    plan = nominal(fixture, schedule)
+    done = moves(plan, fixture)
+    assert [move.step for move in done] == [Step(0), Step(1), Step(1), Step(2)]
+    np.testing.assert_allclose(done[2].transfer.T_world_start, plan.goals[1])
+
+
+def test_a_wrist_turns_back_instead_of_winding_up() -> None:
+    rest = pose.at((0, 0, 0.3), (180, 0, 0))
+    start, end = (pose.at((x, 0, 0), (0, 0, turn)) @ rest for x, turn in ((0.0, 100), (0.2, -110)))
+    middle, last = unwound(rest, start, end)
+    assert np.array_equal(last, end)
+    assert np.degrees(turn_from(rest, middle)) == pytest.approx(-5)
+    np.testing.assert_allclose(middle[:3, 3], (0.1, 0, 0.3), atol=1e-12)
+    assert len(unwound(rest, start, pose.at((0, 0, 0), (0, 0, -70)) @ rest)) == 1

@@ -1,0 +1,44 @@
+"""Pictures without a display, several renderers beside each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.scene.render import Film, picture, save_film, view
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import fresh
+
+SIZE = (160, 120)
+
+
+def test_a_picture_shows_where_the_parts_are(tower: Scene) -> None:
+    layout = draw_layout(tower.scenario, np.random.default_rng(0))
+    before = picture(tower, layout.start, *SIZE)
+    after = picture(tower, {**layout.start, "castle1": layout.goals[0]}, *SIZE)
+    assert before.shape == (120, 160, 3)
+    assert np.abs(before.astype(int) - after).max() > 50
+    assert np.array_equal(before, picture(tower, layout.start, *SIZE))
+
+
+def test_the_end_of_one_film_does_not_spoil_the_next(tower: Scene) -> None:
+    data = fresh(tower.work, draw_layout(tower.scenario, np.random.default_rng(0)).start)
+    first = Film(tower, width=SIZE[0], height=SIZE[1], camera=view(np.zeros(3), 1.0))
+    first(data)
+    second = Film(tower, width=SIZE[0], height=SIZE[1], camera=view(np.zeros(3), 1.0))
+    first.close()
+    second(data)
+    assert np.array_equal(first.frames[0], second.frames[0])
+
+
+def test_films_are_written_by_their_ending(tmp_path: Path) -> None:
+    frames = [np.full((64, 64, 3), v, dtype=np.uint8) for v in (0, 128, 255)]
+    for name in ("a.mp4", "b.gif"):
+        save_film(frames, tmp_path / name, fps=10)
+        assert (tmp_path / name).stat().st_size > 100
+    with pytest.raises(InputError, match=r"ends in \.mp4 or \.gif"):
+        save_film(frames, tmp_path / "c.avi", fps=10)

@@ -1,0 +1,167 @@
+"""Feeling for a hole: what it finds, what it does not, and that it changes nothing where no hole is missed."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.records.settings import TrialSpec
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.replay_cache import Branches
+from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
+from apo_bench.simulation.robot.robot import Guard, Robot
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.stages import attempt, show
+from apo_bench.trial.trial import run_trial
+
+STEP_S = 0.001
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@cache
+def scene(name):
+    return build_scene(load_scenario(name))
+
+
+@cache
+def shown(name):
+    return show(scene(name), 0.0, 1)
+
+
+def layout(name):
+    return shown(name).layout
+
+
+def aside(name, mm):
+    """The true plan, but for its last operation, which is this far off across the walls of its fit."""
+    truth, goals = layout(name), np.array(layout(name).goals)
+    goals[-1, :3, 3] += 1e-3 * mm * goals[-1, :3, 1]
+    return Plan(scene(name).scenario.assembly, truth.start, goals)
+
+
+def carried_out(plan, name, searches, branches=None):
+    return attempt(plan, scene(name), layout(name).goals, None, "contact", branches, searches)
+
+
+def driven(law, push):
+    """Where a law leads under a force that depends on where it has led, (k, 3)."""
+    path = [np.zeros(3)]
+    while (at := law(push(path[-1]))) is not None:
+        path.append(at)
+        assert len(path) < 100_000
+    return np.array(path)
+
+
+def test_a_peg_off_by_more_than_the_play_finds_its_hole_only_by_searching():
+    name, plan = "vanished_fixture", aside("vanished_fixture", 0.6)
+    blind, felt = (carried_out(plan, name, searches) for searches in (False, True))
+    assert not blind.verdict.success
+    assert felt.verdict.success
+    assert felt.result.sim_seconds > blind.result.sim_seconds
+    again = carried_out(plan, name, True)
+    assert again.result.sim_seconds == felt.result.sim_seconds
+    for part, T in felt.result.reached.final.poses.items():
+        assert again.result.reached.final.poses[part].tobytes() == T.tobytes()
+
+
+def test_what_is_farther_off_than_the_spiral_is_not_found():
+    plan = aside("stick_in_tower", 5.0)
+    found = carried_out(plan, "stick_in_tower", True)
+    assert (found.result.outcome.stage, found.result.outcome.code) == ("attach", "force_stop")
+    assert not found.verdict.success
+    assert found.result.sim_seconds < carried_out(plan, "stick_in_tower", False).result.sim_seconds + 30.0
+
+
+def row(method, level, branches=None):
+    spec = TrialSpec("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
+    return run_trial(spec, scene("stick_in_tower"), shown=shown("stick_in_tower"), branches=branches)
+
+
+def test_where_no_hole_is_missed_nothing_changes():
+    plain, felt = row("oracle", 0.0), row("oracle+search", 0.0)
+    assert plain.pop("method") == "oracle"
+    assert felt.pop("method") == "oracle+search"
+    assert json.dumps(felt) == json.dumps(plain)
+
+
+def test_shared_beginnings_change_no_byte():
+    asked = [("none", 0.1), ("search", 0.1), ("contact+search", 0.1), ("contact", 0.1), ("search", 0.1), ("none", 0.1)]
+    branches = Branches()
+    shared = [json.dumps(row(*each, branches)) for each in asked]
+    alone = [json.dumps(row(*each)) for each in asked[:4]]
+    assert shared == [*alone, alone[1], alone[0]]
+    none, search = (json.loads(each) for each in alone[:2])
+    assert (none["failure_code"], none["spec_hash"]) == ("force_stop", search["spec_hash"])
+    assert search["sim_seconds"] > none["sim_seconds"]
+    assert none["predicted"] == search["predicted"]
+
+
+def test_holes_are_felt_for_where_parts_are_inserted():
+    plan = aside("carried_bridge", 0.0)
+    done = [move.transfer for move in moves(plan, scene("carried_bridge"), searches=True)]
+    assert [t.front is not None for t in done] == [False, False, False, True, True]
+    stick, cube = done[3:]
+    assert abs(stick.front[0]) == pytest.approx(0.11, abs=1e-3), "the end of the stick, less the clearance"
+    assert np.abs(stick.front[1:]).max() == pytest.approx(0.0, abs=1e-9)
+    assert cube.front[2] == pytest.approx(-0.025, abs=1e-3), "the bottom of the cube"
+    assert all(move.transfer.front is None for move in moves(plan, scene("carried_bridge")))
+
+
+@pytest.mark.parametrize("way", [DOWN, np.array([0.6, -0.8, 0.0])])
+def test_a_spiral_leaves_no_place_out(way):
+    press = 0.4
+    path = driven(Spiral(Guard(way, 2.0), press, RADIUS_M, 0.001, STEP_S), lambda _: -press * way)
+    assert np.abs(path @ way).max() < 1e-5, "until the force is felt it goes ahead"
+    rng = np.random.default_rng(0)
+    flat = path - (path @ way)[:, None] * way
+    for _ in range(200):
+        place = rng.normal(size=3)
+        place -= (place @ way) * way
+        place *= (RADIUS_M - PITCH_M) * np.sqrt(rng.random()) / np.linalg.norm(place)
+        assert np.linalg.norm(flat - place, axis=1).min() < 0.55 * PITCH_M, "half the pitch, and a tenth for its steps"
+    assert np.linalg.norm(flat, axis=1).max() < RADIUS_M + PITCH_M
+
+
+def test_a_spiral_ends_in_a_hole_against_walls_and_in_time():
+    def made():
+        return Spiral(Guard(DOWN, 2.0), 0.4, RADIUS_M, 0.0015, STEP_S)
+
+    free = made()
+    path = driven(free, lambda _: np.zeros(3))
+    assert free.found
+    assert np.abs(path[:, :2]).max() == 0.0
+    hole = made()
+    path = driven(hole, lambda at: (0.0, 0.0, 0.4 if np.hypot(at[0] - 0.0009, at[1]) > 0.00025 else 0.0))
+    assert hole.found
+    assert np.hypot(path[-1, 0] - 0.0009, path[-1, 1]) < 0.00025
+    held = made()
+    assert len(driven(held, lambda _: np.array([5.0, 0.0, 0.4]))) < 50
+    assert not held.found
+    rattles = made()
+    signs = iter(np.tile([0.3, 0.0], 10**6))
+    assert len(driven(rattles, lambda _: np.array([0.0, 0.0, next(signs)]))) < 20_000
+
+
+def test_easing_gives_way_and_stops():
+    easing = Easing(Guard(DOWN, 2.0), 0.01, STEP_S)
+    path = driven(easing, lambda at: 1e4 * (np.array([0.0002, 0.0, 0.0]) - at) * [1.0, 1.0, 0.0])
+    assert not easing.stopped
+    assert path[-1] == pytest.approx([0.0002, 0.0, -0.01], abs=1e-4), (
+        "to the middle of what pushes, and as deep as asked"
+    )
+    stopped = Easing(Guard(DOWN, 2.0), 0.01, STEP_S)
+    assert len(driven(stopped, lambda _: np.array([0.0, 0.0, 3.0]))) < 50
+    assert stopped.stopped
+
+
+def test_the_tip_goes_where_a_law_says():
+    its = scene("stick_in_tower")
+    robot = Robot(its, layout("stick_in_tower").start)
+    before, asked = robot.T, iter([np.array([1e-3, -1e-3, 1e-3]) * s for s in np.linspace(0.0, 1.0, 200)])
+    robot.servo(lambda _: next(asked, None))
+    assert robot.T[:3, 3] - before[:3, 3] == pytest.approx([1e-3, -1e-3, 1e-3])
+    reached = its.kinematics.forward(robot.q)
+    assert reached == pytest.approx(robot.T, abs=2e-5), "straight joint motions leave the line by some micrometres"

@@ -1,0 +1,70 @@
+"""Calibration: what rows say about coverage, alarms and culprits; rows of the schema before are still read."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.records.fields import ROW_FIELDS
+from apo_bench.records.run_folder import read_rows
+from apo_bench.report.report import report
+from apo_bench.report.tables.calibration import calibration_lines
+from apo_bench.statistics.calibration import calibrations
+from apo_bench.trial.confidence import UNKNOWN
+from apo_bench.trial.recognised import UNCOUNTED
+from tests import pages
+from tests.statistics.test_rates import row, write
+
+
+def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
+    """What calibration looks at in the row of a corrector with a test."""
+    said = {"test_passes": passes, "p_value": 0.5 if passes else 1e-6, "suspects": list(suspects)}
+    errors = {"planned_error_fixed_mm": 0.3 + 0.1 * seed, "planned_error_free_mm": 2.0, "inside_95": seed > 0}
+    return row("contact", seed=seed) | said | errors | more
+
+
+def test_calibration_counts_coverage_alarms_and_culprits() -> None:
+    wrong = {"relations": "shifted:3", "wrong_relation": "R2"}
+    rows = [
+        *(row("oracle", seed=0), row("none", seed=0), row(seed=0, level=None, level_deg=None, careless=None)),
+        *(
+            corrected(0, True),
+            corrected(1, False, ("R1",)),
+            corrected(2, True, inside_95=None),
+            row("contact", 3, None),
+        ),
+        *(
+            corrected(0, True, **wrong),
+            corrected(1, False, ("R1", "R2"), **wrong),
+            corrected(2, False, ("R3",), **wrong),
+        ),
+        corrected(3, False, ("R3",), **wrong | {"relations": "missed", "wrong_relation": None}),
+    ]
+    raw, right, missed, shifted = calibrations(rows)
+    assert (raw.method, raw.covered, raw.failed_tests, raw.fixed_mm) == ("none", (0, 0), (0, 0), None)
+    assert (right.covered, right.failed_tests, right.culprits) == ((1, 2), (1, 3), (0, 0))
+    assert right.fixed_mm == pytest.approx(math.sqrt((0.09 + 0.16 + 0.25) / 3))
+    assert right.fixed_over_clearance == pytest.approx(right.fixed_mm / 0.25)
+    assert right.free_mm == 2.0
+    assert (shifted.failed_tests, shifted.culprits) == ((2, 3), (1, 2))
+    assert (missed.failed_tests, missed.culprits) == ((1, 1), (0, 0))
+    lines = "\n".join(calibration_lines((raw, right, missed, shifted)))
+    assert "| none | 0 | – | – | – | – | – | – |" in lines
+    assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 mm | 1.63 | 2 mm | 66.7 % of 3 | 50.0 % of 2 |" in lines
+
+
+def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:
+    unsaid = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "arm": "six_axis", "timestep_s": 0.001}
+    old = {k: v for k, v in row().items() if k not in unsaid} | {"schema": "apo-bench/row/2"}
+    new = row() | {"seed": 1, "schema": "apo-bench/row/3"}
+    folder = write(tmp_path / "old", [old, new])
+    empty = dict.fromkeys(ROW_FIELDS)
+    today = {"success": None, "as_demonstrated": True}
+    assert read_rows(folder) == [{**empty, **unsaid, **old, **today}, {**empty, **unsaid, **new, **today}]
+    assert "stick_in_tower, careless human, 0.25 mm clearance" in pages.words(report(folder).page)
+    with pytest.raises(InputError, match="a row of schema 'apo-bench/row/1' was given"):
+        read_rows(write(tmp_path / "older", [old | {"schema": "apo-bench/row/1"}]))

@@ -1,0 +1,321 @@
+"""Rates, intervals, the table and the figure."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from statsmodels.stats.proportion import proportion_confint
+
+from apo_bench.errors import InputError
+from apo_bench.records.settings import ROW
+from apo_bench.report.figures.levels import OTHERS, STYLES, draw, rows_of
+from apo_bench.report.report import COLUMNS, report
+from apo_bench.report.tables.confusion import summary
+from apo_bench.statistics.confusion import Confusion, confusions
+from apo_bench.statistics.effort import Effort, efforts
+from apo_bench.statistics.rates import Rate, place_of, tally, wilson
+from apo_bench.trial.confidence import UNKNOWN
+from tests import pages
+
+
+def row(method: str = "none", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:
+    """What statistics looks at in a row."""
+    failed = success is False
+    return {
+        "schema": ROW,
+        "scenario": "stick_in_tower",
+        "clearance_mm": 0.25,
+        "careless": 0.0 if method == "oracle" else 1.0,
+        "level": 0.0 if method == "oracle" else 1.0,
+        "level_deg": 0.0 if method == "oracle" else 1.0,
+        "noise": "isotropic",
+        "relations": "given",
+        "grasp": "friction",
+        "fidelity": "full",
+        "method": method,
+        "seed": seed,
+        **UNKNOWN,
+        "demonstration": "demonstration_failed" if success is None else "ok",
+        "success": success,
+        "as_demonstrated": success,
+        "loose_success": success,
+        "failure_stage": "attach" if failed else None,
+        "failure_code": "force_stop" if failed else None,
+        "failure_operation": 3 if failed else None,
+        "predicted": None if success is None else foretold(failed),
+        "extra_operations": None if success is None else 0,
+        "sim_seconds": None if success is None else 20.0,
+        "pushed_mm": None if success is None else 0.1,
+    } | more
+
+
+def foretold(fails: bool, operation: int = 3) -> dict[str, Any]:
+    """What a plan said about itself."""
+    code, size = ("residual", 2.0) if fails else ("ok", 0.1)
+    return {"fails": fails, "operation": operation if fails else None, "code": code, "size_mm": size}
+
+
+def write(folder: Path, rows: list[dict[str, Any]]) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "trials.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
+    return folder
+
+
+@settings(max_examples=50, deadline=None)
+@given(n=st.integers(1, 3000), data=st.data())
+def test_wilson_solves_its_equation(n: int, data: st.DataObject) -> None:
+    """Its ends are the rates p with (k/n - p)^2 = z^2 p (1 - p) / n."""
+    k = data.draw(st.integers(0, n))
+    low, high = wilson(k, n)
+    z2 = 1.959963984540054**2
+    assert 0.0 <= low <= k / n <= high <= 1.0
+    for p, at_border in ((low, k == 0), (high, k == n)):
+        if at_border:
+            assert p == pytest.approx(k / n, abs=1e-12)
+        else:
+            assert (k / n - p) ** 2 == pytest.approx(z2 * p * (1 - p) / n, rel=1e-9)
+
+
+def test_wilson_golden_values() -> None:
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert wilson(100, 100) == pytest.approx((0.9630, 1.0), abs=5e-5)
+    assert wilson(97, 100) == pytest.approx((0.9155, 0.9897), abs=5e-5)
+    assert wilson(1, 2) == pytest.approx((0.0945, 0.9055), abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "expected"),
+    [(81, 263, (0.2553, 0.3662)), (15, 148, (0.0624, 0.1605)), (0, 20, (0.0, 0.1611)), (1, 29, (0.0061, 0.1718))],
+)
+def test_wilson_published_examples(successes: int, trials: int, expected: tuple[float, float]) -> None:
+    """Table I, method 3, of R. G. Newcombe, Two-sided confidence intervals for the single proportion, Statistics in
+    Medicine 17 (1998), 857-872."""
+    assert wilson(successes, trials) == pytest.approx(expected, abs=5e-5)
+    assert wilson(successes, trials) == pytest.approx(proportion_confint(successes, trials, method="wilson"), abs=1e-12)
+
+
+def test_what_was_not_executed_is_a_failure_and_stands_beside() -> None:
+    """Nothing corrected, nothing seen or a dead worker: failures; of those whose plan was carried out, 3 of 4."""
+    stages = {1: "correct", 2: "observe", 3: "worker", 4: "judge"}
+    rows = [row(seed=i, success=i not in stages, failure_stage=stages.get(i)) for i in range(8)]
+    (cell,) = tally([*rows, row(seed=9, success=None)])
+    assert (cell.trials, cell.successes, cell.not_executed, cell.excluded) == (8, 4, 3, 1)
+    assert (cell.rate, cell.executed, cell.executed.rate) == (0.5, (4, 5), 0.8)
+    assert cell.executed.interval == wilson(4, 5)
+    assert Rate(0, 0).rate is None
+
+
+def test_grasp_and_fidelity_are_axes_and_older_rows_are_full() -> None:
+    older = row()
+    del older["fidelity"]
+    rows = [older, row(fidelity="contact"), row(grasp="weld")]
+    assert [(c.grasp, c.fidelity) for c in tally(rows)] == [
+        ("friction", "full"), ("friction", "contact"), ("weld", "full")
+    ]  # fmt: skip
+    assert place_of(row(level=None)) is None
+
+
+def test_a_trial_that_is_there_twice_is_refused() -> None:
+    with pytest.raises(InputError, match="seed 3"):
+        tally([row(seed=3), row(seed=4), row(seed=3, success=False)])
+
+
+def test_rows_are_counted_into_cells() -> None:
+    rows = [
+        row(seed=0),
+        row(seed=1, success=False, loose_success=True),
+        row(seed=2, success=False),
+        row(seed=3, success=None),
+        row(seed=4, success=False, failure_stage="judge", failure_code="gap"),
+        row("oracle", seed=0),
+        row(seed=0, level=None, level_deg=None, careless=None),
+    ]
+    ceiling, raw = tally(rows)
+    assert (ceiling.method, ceiling.trials, ceiling.rate) == ("oracle", 1, 1.0)
+    assert (raw.trials, raw.successes, raw.loose_successes, raw.excluded) == (4, 1, 2, 1)
+    assert list(raw.failures.items()) == [("attach: force_stop", 2), ("judge: gap", 1)]
+    assert raw.rate == 0.25
+    assert raw.interval == wilson(1, 4)
+
+
+def test_methods_are_sorted_as_a_reader_looks_for_them() -> None:
+    given = ("minimal", "paper-track", "last-only", "paper", "none", "oracle")
+    assert [c.method for c in tally([row(method) for method in given])] == [
+        *("oracle", "none", "paper", "paper-track", "last-only", "minimal")
+    ]
+
+
+def test_predictions_are_counted_against_physics() -> None:
+    rows = [
+        row(seed=0),
+        row(seed=1, predicted=foretold(True)),
+        row(seed=2, success=False),
+        row(seed=3, success=False, predicted=foretold(True, 2)),
+        row(seed=4, success=False, failure_stage="judge", failure_code="gap", failure_operation=None),
+        row(seed=5, success=False, predicted=foretold(False)),
+        row(seed=6, success=False, failure_stage="correct", failure_operation=None, predicted=None),
+        row(seed=7, success=None),
+        row("oracle", seed=0),
+        row(seed=0, scenario="stick_on_castles", level=None, level_deg=None, careless=None),
+    ]
+    ceiling, raw, measured, everything = confusions(rows)
+    assert raw == Confusion(
+        *("stick_in_tower", "none"), fit_fitted=1, fit_failed=1, fail_fitted=1, fail_failed=3, same_operation=1,
+        stopped=2, not_executed=1, excluded=1,
+    )  # fmt: skip
+    assert (raw.executed, raw.right, raw.agreement) == (6, 4, 4 / 6)
+    assert (ceiling.method, ceiling.agreement, measured.scenario) == ("oracle", 1.0, "stick_on_castles")
+    assert (everything.scenario, everything.method, everything.executed) == ("all", "all", 8)
+    assert everything.agreement == 6 / 8
+    assert summary(everything) == (
+        "Predicted: 75.0 % of 8 executed trials ended as foretold (counted by as_demonstrated); failures that were not "
+        "foretold: 1, warnings that were wrong: 1."
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    results=st.lists(st.tuples(st.sampled_from([True, False, None]), st.booleans(), st.booleans()), max_size=20),
+)
+def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | None, bool, bool]]) -> None:
+    rows = [
+        row("paper" if i % 2 else "none", seed=i, success=s, predicted=foretold(fails) if s or said else None)
+        for i, (s, fails, said) in enumerate(results)
+    ]
+    *parts, everything = confusions(rows)
+    assert everything.executed + everything.not_executed + everything.excluded == len(rows)
+    for field in ("fit_fitted", "fit_failed", "fail_fitted", "fail_failed", "not_executed", "excluded"):
+        assert sum(getattr(c, field) for c in parts) == getattr(everything, field)
+
+
+def test_without_an_executed_trial_nothing_agrees() -> None:
+    (_, everything) = confusions([row(success=None)])
+    assert (everything.agreement, everything.excluded) == (None, 1)
+    assert "nothing" in summary(everything)
+
+
+def test_a_cell_whose_demonstrations_all_failed_has_no_rate() -> None:
+    (cell,) = tally([row(success=None)])
+    assert (cell.trials, cell.excluded, cell.rate, cell.loose_rate, cell.interval) == (0, 1, None, None, (0.0, 1.0))
+
+
+@settings(max_examples=30, deadline=None)
+@given(results=st.lists(st.sampled_from([True, False, None]), max_size=30), order=st.randoms())
+def test_every_row_is_counted_once_in_any_order(results: list[bool | None], order: Any) -> None:
+    rows = [row("paper" if i % 2 else "none", seed=i, success=s) for i, s in enumerate(results)]
+    shuffled = list(rows)
+    order.shuffle(shuffled)
+    cells = tally(rows)
+    assert sum(c.trials + c.excluded for c in cells) == len(rows)
+    assert [(c.method, c.trials, c.successes, c.excluded) for c in tally(shuffled)] == [
+        (c.method, c.trials, c.successes, c.excluded) for c in cells
+    ]
+
+
+def test_clearances_levels_and_carelessness_are_cells_of_their_own() -> None:
+    rows = [row(), row(clearance_mm=0.5), row(level_deg=0.0), row(careless=0.0), row(scenario="stick_on_castles")]
+    assert len(tally(rows)) == 5
+
+
+def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
+    rows = [row("oracle", seed=i) for i in range(4)]
+    for level in (0.0, 0.5, 1.0):
+        rows += [row(seed=i, success=i < 1, level=level, level_deg=level) for i in range(4)]
+        rows += [row("paper", seed=i, success=None if i == 3 else True, level=level, level_deg=level) for i in range(4)]
+    made = report(write(tmp_path / "run", rows))
+    table = list(csv.DictReader(made.table.open()))
+    assert tuple(table[0]) == COLUMNS
+    assert [(line["method"], line["level_mm"], line["trials"], line["successes"]) for line in table] == [
+        ("oracle", "0.0", "4", "4"),
+        *(("none", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
+        *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
+    ]
+    assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
+    assert made.figure is not None
+    assert made.figure.read_bytes().startswith(b"\x89PNG")
+    page = pages.lines(made.page)
+    assert "| method, level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
+    assert "| none | 25.0 % 4.6 to 69.9 % n 4 | 25.0 % 4.6 to 69.9 % n 4 |" in page
+    assert "| paper | 100.0 % 43.9 to 100.0 % n 3 | 100.0 % 43.9 to 100.0 % n 3 |" in page
+    assert "| stick_in_tower | none | 12 | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
+    assert "| all | all | 25 | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
+    confusion = list(csv.DictReader(made.confusion.open()))
+    assert [line["method"] for line in confusion] == ["oracle", "none", "paper", "all"]
+    assert (confusion[1]["predicted_fail_failed"], confusion[2]["excluded"]) == ("9", "3")
+
+
+def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
+    """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
+    levels = ({"level": x, "level_deg": x} for x in (0.0, 0.5, 2.0))
+    rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("none", "paper")]
+    rows += [row("paper", clearance_mm=c, relations="missed") for c in (0.25, 1.0)]
+    cells = tally(rows)
+    assert {(c.clearance_mm, c.level, c.tightness) for c in cells if c.method == "none"} == {
+        *((0.25, 0.0, None), (1.0, 0.0, None), (0.25, 0.5, 0.5), (0.25, 2.0, 0.125), (1.0, 0.5, 2.0), (1.0, 2.0, 0.5))
+    }
+    made = report(write(tmp_path / "run", rows))
+    assert made.tightness is not None
+    assert made.tightness.read_bytes().startswith(b"\x89PNG")
+    assert "Success over tightness" in pages.words(made.page)
+    table = list(csv.DictReader(made.table.open()))
+    assert {line["tightness"] for line in table} == {"", "0.5", "0.125", "2.0", "0.25", "1.0"}
+    assert report(write(tmp_path / "one", [row(), row("paper")])).tightness is None
+    rows_drawn = rows_of(cells)
+    assert [(r.clearance_mm, r.relations) for r in rows_drawn] == [
+        *((0.25, "given"), (0.25, "missed"), (1.0, "given"), (1.0, "missed"))
+    ]
+    assert [sum(r.holds(c) for c in cells) for r in rows_drawn] == [6, 4, 6, 4]
+
+
+def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) -> None:
+    from imageio.v3 import improps
+
+    few = report(write(tmp_path / "few", [row(), row("oracle")]))
+    more = [row(scenario=s, careless=f) for s in ("stick_in_tower", "stick_on_castles") for f in (0.0, 1.0)]
+    many = report(write(tmp_path / "many", more))
+    assert few.figure is not None
+    assert many.figure is not None
+    low, wide = improps(few.figure).shape[:2], improps(many.figure).shape[:2]
+    assert wide[0] > low[0] + 300
+    assert wide[1] > low[1] + 300
+
+
+def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
+    every = [*STYLES.values(), *OTHERS]
+    assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
+    methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
+    draw(tally([row(method) for method in methods]), tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no sweep"):
+        report(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no finished trial"):
+        report(write(tmp_path / "empty", []))
+    with pytest.raises(InputError, match=r"line 2, field schema: it is missing"):
+        report(write(tmp_path / "bad", [row(), {"seed": 1}]))
+    with pytest.raises(InputError, match="row of schema 'apo-bench/row/1'"):
+        report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))
+
+
+def test_effort_counts_what_was_right() -> None:
+    rows = [
+        row("paper", 0),
+        row("paper-track", 0, extra_operations=2, sim_seconds=26.0, pushed_mm=0.3),
+        row("paper-track", 1, extra_operations=4, sim_seconds=28.0, pushed_mm=0.2),
+        row("paper-track", 2, success=False, extra_operations=9, sim_seconds=99.0, pushed_mm=9.0),
+        row("none", 0, success=False),
+    ]
+    assert efforts(rows) == (
+        Effort("stick_in_tower", "paper", 1, 0.0, 20.0, 0.1),
+        Effort("stick_in_tower", "paper-track", 2, 3.0, 27.0, 0.3),
+    )
+    assert efforts([]) == ()

@@ -1,0 +1,444 @@
+"""Worker processes: correctors that die, hang or raise cost one trial each, whoever else is at work."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+from apo_bench.records.limits import USUAL_LIMITS, Limits
+from apo_bench.records.replay_command import replay_command
+from apo_bench.records.run_file import read_run
+from apo_bench.records.settings import TrialSpec
+from apo_bench.report.page.ran import limits_of
+from apo_bench.report.report import report
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
+from apo_bench.sweeps.local import member as crew_member
+from apo_bench.sweeps.local.pool import MOST_FALSE_STARTS, spread
+from apo_bench.sweeps.stopping import Stopped, listening
+from apo_bench.sweeps.sweep import sweep
+from apo_bench.sweeps.worker import Worker, lost, misbehaved
+from apo_bench.trial.fingerprint import content_hash
+from tests import pages
+
+CODE = """
+import ctypes, os, shutil, subprocess, sys, time
+
+def dies_of_b(seen):
+    if "B" in seen.assembly.solids:
+        os._exit(3)
+    raise KeyError("many")
+
+def hangs(seen):
+    subprocess.run(["sleep", "86399"])
+
+def raises(seen):
+    raise ZeroDivisionError(object())
+
+def halves(seen):
+    raise ValueError("half a letter: \\ud800")
+
+def forks(seen):
+    os.fork()
+    raise ValueError("twice")
+
+def ends(seen):
+    os._exit(0)
+
+def removes(seen):
+    shutil.rmtree("run")
+    raise ValueError("gone")
+
+def nonsense(seen):
+    return "goals"
+
+def interrupts(seen):
+    raise KeyboardInterrupt
+
+def talks(seen):
+    print("from Python")
+    print("from behind", file=sys.__stdout__)
+    os.write(1, b"from below")
+    ctypes.CDLL(None).printf(b"from C")
+    return seen.goals
+
+def slow(seen):
+    time.sleep(0.2)
+    raise ValueError("slow")
+"""
+FOLDERS = pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+
+
+@pytest.fixture(autouse=True)
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (tmp_path / "unruly.py").write_text(CODE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield
+    sys.modules.pop("unruly", None)
+
+
+def grid(*methods: str, scenarios: tuple[str, ...] = ("block_on_block",), **more: Any) -> SweepSpec:
+    """Trials that end before the arm moves, but for its own."""
+    return SweepSpec(scenarios, (1.0,), (0.0,), tuple(f"unruly:{m}" for m in methods), **{"trials": 1} | more)
+
+
+def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]]:
+    return {
+        (row["scenario"], row["method"].removeprefix("unruly:")): (row["failure_stage"], row["failure_code"])
+        for row in rows
+    }
+
+
+def test_what_a_corrector_says_can_be_written_as_text(tmp_path: Path) -> None:
+    (said,) = sweep(grid("halves"), tmp_path / "rows")
+    assert "half a letter" in said["sentence"]
+    said["sentence"].encode()
+
+
+def test_a_corrector_that_forks_has_one_row(tmp_path: Path) -> None:
+    rows = sweep(grid("forks", "raises", trials=2), tmp_path / "rows", workers=1)
+    assert sorted((row["seed"], row["method"]) for row in rows) == [
+        (seed, f"unruly:{method}") for seed in (0, 1) for method in ("forks", "raises")
+    ]
+    assert {row["failure_code"] for row in rows} == {"raised"}
+
+
+def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: Path) -> None:
+    asked = grid("raises", "dies_of_b", "nonsense", scenarios=("block_on_block", "stick_in_tower"), trials=2)
+    one = sweep(asked, tmp_path / "one", workers=1)
+    four = sweep(asked, tmp_path / "four", workers=4)
+    assert endings(one) == {
+        **{
+            (scenario, method): ("correct", "raised")
+            for scenario in asked.scenarios
+            for method in ("raises", "nonsense")
+        },
+        ("stick_in_tower", "dies_of_b"): ("correct", "raised"),
+        ("block_on_block", "dies_of_b"): ("worker", "worker_died"),
+    }
+    assert len(one) == 2 * 2 * 3
+    assert all(row["success"] is False for row in one)
+    assert sorted(map(json.dumps, one)) == sorted(map(json.dumps, four))
+    timing = [json.loads(text) for text in (tmp_path / "four" / "timing.jsonl").read_text().splitlines()]
+    assert len(timing) == len(four)
+    assert {t["worker"] for t in timing} <= {0, 1, 2, 3}
+
+
+def test_an_interrupt_of_the_correctors_own_is_an_error_that_it_raised(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rows = sweep(grid("interrupts", "raises"), tmp_path / "run", workers=1)
+    assert endings(rows) == {
+        ("block_on_block", "interrupts"): ("correct", "raised"),
+        ("block_on_block", "raises"): ("correct", "raised"),
+    }
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> None:
+    """The clock is looked at every half second."""
+    rows = sweep(grid("slow", trials=2), tmp_path / "late", workers=1, limit_s=0.05)
+    assert {(row["failure_stage"], row["failure_code"]) for row in rows} == {("worker", "time_limit")}
+    for row in rows:
+        spec = TrialSpec("block_on_block", careless=0.0, method="unruly:slow", seed=row["seed"])
+        same = {name: row[name] for name in ("spec_hash", "clearance_mm")}
+        assert row == {**lost(spec, "", "time_limit"), **same}
+
+
+def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Limits = USUAL_LIMITS) -> dict[str, Any]:
+    """The row that the command of a row prints."""
+    assert main([*shlex.split(replay_command(row, None, limits))[1:], "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = sweep(grid("raises", "nonsense", "dies_of_b"), tmp_path / "run", workers=1)
+    assert {row["failure_code"] for row in rows} == {"raised", "worker_died"}
+    for row in rows:
+        assert ("--trial-limit 600" in replay_command(row)) is (row["failure_stage"] == "worker")
+        assert replayed(row, capsys) == json.loads(json.dumps(row))
+
+
+@pytest.mark.parametrize(("workers", "limits"), [(1, Limits(50.0, 1.5)), (None, Limits(None, 1.5))])
+def test_what_the_limit_of_the_corrector_ended_is_the_same_row_again(
+    workers: int | None, limits: Limits, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (row,) = sweep(grid("hangs"), tmp_path / "run", workers=workers, limit_s=50.0, corrector_limit_s=1.5)
+    assert (row["failure_code"], row["sentence"]) == ("time_limit", "the corrector took longer than its limit")
+    assert limits_of(read_run(tmp_path / "run")) == limits
+    assert replayed(row, capsys, limits) == json.loads(json.dumps(row))
+    kept = pages.behind(report(tmp_path / "run").page)["words"]["command"]
+    said = ["--corrector-limit 1.5" in kept[0], "--trial-limit 50 " in f"{kept[0]} ", len(kept)]
+    assert said == [True, workers == 1, 1]
+
+
+def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:hangs"]
+    assert main([*trial, "--trial-limit", "6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["failure_code"] == "time_limit"
+    assert main([*trial, "--trial-limit", "-1"]) == 2
+    assert "a limit of -1 s per trial was given" in capsys.readouterr().err
+
+
+def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film, seen = tmp_path / "film.gif", tmp_path / "seen.json"
+    trial = ["replay", "block_on_block", "--careless", "0", "--level", "0.1", "--grasp", "weld", "--method", "none"]
+    written = ["--video", str(film), "--save-observation", str(seen)]
+    assert main([*trial, *written, "--trial-limit", "500", "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    assert row["failure_stage"] in (None, "judge")
+    assert film.read_bytes()[:3] == b"GIF"
+    measured = ["replay", "block_on_block", "--grasp", "weld", "--observation", str(seen), "--json"]
+    assert main([*measured, "--method", "none"]) == 0
+    here = json.loads(capsys.readouterr().out)
+    assert main([*measured, "--method", "none", "--trial-limit", "500"]) == 0
+    assert json.loads(capsys.readouterr().out) == here
+    assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
+    late = json.loads(capsys.readouterr().out)
+    assert (late["failure_code"], late["noise"], late["level"]) == ("time_limit", "measured", None)
+    assert list(late) == list(here)
+    film.unlink()
+    assert main([*trial[:-1], "unruly:ends", *written]) == 0
+    assert "nothing was replayed, so" in capsys.readouterr().err
+    assert not film.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")
+def test_a_row_on_standard_output_stands_there_alone(tmp_path: Path) -> None:
+    """Also what is held back until the end, where the output is no terminal."""
+    trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:talks", "--json"]
+    held_back = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
+    for more in ([], ["--trial-limit", "100"]):
+        command = [sys.executable, "-m", "apo_bench.cli.app", *trial, *more]
+        done = subprocess.run(command, capture_output=True, text=True, env=held_back, check=True, timeout=120)
+        assert json.loads(done.stdout)["method"] == "unruly:talks"
+        for words in ("from Python", "from behind", "from below", "from C"):
+            assert words in done.stderr
+    closed = shlex.join([sys.executable, "-m", "apo_bench.cli.app", *trial]) + " >&-"
+    done = subprocess.run(closed, shell=True, capture_output=True, text=True, check=False, timeout=120)
+    assert "Traceback" not in done.stderr
+
+
+@FOLDERS
+def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
+    began = time.monotonic()
+    rows = sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=8.0)
+    assert endings(rows) == {
+        ("block_on_block", "hangs"): ("worker", "time_limit"),
+        ("block_on_block", "raises"): ("correct", "raised"),
+    }
+    assert 8.0 < time.monotonic() - began < 300.0
+    assert not asleep()
+    assert "8" not in rows[0]["sentence"]
+
+
+def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
+    spec = TrialSpec("block_on_block", method="paper", seed=4)
+    died, late = lost(spec, "abc", "worker_died"), lost(spec, "abc", "time_limit")
+    raised = misbehaved(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
+    assert list(died) == list(late) == list(raised)
+    assert died["spec_hash"] == raised["spec_hash"]
+    assert (died["success"], died["demonstration"], died["failure_stage"]) == (False, None, "worker")
+    assert died["sentence"] == "the process that ran the trial died"
+    assert (late["failure_code"], raised["demonstration"]) == ("time_limit", "ok")
+    assert raised["sentence"].startswith("it raised <thing at 0x...>; xxx")
+    assert len(raised["sentence"]) == 1000
+
+
+def test_a_worker_with_other_code_or_packages_refuses() -> None:
+    unit = Unit((TrialSpec("block_on_block", method="none"),))
+    with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
+        Worker(0, Terms({"block_on_block": "0123456789abcdef"}, versions())).run(unit, lambda row, timing: None)
+    with pytest.raises(
+        InputError, match=r"has mujoco .*, the process that started the sweep 1\.2\.3; install the same"
+    ):
+        Worker(0, Terms({}, versions() | {"mujoco": "1.2.3"}))
+
+
+def test_what_a_worker_refuses_ends_the_sweep() -> None:
+    asked = grid("raises")
+    terms = Terms({"block_on_block": "0123456789abcdef"}, versions())
+    with pytest.raises(InputError, match="has other code or other files"):
+        spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Ends the process that unpacks it."""
+
+    content: str = ""
+
+    def __reduce__(self) -> Any:
+        return os._exit, (5,)
+
+
+def test_processes_that_cannot_begin_are_given_up() -> None:
+    asked = grid("raises")
+    terms: Any = Deadly()
+    with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
+        spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+    assert MOST_FALSE_STARTS == 3
+
+
+def test_a_corrector_that_removes_the_folder_of_the_rows(tmp_path: Path) -> None:
+    rows = sweep(grid("removes", "raises", trials=2), "run", workers=1)
+    assert len(rows) == 4
+    assert {row["failure_code"] for row in rows} == {"raised"}
+    assert count(tmp_path / "run") == 4
+
+
+@pytest.mark.parametrize("methods", [("raises",), ("raises", "none")])
+def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
+    methods: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first process is killed after its first row, and those after it before they begin."""
+    asked = replace(grid("raises", trials=2), methods=tuple(m if m == "none" else f"unruly:{m}" for m in methods))
+    content = content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").mjcf)
+    terms = Terms({"block_on_block": content}, versions())
+    asked_for: list[Any] = []
+
+    def start(target: Any, *given: Any) -> Any:
+        asked_for.append(target)
+        return real(target if len(asked_for) == 1 else os._exit, *given)
+
+    real = crew_member.start
+    monkeypatch.setattr(crew_member, "start", start)
+    rows: list[dict[str, Any]] = []
+
+    def emit(row: Any, timing: Any) -> None:
+        rows.append(dict(row))
+        if len(rows) == 1:
+            for process in multiprocessing.active_children():
+                process.kill()
+                process.join()
+
+    work = tuple(units([asked], load_all([asked])))
+    if "none" in methods:
+        with pytest.raises(RuntimeError, match="before they have begun a trial"):
+            spread(work, terms, workers=1, limit_s=60.0, emit=emit)
+    else:
+        spread(work, terms, workers=1, limit_s=60.0, emit=emit)
+        assert [row["failure_code"] for row in rows] == ["raised", "worker_died"]
+
+
+PATIENT = """
+import sys
+from apo_bench.benchmark import crew
+from apo_bench.cli.app import main
+crew.GRACE_S = float(sys.argv[1])
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def started(out: Path, *more: str, grace_s: float = 5.0) -> subprocess.Popen[str]:
+    asked = ["sweep", "block_on_block", "--careless", "0", "--out", str(out), "--workers", "1", *more]
+    return subprocess.Popen(
+        [sys.executable, "-c", PATIENT, str(grace_s), *asked],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
+    )
+
+
+def count(out: Path) -> int:
+    path = out / "trials.jsonl"
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def wait_for(true: Callable[[], bool], process: subprocess.Popen[str], seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+def asleep() -> list[str]:
+    """Processes that `hangs` has started and that are still there."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found += [path.parent.name] if b"sleep\x0086399" in path.read_bytes() else []
+        except OSError:
+            continue
+    return found
+
+
+@FOLDERS
+def test_a_signal_ends_a_sweep_cleanly(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    levels = ",".join(str(0.5 * k) for k in range(100))
+    process = started(out, "--methods", "unruly:slow", "--trials", "1", "--levels", levels)
+    wait_for(lambda: count(out) >= 2, process)
+    began = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert said == "apo-bench: ended by SIGTERM; what had ended is kept, and the same command continues.\n"
+    assert time.monotonic() - began < 60.0
+    assert 2 <= count(out) < 100
+    assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
+
+
+@FOLDERS
+def test_a_second_interrupt_ends_at_once(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = started(out, "--methods", "unruly:raises,unruly:hangs", "--trials", "1", "--levels", "1", grace_s=600.0)
+    wait_for(lambda: count(out) == 1 and bool(asleep()), process)
+    process.send_signal(signal.SIGINT)
+    time.sleep(1.0)
+    assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said == "apo-bench: interrupted; what had ended is kept, and the same command continues.\n"
+    assert not asleep()
+
+
+def test_the_first_signal_asks_and_the_second_raises() -> None:
+    handler = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with listening() as check:
+            check()
+            os.kill(os.getpid(), signal.SIGINT)
+            with pytest.raises(Stopped) as first:
+                check()
+            assert first.value.number == signal.SIGINT
+            with pytest.raises(Stopped):
+                os.kill(os.getpid(), signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def test_handlers_of_the_callers_own_stay() -> None:
+    mine, before = lambda number, frame: None, signal.getsignal(signal.SIGTERM)
+    signal.signal(signal.SIGTERM, mine)
+    try:
+        with listening() as check:
+            assert signal.getsignal(signal.SIGTERM) is mine
+            check()
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,513 @@
+"""A sweep on a Ray cluster: the same rows, whatever becomes of nodes, workers and the driver. The cluster is real."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import pickle
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+from apo_bench.records.key import row_key
+from apo_bench.records.row import Row
+from apo_bench.resources import folder
+from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
+from apo_bench.sweeps.ray import actor as ray_hand
+from apo_bench.sweeps.ray import backend as on_ray
+from apo_bench.sweeps.ray import pool as ray_crew
+from apo_bench.sweeps.ray.actor import refusal
+from apo_bench.sweeps.ray.runtime_files import parcel, wanted
+from apo_bench.sweeps.sweep import sweep
+from apo_bench.trial.fingerprint import content_hash
+
+SPEC = SweepSpec(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
+NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
+CODE = """
+import os, time
+from helper_of_mine import seconds
+
+def dies(seen):
+    os._exit(3)
+
+def hangs(seen):
+    time.sleep(seconds)
+
+def raises(seen):
+    raise RuntimeError("of my own")
+"""
+installed = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="Ray is not installed: the extra [ray]")
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of a user's own, and the current one."""
+    (tmp_path / "code_of_mine.py").write_text(CODE)
+    (tmp_path / "helper_of_mine.py").write_text("seconds = 1000")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    for name in ("code_of_mine", "helper_of_mine"):
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """A head and another node, one CPU each; nothing of it is left afterwards."""
+    pytest.importorskip("ray", reason="Ray is not installed: the extra [ray]")
+    if not Path("/proc").is_dir():
+        pytest.skip("looks for processes in /proc")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("RAY_AUTH_MODE", "disabled")
+        patch.delenv("RAY_ADDRESS", raising=False)
+        from ray.cluster_utils import Cluster
+
+        cluster = Cluster(initialize_head=True, head_node_args=NODE)
+        session = str(cluster.head_node.get_session_dir_path())
+        try:
+            cluster.add_node(**NODE)
+            yield cluster
+        finally:
+            cluster.shutdown()
+            wait_for(lambda: not processes(session))
+
+
+def processes(word: str) -> list[int]:
+    """Those with a word in their command line."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if word.encode() in path.read_bytes():
+                found.append(int(path.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.1)
+
+
+def terms_of(spec: SweepSpec) -> tuple[tuple[Unit, ...], Terms]:
+    loaded = load_all([spec])
+    arm = find_arm(spec.arm).mjcf
+    return tuple(units([spec], loaded)), Terms({g: content_hash(s, g, arm) for g, s in loaded.items()}, versions())
+
+
+def lines(out: Path) -> list[bytes]:
+    return sorted((out / "trials.jsonl").read_bytes().splitlines())
+
+
+def text_of(path: Path) -> str:
+    """Nothing where there is no such file, or no longer."""
+    try:
+        return path.read_text()
+    except OSError:
+        return ""
+
+
+def count(out: Path) -> int:
+    return text_of(out / "trials.jsonl").count("\n")
+
+
+def hands(cluster: Any) -> list[int]:
+    """The processes of actors on the nodes of a cluster."""
+    raylets = {info.process.pid for node in cluster.list_all_nodes() for info in node.all_processes["raylet"]}
+    return [pid for pid in processes("ray::Hand") if parent(pid) in raylets]
+
+
+def parent(pid: int) -> int | None:
+    found = re.search(r"^PPid:\s*(\d+)", text_of(Path(f"/proc/{pid}/status")), re.MULTILINE)
+    return int(found[1]) if found else None
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
+    """The rows of `SPEC`, made in this process."""
+    out = tmp_path_factory.mktemp("here")
+    sweep(SPEC, out)
+    return lines(out)
+
+
+@pytest.mark.slow
+def test_a_node_that_is_lost_costs_no_row_and_changes_none(cluster: Any, here: list[bytes], tmp_path: Path) -> None:
+    second = next(node for node in cluster.list_all_nodes() if node is not cluster.head_node)
+    rows_then = []
+
+    def lose() -> None:
+        """As soon as it has made a row."""
+        wait_for(lambda: second.node_id in text_of(tmp_path / "timing.jsonl"))
+        rows_then.append(count(tmp_path))
+        cluster.remove_node(second, allow_graceful=False)
+
+    losing = threading.Thread(target=lose)
+    losing.start()
+    sweep(SPEC, tmp_path, backend="ray", address=cluster.address)
+    losing.join()
+    cluster.add_node(**NODE)
+    timing = [json.loads(line) for line in text_of(tmp_path / "timing.jsonl").splitlines()]
+    assert lines(tmp_path) == here
+    assert 0 < rows_then[0] < len(here)
+    assert {entry["node"] for entry in timing} == {second.node_id, cluster.head_node.node_id}
+    assert all({"host", "worker", "trial_s"} <= set(entry) for entry in timing)
+
+
+@pytest.mark.slow
+def test_a_driver_that_is_stopped_or_killed_goes_on_later(cluster: Any, here: list[bytes], tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    asked = ["--levels", "1", "--careless", "0", "--methods", "none,paper", "--trials", "5", "--out", str(out)]
+    command = [sys.executable, "-m", "apo_bench.cli.app", "sweep", "carried_bridge", *asked]
+    command += ["--backend", "ray", "--address", cluster.address]
+
+    def start() -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
+        )
+
+    for number, rows in ((signal.SIGINT, 2), (signal.SIGKILL, 5)):
+        process = start()
+        wait_for(lambda rows=rows: count(out) >= rows)
+        process.send_signal(number)
+        printed = process.communicate(timeout=60)
+        if number == signal.SIGINT:
+            assert process.returncode == 130
+            assert (printed[0], printed[1].count("\n"), printed[1][:11]) == ("", 1, "apo-bench: ")
+        wait_for(lambda: not hands(cluster))
+    assert len(cluster.list_all_nodes()) == 2
+    assert 5 <= count(out) < len(here)
+    last = start()
+    printed = last.communicate(timeout=120)
+    assert (last.returncode, printed[1]) == (0, "")
+    assert f"{len(here)} rows in" in printed[0]
+    assert lines(out) == here
+
+
+@pytest.mark.slow
+def test_a_trial_that_ends_its_worker_or_hangs_is_one_failed_row(cluster: Any, own: Path) -> None:
+    """And files of the current folder, with what they import, travel to the nodes."""
+    methods = tuple(f"code_of_mine:{name}" for name in ("dies", "raises", "hangs"))
+    shutil.copy(folder("scenarios") / "block_on_block.toml", own / "mine.toml")
+    spec = replace(SPEC, scenarios=("mine.toml",), methods=methods, trials=1)
+    work, terms = terms_of(spec)
+    rows: list[Row] = []
+    on_ray.spread(
+        work,
+        terms,
+        workers=None,
+        limit_s=3.0,
+        emit=lambda row, timing: rows.append(row),
+        address=cluster.address,
+    )
+    ends = {row["method"].partition(":")[2]: (row["failure_stage"], row["failure_code"]) for row in rows}
+    assert len(rows) == len({row_key(row) for row in rows}) == 3
+    assert ends == {
+        "dies": ("worker", "worker_died"),
+        "raises": ("correct", "raised"),
+        "hangs": ("worker", "time_limit"),
+    }
+    assert not any(row["success"] for row in rows)
+
+
+@pytest.mark.slow
+def test_nodes_with_other_packages_or_code_are_refused(cluster: Any) -> None:
+    work, terms = terms_of(SPEC)
+    other = replace(terms, versions={**terms.versions, "mujoco": "3.0.0"})
+    with pytest.raises(InputError, match=rf"the node '{socket.gethostname()}' .* mujoco .* 3\.0\.0"):
+        on_ray.spread(work, other, workers=1, limit_s=60.0, emit=refuse_row, address=cluster.address)
+
+
+def refuse_news(news: Any) -> None:
+    raise AssertionError("there was news")
+
+
+def refuse_row(row: Row, timing: dict[str, Any]) -> None:
+    raise AssertionError("a row was made")
+
+
+def test_what_speaks_against_a_node_is_one_sentence(own: Path) -> None:
+    work, terms = terms_of(replace(SPEC, methods=("code_of_mine:raises",)))
+    asked = wanted(work)
+    assert refusal(pickle.dumps((terms, asked))) is None
+    other = dict.fromkeys(terms.content, "0" * 16)
+    changed = dict.fromkeys(asked.content, "0" * 16)
+    for packed, words in (
+        ((replace(terms, content=other), asked), "other code or other files for 'carried_bridge'"),
+        ((terms, replace(asked, content=changed)), "the file behind the method code_of_mine:raises is another one"),
+        ((terms, replace(asked, methods=("not_there:at_all",))), "cannot be imported"),
+        ((terms, replace(asked, scenarios=("missing.toml",))), "missing.toml"),
+    ):
+        said = refusal(pickle.dumps(packed)) or ""
+        assert words in said
+        assert (said.count("\n"), said.startswith("the node '")) == (0, True)
+
+
+def test_files_below_the_current_folder_travel_and_no_others(
+    own: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    far = tmp_path_factory.mktemp("far") / "far.toml"
+    text = (folder("scenarios") / "block_on_block.toml").read_text()
+    far.write_text(text.replace("block_on_block", "far"))
+    (own / "deep").mkdir()
+    (own / "deep" / "mine.toml").write_text(text.replace('file = "block"', 'file = "../part.xml"'))
+    shutil.copy(folder("assets") / "parts" / "block.xml", own / "part.xml")
+    shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
+    scenarios = ("deep/mine.toml", str(far))
+    spec = replace(SPEC, scenarios=scenarios, methods=("code_of_mine:raises",), noises=("noise.toml", "camera"))
+    travel = parcel(wanted(tuple(units([spec], load_all([spec])))))
+    assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml", "code_of_mine.py", "helper_of_mine.py"}
+    assert all((own / name).samefile(path) for name, path in travel.items())
+
+
+def test_news_are_told_again_until_they_have_arrived(monkeypatch: pytest.MonkeyPatch) -> None:
+    work, terms = terms_of(replace(SPEC, trials=1))
+    met = [threading.Event(), threading.Event()]
+
+    class Quick:
+        def __init__(self, number: int, terms: Terms) -> None:
+            pass
+
+        def run(self, unit: Unit, emit: Any, stopped: Any, began: Any) -> None:
+            for spec, go in zip(unit.trials, met, strict=True):
+                if stopped():
+                    return
+                began(spec)
+                go.wait(60.0)
+                emit({"method": spec.method}, {"host": "h"})
+
+    monkeypatch.setattr(ray_hand, "Worker", Quick)
+    hand = ray_hand.Hand(0, pickle.dumps((terms, wanted(work))), "node 1")
+    assert hand.news(0, 0.0) == []
+    hand.take(work[0])
+    assert hand.news(0, 60.0) == hand.news(0, 60.0) == [("began",)]
+    met[0].set()
+    row = ("row", {"method": "none"}, {"host": "h", "node": "node 1"})
+    wait_for(lambda: hand.news(1, 60.0) == [row, ("began",)])
+    assert hand.news(1, 0.0) == [row, ("began",)]
+    assert hand.news(2, 0.0) == [("began",)]
+    hand.stop()
+    met[1].set()
+    wait_for(lambda: [kind for kind, *_ in hand.news(3, 60.0)] == ["row", "done"])
+
+
+def test_code_that_ends_its_thread_ends_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thread that ends would leave its worker waiting for nothing until the limit of the trial."""
+    work, terms = terms_of(replace(SPEC, trials=1))
+    ended = threading.Event()
+
+    class Leaving:
+        def __init__(self, number: int, terms: Terms) -> None:
+            pass
+
+        def run(self, *_: Any) -> None:
+            sys.exit(0)
+
+    monkeypatch.setattr(ray_hand, "Worker", Leaving)
+    monkeypatch.setattr(ray_hand.os, "_exit", lambda code: ended.set())
+    ray_hand.Hand(0, pickle.dumps((terms, wanted(work))), "node 1").take(work[0])
+    assert ended.wait(60.0)
+
+
+class Away(Exception):
+    """An answer that was lost, or is late."""
+
+
+class Gone(Exception):
+    """An actor that is no more."""
+
+    preempted = False
+
+
+class Call:
+    """Stands for an answer that will come, or not."""
+
+    def __init__(self, answers: list[Any]) -> None:
+        self.answer = answers.pop(0)
+
+
+class Nodes:
+    """Stands for Ray: `answers` says what each next answer of an actor is; an error is raised, `...` never comes."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, answers: list[Any]) -> None:
+        self.answers, self.alive, self.killed, self.taken = answers, True, 0, []
+        names = {
+            "ActorUnavailableError": Away,
+            "ObjectLostError": Away,
+            "RayActorError": Gone,
+            "RayTaskError": KeyError,
+        }
+        monkeypatch.setitem(sys.modules, "ray", self)
+        monkeypatch.setitem(sys.modules, "ray.exceptions", SimpleNamespace(**names))
+        self.actor = SimpleNamespace(
+            where=SimpleNamespace(remote=lambda: Call(self.answers)),
+            news=SimpleNamespace(remote=lambda heard, wait_s: Call(self.answers)),
+            take=SimpleNamespace(remote=self.taken.append),
+        )
+
+    def wait(self, calls: list[Call], **_: Any) -> tuple[list[Call], list[Call]]:
+        return [call for call in calls if call.answer is not ...], []
+
+    def get(self, call: Call) -> Any:
+        if isinstance(call.answer, Exception):
+            raise call.answer
+        return list(call.answer)
+
+    def kill(self, actor: Any) -> None:
+        self.killed += 1
+
+    def nodes(self) -> list[dict[str, Any]]:
+        return [{"NodeID": "n", "Alive": self.alive}]
+
+
+HELLO = ("n", "h", None)
+BEGAN = (("began",),)
+ENDED = (("row", {}, {}), ("began",), ("row", {}, {}), ("done",))
+
+
+@pytest.mark.parametrize(
+    ("answers", "told", "takes"),
+    [
+        ([HELLO, ENDED, ...], ["row", "row"], [2]),
+        ([Away(), HELLO, Away(), BEGAN, Away(), ENDED, ...], ["row", "row"], [2]),
+        ([HELLO, BEGAN, Gone(), HELLO, ENDED, ...], ["row", "row"], [2, 2]),
+        ([HELLO, BEGAN, Gone(), HELLO, BEGAN, Gone(), HELLO, ENDED[2:], ...], ["worker_died", "row"], [2, 2, 1]),
+        ([HELLO, ENDED[:2], Gone(), HELLO, BEGAN, Gone()], ["row", "worker_died"], [2, 1]),
+    ],
+)
+def test_each_trial_has_one_row_whatever_is_answered(
+    answers: list[Any], told: list[str], takes: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
+    ray = Nodes(monkeypatch, list(answers))
+    heard: list[Any] = []
+    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    for _ in range(30):
+        if crew.busy:
+            crew.turn(heard.append)
+    kinds = [news[2] if news[0] == "lost" else news[0] for news in heard]
+    assert not crew.busy
+    assert kinds == told
+    assert [len(unit.trials) for unit in ray.taken] == takes
+
+
+def test_the_loss_of_a_node_is_no_fault_of_a_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
+    ray = Nodes(monkeypatch, [HELLO, BEGAN, Gone()] * 9 + [HELLO, ENDED, ...])
+    ray.alive = False
+    heard: list[Any] = []
+    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    while crew.busy:
+        crew.turn(heard.append)
+    assert [news[0] for news in heard] == ["row", "row"]
+
+
+def test_workers_that_never_begin_end_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
+    ray = Nodes(monkeypatch, [Gone("no room")] * 9)
+    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    for _ in range(ray_crew.FALSE_STARTS - 1):
+        crew.turn(refuse_news)
+    with pytest.raises(RuntimeError, match="end before they have begun a trial: no room"):
+        crew.turn(refuse_news)
+
+
+def test_workers_that_begin_no_more_cost_the_trials_of_own_correctors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
+    ray = Nodes(monkeypatch, [HELLO, ENDED[:2], *[Gone()] * (ray_crew.DEATHS - 1), *[HELLO, Gone()] * 9])
+    heard: list[Any] = []
+    spec = replace(SPEC, methods=("not_there:one", "not_there:two"), trials=1)
+    crew = ray_crew.Crew(terms_of(spec)[0], lambda number: ray.actor, lambda: 1, 60.0)
+    for _ in range(30):
+        if crew.busy:
+            crew.turn(heard.append)
+    assert [(news[0], *news[2:3]) for news in heard][1:] == [("lost", "worker_died")]
+
+
+def test_a_driver_that_was_asleep_finds_nobody_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
+    now = [0.0]
+    monkeypatch.setattr(ray_crew.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(ray_crew, "TURN_S", 0.2)
+    ray = Nodes(monkeypatch, [HELLO, BEGAN, ..., HELLO, ENDED[2:], ...])
+    heard: list[Any] = []
+    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    for seconds in (0.0, 0.0, 3600.0):
+        now[0] += seconds
+        crew.turn(heard.append)
+    assert (heard, ray.killed) == ([], 0)
+    for _ in range(70):
+        now[0] += 1.0
+        if crew.busy:
+            crew.turn(heard.append)
+    assert [news[2] if news[0] == "lost" else news[0] for news in heard] == ["time_limit", "row"]
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str], out: Path) -> str:
+    asked = ["sweep", "block_on_block", "--trials", "1", "--out", str(out), *arguments]
+    assert main(asked) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n"), said.err[:11]) == ("", 1, "apo-bench: ")
+    return said.err
+
+
+@installed
+@pytest.mark.parametrize("address", ["rubbish", "10.0.0.1", "ray://10.0.0.1:10001", "host:port", "1.2.3.4:0", ""])
+def test_what_is_no_address_is_refused(address: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    said = refused(["--backend", "ray", "--address", address], capsys, tmp_path / "run")
+    assert "HOST:PORT of its head is allowed" in said
+    assert not (tmp_path / "run").exists()
+
+
+@installed
+def test_an_address_where_nothing_listens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    for address in (f"127.0.0.1:{port}", "no-such-host.invalid:6379"):
+        said = refused(["--backend", "ray", "--address", address], capsys, tmp_path / "run")
+        assert f"no Ray cluster answers at {address}" in said
+    assert not (tmp_path / "run").exists()
+
+
+@installed
+def test_an_address_where_something_else_listens(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(on_ray, "JOINING_S", 2.0)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        said = refused(["--backend", "ray", "--address", address], capfd, tmp_path / "run")
+    assert f"no Ray cluster answered at {address} within 2 s" in said
+
+
+def test_the_extra_is_named_where_it_is_missing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(on_ray.importlib.util, "find_spec", lambda name: None)
+    assert "pip install 'apo_bench[ray]'" in refused(["--backend", "ray"], capsys, tmp_path / "run")
+
+
+def test_an_address_is_one_of_a_cluster(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert "--backend ray" in refused(["--address", "10.0.0.1:6379"], capsys, tmp_path / "run")

@@ -1,0 +1,102 @@
+"""The walls of the house: every contract is kept, and each one breaks when its wall is broken."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import grimp
+import pytest
+from importlinter import configuration
+from importlinter.contracts.forbidden import ForbiddenContract
+from importlinter.contracts.layers import LayersContract
+
+ROOT = Path(__file__).parent.parent
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+CONTRACTS: dict[str, dict[str, Any]] = {contract["id"]: contract for contract in SETTINGS["contracts"]}
+configuration.configure()
+KINDS = {"layers": LayersContract, "forbidden": ForbiddenContract}
+BREACHES = {
+    "layers": [
+        ("apo_bench.correction.contact", "apo_bench.simulation.scene.world"),
+        ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact"),
+        ("apo_bench.scenario.file", "apo_bench.trial.trial"),
+        ("apo_bench.geometry.pose", "apo_bench.assembly.goals"),
+        ("apo_bench.sweeps.sweep", "apo_bench.report.report"),
+    ],
+    "judge": [
+        ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
+        ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
+        ("apo_bench.judging.finished", "apo_bench.correction.contact"),
+    ],
+    "corrector": [
+        ("apo_bench.correction.contact", "apo_bench.scenario.scenario"),
+        ("apo_bench.correction.solvers.compact", "apo_bench.simulation.settling"),
+    ],
+    "rows": [
+        ("apo_bench.report.report", "apo_bench.trial.trial"),
+        ("apo_bench.statistics.rates", "apo_bench.simulation.scene.scene"),
+        ("apo_bench.records.settings", "apo_bench.assembly.goals"),
+    ],
+    "simulators": [
+        ("apo_bench.envs.apo_replay", "mujoco"),
+        ("apo_bench.cli.app", "mink"),
+        ("apo_bench.trial.stages", "dm_control"),
+    ],
+    "gymnasium": [("apo_bench.trial.trial", "gymnasium"), ("apo_bench.simulation.scene.scene", "gymnasium")],
+}
+
+
+@pytest.fixture(scope="module")
+def graph() -> grimp.ImportGraph:
+    return grimp.build_graph("apo_bench", include_external_packages=True, cache_dir=None)
+
+
+def keeps(graph: grimp.ImportGraph, contract: str) -> bool:
+    """Whether a graph of imports keeps a contract."""
+    options = {
+        key: str(value) if isinstance(value, bool) else value
+        for key, value in CONTRACTS[contract].items()
+        if key not in ("id", "name", "type")
+    }
+    session = {"root_packages": ["apo_bench"], "include_external_packages": True}
+    kind = KINDS[CONTRACTS[contract]["type"]]
+    check = kind(name=contract, session_options=session, contract_options=options)
+    return bool(check.check(graph=graph, verbose=False).kept)
+
+
+def test_a_breach_is_tried_for_every_contract() -> None:
+    assert BREACHES.keys() == CONTRACTS.keys()
+
+
+@pytest.mark.parametrize("contract", CONTRACTS)
+def test_the_contract_is_kept(graph: grimp.ImportGraph, contract: str) -> None:
+    assert keeps(graph, contract)
+
+
+@pytest.mark.parametrize(
+    ("contract", "importer", "imported"),
+    [(name, *breach) for name, breaches in BREACHES.items() for breach in breaches],
+)
+def test_a_broken_wall_is_seen(graph: grimp.ImportGraph, contract: str, importer: str, imported: str) -> None:
+    assert {importer} <= graph.modules
+    graph.add_import(importer=importer, imported=imported)
+    try:
+        assert not keeps(graph, contract)
+    finally:
+        graph.remove_import(importer=importer, imported=imported)
+
+
+def test_the_lists_of_rooms_are_complete() -> None:
+    """A new room is in the layers, and may not know a simulator or Gymnasium unless somebody says so."""
+    package = ROOT / "apo_bench"
+    rooms = {
+        f"apo_bench.{path.stem}"
+        for path in package.iterdir()
+        if (path / "__init__.py").is_file() or (path.suffix == ".py" and path.stem not in ("__init__", "moved"))
+    }
+    layers = {f"apo_bench.{room.strip()}" for line in CONTRACTS["layers"]["layers"] for room in line.split("|")}
+    assert layers == rooms
+    assert {*CONTRACTS["simulators"]["source_modules"], "apo_bench.simulation"} == rooms
+    assert {*CONTRACTS["gymnasium"]["source_modules"], "apo_bench.envs"} == rooms

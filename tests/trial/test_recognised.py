@@ -1,0 +1,171 @@
+"""Recognised relations where trials, sweeps, reports and the command line meet them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench.cli import app as cli
+from apo_bench.records.relations import RECOGNISED
+from apo_bench.records.settings import TrialSpec
+from apo_bench.report.figures.recognised import draw_recognitions
+from apo_bench.report.tables.recognised import ALL, NONE, recognition_lines, recognitions, write_recognitions
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.recognised import UNCOUNTED
+from apo_bench.trial.stages import Shown, show
+from apo_bench.trial.trial import run_trial
+from tests import pages
+
+SEEN = str(Path(__file__).parents[2] / "docs" / "seen.csv")
+SPEC = TrialSpec("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario("block_on_block"))
+
+
+@pytest.fixture(scope="module")
+def shown(scene: Scene) -> Shown:
+    return show(scene, 0.0, 4)
+
+
+def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) -> dict[str, Any]:
+    """What a table needs of a row."""
+    base = {"scenario": "one", "noise": "isotropic", "eye": "noise", "relations": relations, "careless": 0.0}
+    counts = {"contacts_right": 3, "contacts_missed": 0, "contacts_false": 0}
+    level = {"level": 1.0, "level_deg": 1.0, "seed": seed, "clearance_mm": 0.25, "method": method}
+    return base | level | counts | changes
+
+
+@pytest.mark.parametrize("relations", RECOGNISED)
+def test_a_trial_says_how_many_contacts_were_recognised(scene: Scene, shown: Shown, relations: str) -> None:
+    made = run_trial(TrialSpec(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
+    assert made["success"] is True
+    assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (2, 0, 0)
+    assert (made["relations"], made["wrong_relation"]) == (relations, None)
+
+
+def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: Shown) -> None:
+    made = run_trial(TrialSpec(**(asdict(SPEC) | {"method": "none"})), scene, shown=shown)
+    assert {name: made[name] for name in UNCOUNTED} == dict(UNCOUNTED)
+
+
+def test_missed_and_false_relations_are_counted_like_recognised_ones(scene: Scene, shown: Shown) -> None:
+    for relations, counts in (("missed", (1, 1, 0)), ("false", (2, 0, 1)), ("given", (2, 0, 0))):
+        made = run_trial(TrialSpec(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
+        assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == counts
+
+
+def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
+    rows = [row("recognised", "paper"), row("recognised", "contact"), row("recognised", seed=1, contacts_missed=1)]
+    (found,) = recognitions([*rows, row("given"), row("missed"), row("recognised", "none", **UNCOUNTED)])
+    assert (found.demonstrations, found.complete, found.right, found.missed, found.false) == (2, 1, 6, 1, 0)
+    assert found.precision == 1.0
+    assert found.recall == pytest.approx(6 / 7)
+
+
+def test_scenarios_are_also_counted_together() -> None:
+    rows = [row("recognised"), row("recognised", scenario="two", contacts_right=1, contacts_false=2)]
+    found = {r.place.scenario: r for r in recognitions(rows)}
+    assert list(found) == ["one", "two", ALL]
+    assert (found[ALL].demonstrations, found[ALL].complete, found[ALL].right, found[ALL].false) == (2, 1, 4, 2)
+    assert found["two"].precision == pytest.approx(1 / 3)
+
+
+def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
+    found = recognitions([row("recognised-fixed", contacts_right=0, contacts_missed=3)])
+    assert (found[0].precision, found[0].recall) == (None, 0.0)
+    assert recognition_lines(found)[-1].endswith("| – | 0.00 % | 3 | 0 |")
+    assert recognition_lines(()) == [NONE]
+    write_recognitions(found, tmp_path / "table.csv")
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        (line,) = csv.DictReader(file)
+    assert (line["missed"], line["precision"], line["recall"]) == ("3", "", "0.0")
+    draw_recognitions(found, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 5000
+
+
+def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "rows"
+    given = ["--levels", "0.5", "--careless", "0", "--methods", "none,contact", "--trials", "1", "--workers", "1"]
+    assert cli.main(["sweep", "block_on_block", *given, "--relations", "given,recognised", "--out", str(out)]) == 0
+    rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert [(r["method"], r["relations"]) for r in rows] == [
+        ("none", "given"),
+        ("contact", "given"),
+        ("contact", "recognised"),
+    ]
+    assert cli.main(["report", str(out)]) == 0
+    page = pages.lines(out / "report.html")
+    assert "| block_on_block | isotropic | recognised | 0 | 0.5 | 1 of 1 |" in page
+    assert (out / "tables" / "recognised.csv").exists()
+    assert (out / "figures" / "recognised.png").exists()
+    capsys.readouterr()
+
+
+def test_the_command_prints_the_evidence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["recognise", "stick_in_tower", "--observation", SEEN]) == 0
+    said = capsys.readouterr().out
+    assert "castle1.bottom" in said
+    assert "all 9 contacts of the scenario were recognised, and no other" in said
+
+
+def test_nothing_is_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["recognise", "stick_in_tower", "--level", "0", "--careless", "1", "--seed", "3"]) == 0
+    said = capsys.readouterr().out
+    assert " 0.00 " in said
+    assert "-0.00" not in said
+
+
+def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = Path(SEEN).read_text(encoding="utf-8").splitlines()
+    header, first, *rest = lines
+    x = header.split(",").index("z_mm")
+    cells = first.split(",")
+    cells[x] = str(float(cells[x]) + 30.0)
+    path = tmp_path / "lifted.csv"
+    path.write_text("\n".join([header, ",".join(cells), *rest]) + "\n", encoding="utf-8")
+    assert cli.main(["recognise", "stick_in_tower", "--observation", str(path), "--json"]) == 0
+    form = json.loads(capsys.readouterr().out)
+    assert form["schema"] == "apo-bench/recognised/1"
+    assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} in form["missed"]
+    assert form["contacts_missed"] == len(form["missed"])
+    assert form["contacts_right"] == sum(contact["in_scenario"] for contact in form["contacts"])
+    assert all(abs(contact["gap_mm"]) <= contact["allowed_gap_mm"] for contact in form["contacts"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["recognise", "stick_in_tower", "--relations", "given"], "unknown way of recognising 'given'"),
+        (["recognise", "stick_in_tower", "--observation", SEEN, "--level", "1"], "--level, which draws a trial"),
+        (["recognise", "stick_in_tower", "--deviation-mm", "1"], "--deviation-mm, which is for files"),
+        (["recognise", "stick_in_tower", "--observation", "nowhere.csv"], "nowhere.csv"),
+        (["recognise", "nowhere"], "unknown scenario 'nowhere'"),
+        (
+            ["replay", "stick_in_tower", "--observation", SEEN, "--relations", "missed"],
+            "--relations was given together",
+        ),
+        (["replay", "stick_in_tower", "--relations", "recognized"], "unknown kind of relations"),
+    ],
+)
+def test_wrong_requests_get_one_sentence(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+
+
+def test_a_measured_observation_may_be_recognised(capsys: pytest.CaptureFixture[str]) -> None:
+    wanted = ["--method", "contact", "--relations", "recognised", "--json"]
+    assert cli.main(["replay", "stick_in_tower", "--observation", SEEN, *wanted]) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert (made["success"], made["noise"], made["relations"]) == (True, "measured", "recognised")
+    assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (9, 0, 0)

@@ -1,0 +1,396 @@
+"""One trial: its stages, its row, its hash. Physics runs once per method; the rest looks at what came out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Consistency, Correction, Observation, Step, Suspect, Try
+from apo_bench.assembly.graph import relation_graph
+from apo_bench.cli.terminal import print_row
+from apo_bench.correction.correctors import correct
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.records import outcomes
+from apo_bench.records.settings import ENV_ID, LARGEST_SEED, ROW, TrialSpec, level_pair
+from apo_bench.resources import folder
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial import stages
+from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.planning import plan
+from apo_bench.trial.stages import Shown, see, show, stream
+from apo_bench.trial.trial import nominal_where_seen, run_measured, run_trial
+
+SPEC = TrialSpec("stick_in_tower", grasp="weld", method="none", seed=5)
+KEYS = (
+    *("schema", "env_id", "spec_hash", "scenario", "level", "careless", "clearance_mm", "noise", "grasp"),
+    *("relations", "method", "seed", "timestep_s", "thresholds", "demonstration", "success", "loose_success"),
+    *("failure_stage", "failure_code", "conditions", "freed", "gap_before_mm", "gap_after_mm", "reached"),
+    *(
+        "tried",
+        "extra_operations",
+        "predicted",
+        "pose_error_fixed_mm",
+        "pose_error_free_mm",
+        "peak_force_n",
+        "sim_seconds",
+    ),
+    *(
+        "chi_square",
+        "chi_square_freedom",
+        "p_value",
+        "test_passes",
+        "suspects",
+        "dropped",
+        "wrong_relation",
+        "inside_95",
+    ),
+    *("planned_error_fixed_mm", "planned_error_free_mm"),
+)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario("stick_in_tower"), grasp="weld")
+
+
+@pytest.fixture(scope="module")
+def shown(scene: Scene) -> Shown:
+    return show(scene, 1.0, SPEC.seed)
+
+
+@pytest.fixture(scope="module")
+def rows(scene: Scene, shown: Shown) -> dict[str, dict[str, Any]]:
+    return {m: run_trial(replace(SPEC, method=m), scene, shown=shown) for m in ("oracle", "none", "paper")}
+
+
+def refuses(seen: Observation) -> Correction:
+    """A corrector that never converges."""
+    tried = (Try(2, (2,), float("inf")),)
+    return Correction(seen.goals, "not_converged", "it did not come to rest", (2, 1), 2e-3, 1e-3, 13, tried=tried)
+
+
+def rebuilds(seen: Observation) -> Correction:
+    """Tracking as the paper shows it for example 5.1: castle 2 is put down as seen, taken off and put down rightly."""
+    made = correct(seen, "paper")
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = made.goals[[step.operation for step in schedule]]
+    targets[1:3] = seen.goals[1]
+    tried = (Try(np.int64(2), (np.int64(2),), 1.5e-3), Try(2, (2, 1), 1e-5))
+    return replace(made, freed=(2, 1), tried=tried, schedule=schedule, targets=targets)
+
+
+def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) -> None:
+    keys = list(rows["oracle"])
+    assert set(KEYS) <= set(keys)
+    for row in rows.values():
+        assert list(row) == keys
+        assert json.loads(json.dumps(row, allow_nan=False)) == row
+        assert (row["schema"], row["env_id"]) == (ROW, ENV_ID)
+        assert row["thresholds"]["pushed_mm"] == 1.0
+        assert row["demonstration"] == "ok"
+
+
+def test_correction_makes_the_difference(rows: dict[str, dict[str, Any]]) -> None:
+    assert {method: row["success"] for method, row in rows.items()} == {"oracle": True, "none": False, "paper": True}
+    assert rows["none"]["failure_stage"] in outcomes.STAGES
+    assert rows["none"]["failure_code"] in outcomes.CODES
+    for method in ("oracle", "paper"):
+        row = rows[method]
+        assert (row["failure_stage"], row["failure_code"], row["failure_operation"]) == (None, None, None)
+        assert not any(row["conditions"].values())
+        assert row["gap_after_mm"] < 0.1
+        assert row["pose_error_fixed_mm"] < 1.0
+
+
+def test_the_row_says_what_the_corrector_did(rows: dict[str, dict[str, Any]]) -> None:
+    assert rows["paper"]["freed"] == [3, 2, 1]
+    assert rows["none"]["freed"] == []
+    assert rows["paper"]["gap_before_mm"] == rows["none"]["gap_before_mm"] == rows["none"]["gap_after_mm"]
+    assert rows["oracle"]["gap_before_mm"] < 1e-9
+
+
+def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None:
+    """A careless human put castle 2 aside by 1.5 mm and more: the stick will not go in."""
+    said = rows["none"]["predicted"]
+    assert (said["fails"], said["operation"], said["code"]) == (True, 3, "residual")
+    assert said["size_mm"] > 1.0
+    for method in ("oracle", "paper"):
+        fits = rows[method]["predicted"]
+        assert (fits["fails"], fits["operation"], fits["code"]) == (False, None, "ok")
+        assert fits["size_mm"] < 0.1
+    assert [rows[method]["tried"] for method in rows] == [[], [], []]
+    assert [rows[method]["extra_operations"] for method in rows] == [0, 0, 0]
+
+
+def test_a_schedule_is_carried_out_and_counted(scene: Scene, shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = observed(scene, shown)
+    made = rebuilds(seen)
+    planned = plan(rebuilds, seen, None).plan
+    assert planned is not None
+    assert planned.schedule == made.schedule
+    np.testing.assert_array_equal(planned.targets, made.targets)
+    monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method: made)
+    row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
+    assert row["tried"] == [
+        {"step": 3, "free": [3], "gap_mm": pytest.approx(1.5)},
+        {"step": 3, "free": [3, 2], "gap_mm": pytest.approx(0.01)},
+    ]
+    assert (row["freed"], row["extra_operations"], row["predicted"]["fails"]) == ([3, 2], 2, False)
+    assert row["success"] is True
+    assert row["pushed_mm"] < 1.0
+    assert json.loads(json.dumps(row, allow_nan=False)) == row
+
+
+def test_a_person_reads_what_was_tried_and_foretold(
+    rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    tried = [{"step": 3, "free": [3], "gap_mm": 1.528}, {"step": 3, "free": [3, 2], "gap_mm": None}]
+    print_row(rows["none"] | {"tried": tried, "freed": [3, 2], "extra_operations": 2})
+    said = " ".join(capsys.readouterr().out.split())
+    assert "after step 3 {3} leaves 1.528 mm after step 3 {3,2} did not come to rest freed {3,2}" in said
+    assert "schedule 2 operations beyond doing each once predicted operation 3 fails: residual, " in said
+    print_row(rows["paper"])
+    assert "predicted it fits, 0.00 mm off at most" in " ".join(capsys.readouterr().out.split())
+
+
+def doubts(seen: Observation) -> Correction:
+    """As the paper corrects, with a test that fails and names the first relation."""
+    arcs = relation_graph(seen.assembly).arcs
+    suspects = tuple(Suspect(a.name, a.contacts, a.made, 1.0, 3, 0.8 if a is arcs[0] else 0.0) for a in arcs)
+    test = Consistency(30.0, 5, 1e-5, 0.01, suspects)
+    return replace(correct(seen, "paper"), test=test, dropped=("R1",))
+
+
+def test_the_row_says_what_the_correction_says_of_itself(
+    scene: Scene, shown: Shown, monkeypatch: pytest.MonkeyPatch, rows: dict[str, dict[str, Any]]
+) -> None:
+    monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method: doubts(seen))
+    row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
+    assert (row["chi_square"], row["chi_square_freedom"], row["p_value"]) == (30.0, 5, 1e-5)
+    assert (row["test_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
+    for method in ("oracle", "none", "paper"):
+        assert (rows[method]["test_passes"], rows[method]["suspects"], rows[method]["chi_square"]) == (None, None, None)
+    assert [rows[method]["dropped"] for method in ("oracle", "none", "paper")] == [None, None, []]
+
+
+def test_the_row_says_how_far_the_plan_is_from_the_truth(rows: dict[str, dict[str, Any]]) -> None:
+    """That of `oracle` is rounding: up to 4e-14 mm was found."""
+    assert max(rows["oracle"]["planned_error_fixed_mm"], rows["oracle"]["planned_error_free_mm"]) < 1e-12
+    assert rows["none"]["planned_error_fixed_mm"] > 1.0
+    assert rows["paper"]["planned_error_fixed_mm"] < 0.1
+    assert rows["paper"]["planned_error_free_mm"] > 0.5
+
+
+def test_wrong_relations_are_told_and_noted(scene: Scene, shown: Shown) -> None:
+    """Correctors meet them, nothing else does; robot and judge keep the right ones."""
+    kinds = ("given", "missed", "false", "shifted:3")
+    told = {k: run_trial(replace(SPEC, method="paper", relations=k), scene, shown=shown) for k in kinds}
+    assert [told[k]["relations"] for k in kinds] == list(kinds)
+    assert [told[k]["wrong_relation"] is None for k in kinds] == [True, True, False, False]
+    assert told["shifted:3"]["success"] is False
+    raw = [run_trial(replace(SPEC, relations=k), scene, shown=shown) for k in ("given", "shifted:3")]
+    apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
+    assert apart == {"relations", "spec_hash"}
+
+
+def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> None:
+    reached = rows["oracle"]["reached"]
+    assert set(reached) == {"table", "castle1", "castle2", "stick"}
+    x, y, z, *q = reached["castle2"]
+    assert 50 < x < 170
+    assert abs(y) < 60
+    assert z == pytest.approx(80.0, abs=0.1)
+    assert np.linalg.norm(q) == pytest.approx(1.0)
+    assert abs(q[0]) < 0.1  # upside down: no real part
+
+
+def test_methods_share_layout_and_hand(rows: dict[str, dict[str, Any]]) -> None:
+    assert len({row["spec_hash"] for row in rows.values()}) == 1
+
+
+def test_the_hash_names_what_may_be_counted_together(scene: Scene) -> None:
+    content = content_hash(scene.scenario, "stick_in_tower", scene.arm.mjcf)
+    same = {spec_hash(replace(SPEC, method=m, seed=k), content) for m in ("none", "paper") for k in (0, 9)}
+    assert len(same) == 1
+    others = {"level_mm": 2.0, "level_deg": 2.0, "careless": 0.0, "clearance_mm": 0.5, "noise": "a:b"}
+    others |= {"grasp": "friction", "arm": "a:b", "timestep_s": 0.0005}
+    changed = {spec_hash(replace(SPEC, **{key: value}), content) for key, value in others.items()}
+    assert len(changed | same) == len(others) + 1
+    assert spec_hash(SPEC, content, "measured") not in same
+    assert all(len(h) == 16 and int(h, 16) >= 0 for h in same)
+
+
+def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> None:
+    scenario = scene.scenario
+    path = tmp_path / "stick_in_tower.toml"
+    path.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
+    first = content_hash(scenario, "stick_in_tower", scene.arm.mjcf)
+    assert content_hash(scenario, path, scene.arm.mjcf) == first
+    path.write_bytes(path.read_bytes() + b"# a word\n")
+    arm = tmp_path / "arm.xml"
+    arm.write_text("<mujoco/>")
+    part = tmp_path / "castle.xml"
+    part.write_bytes(scenario.part_files["castle1"].read_bytes() + b"\n")
+    stricter = replace(scenario, thresholds=replace(scenario.thresholds, pushed_mm=0.5))
+    wider = replace(scenario, clearance_mm=0.5)
+    hashes = {
+        first,
+        content_hash(scenario, path, scene.arm.mjcf),
+        content_hash(scenario, "stick_in_tower", arm),
+        content_hash(replace(scenario, part_files={**scenario.part_files, "castle1": part}), "stick_in_tower", arm),
+        content_hash(stricter, "stick_in_tower", scene.arm.mjcf),
+        content_hash(scenario, scenario, scene.arm.mjcf),
+        content_hash(wider, wider, scene.arm.mjcf),
+    }
+    assert len(hashes) == 7
+
+
+def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown: Shown) -> None:
+    planned = plan(refuses, observed(scene, shown), shown.layout.goals)
+    assert planned.plan is None
+    assert planned.refused is not None
+    assert planned.refused[:2] == ("correct", "not_converged")
+    assert planned.freed == (2, 1)
+
+
+def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: Shown) -> None:
+    seen = replace(observed(scene, shown), seen=np.array([True, False, True]))
+    raw = plan("none", seen, shown.layout.goals)
+    assert raw.plan is None
+    assert raw.refused is not None
+    assert raw.refused[:3] == ("observe", "not_seen", 1)
+    assert "operation 2" in raw.refused.sentence
+    oracle = plan("oracle", seen, shown.layout.goals)
+    assert oracle.plan is not None
+    np.testing.assert_array_equal(oracle.plan.goals, shown.layout.goals)
+
+
+def test_a_row_without_replay_is_a_failure_with_null_physics(
+    scene: Scene, shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method: refuses(seen))
+    row = run_trial(replace(SPEC, method="paper"), scene, shown=shown)
+    assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
+    assert (row["freed"], row["gap_after_mm"]) == ([3, 2], None)
+    assert row["tried"] == [{"step": 3, "free": [3], "gap_mm": None}]
+    assert row["predicted"] is row["extra_operations"] is None
+    assert row["reached"] is row["sim_seconds"] is row["conditions"] is None
+
+
+def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: Shown) -> None:
+    failed = Shown(shown.layout, replace(shown.demonstration, code="demonstration_failed"))
+    rows = [run_trial(replace(SPEC, method=m), scene, shown=failed) for m in ("oracle", "none", "paper")]
+    for row in rows:
+        assert row["demonstration"] == "demonstration_failed"
+        assert row["success"] is row["loose_success"] is None
+        assert row["failure_stage"] == "demonstrate"
+
+
+def test_noise_reaches_the_robot(scene: Scene, shown: Shown) -> None:
+    """Level 0 replays exactly what was shown; other levels scale the same draws."""
+    goals = {L: observed(scene, shown, L).goals for L in (0.0, 1.0, 2.0)}
+    np.testing.assert_array_equal(goals[0.0], shown.demonstration.goals)
+    one, two = (pose.log(pose.inverse(goals[0.0]) @ goals[L]) for L in (1.0, 2.0))
+    assert np.abs(one).max() > 1e-4
+    np.testing.assert_allclose(two, 2 * one, rtol=1e-6, atol=1e-12)
+    raw = plan("none", observed(scene, shown), None).plan
+    assert raw is not None
+    np.testing.assert_array_equal(raw.goals, goals[1.0])
+
+
+def test_streams_are_apart_and_the_key_is_seed_and_stage() -> None:
+    draws = {(k, s): float(stream(k, s).random()) for k in (0, 1, 2) for s in range(4)}
+    assert len(set(draws.values())) == 12
+    assert draws[1, stages.OBSERVATION] == float(np.random.default_rng([1, 2]).random())
+    assert (stages.LAYOUT, stages.DEMONSTRATION, stages.OBSERVATION, stages.ARM) == (0, 1, 2, 3)
+
+
+def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: Shown) -> None:
+    """The truth varies: a corrector that knows the scenario by heart builds it elsewhere on the table."""
+    planned = plan(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
+    assert planned.plan is not None
+    assert planned.gap_after_m < 1e-9
+    verdict = stages.attempt(planned.plan, scene, shown.layout.goals).verdict
+    assert (verdict.as_demonstrated, verdict.demonstrated.code) == (False, "overlap")
+
+
+def test_a_measured_observation_is_judged_where_it_was_seen(scene: Scene, shown: Shown) -> None:
+    seen = observed(scene, shown)
+    row = run_measured(replace(SPEC, method="paper"), scene, seen, "text of the file")
+    assert row["success"] is True
+
+
+def test_a_measured_observation_has_no_truth(scene: Scene, shown: Shown) -> None:
+    seen = observed(scene, shown, 40.0)
+    row = run_measured(replace(SPEC, method="none"), scene, seen, "text of the file")
+    assert (row["level"], row["careless"], row["noise"], row["demonstration"]) == (None, None, "measured", "ok")
+    assert row["success"] is False
+    assert row["pose_error_fixed_mm"] is row["pose_error_free_mm"] is None
+    with pytest.raises(InputError, match=r"oracle.*truth is not known"):
+        run_measured(replace(SPEC, method="oracle"), scene, seen, "")
+
+
+def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown: Shown) -> None:
+    layout, nominal = shown.layout.goals, scene.scenario.goals
+    exact = replace(observed(scene, shown), goals=layout)
+    reference = nominal_where_seen(nominal, exact)
+    np.testing.assert_allclose(reference[0], layout[0], rtol=0, atol=1e-12)
+    steps = [pose.inverse(goals[0]) @ goals[1] for goals in (reference, nominal)]
+    np.testing.assert_allclose(steps[0], steps[1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"level_mm": -1.0}, "level in mm of -1"),
+        ({"level_deg": float("nan")}, "level in degrees of nan"),
+        ({"careless": float("inf")}, "carelessness of inf"),
+        ({"clearance_mm": 9.0}, "clearance of 9"),
+        ({"seed": -1}, "seed of -1"),
+        ({"seed": LARGEST_SEED + 1}, "whole numbers from 0"),
+        ({"method": "papr"}, "did you mean 'paper'"),
+        ({"relations": "recognized"}, "unknown kind of relations"),
+    ],
+)
+def test_a_specification_is_checked_at_the_door(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        TrialSpec(**(asdict(SPEC) | changes))
+
+
+def test_a_level_is_one_number_or_two() -> None:
+    assert level_pair(2) == (2.0, 2.0)
+    assert level_pair([1.0, 0.5]) == (1.0, 0.5)
+    with pytest.raises(InputError, match="a pair of mm and degrees"):
+        level_pair([1.0, 2.0, 3.0])
+    for wrong in (None, "far", ["far", 1.0], []):
+        with pytest.raises(InputError, match="one number is allowed"):
+            level_pair(wrong)  # type: ignore[arg-type]
+
+
+def test_a_level_of_a_ray_is_one_number() -> None:
+    assert level_pair(2, "range") == (2.0, 0.0)
+    with pytest.raises(InputError, match="one number is allowed, mm per ray"):
+        level_pair((1.0, 2.0), "range")
+    for make in (lambda: level_pair(51, "range"), lambda: TrialSpec("stick_in_tower", level_mm=51, eye="range")):
+        with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm per ray"):
+            make()
+    with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm and 1 degree"):
+        TrialSpec("stick_in_tower", level_mm=51)
+
+
+@pytest.mark.parametrize("relations", ["recognised:3", "recognised-twice:3", "given:1", "missed:2", "false:"])
+def test_only_shifted_relations_have_a_size(relations: str) -> None:
+    with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
+        TrialSpec("stick_in_tower", relations=relations)
+
+
+def observed(scene: Scene, shown: Shown, level: float = 1.0) -> Observation:
+    return see(scene, shown, make_noise("isotropic", Level(level, level)), SPEC.seed)
