@@ -33,7 +33,7 @@ _LATER = MappingProxyType(
         "Corrected": "apo_bench.envs.corrected",
         "correct": "apo_bench.correction.correctors",
         "correct_many": "apo_bench.correction.many",
-        "explain": "apo_bench.correction.explain",
+        "explain": "apo_bench.correction.explanation",
         "load_scenario": "apo_bench.scenario.file",
         "read_observation": "apo_bench.files.observation",
         "recognise": "apo_bench.recognition.contacts",

@@ -42,7 +42,7 @@ def explain(
 ) -> None:
     """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
     from apo_bench.correction.correctors import correct as corrected
-    from apo_bench.correction.explain import explain as explained
+    from apo_bench.correction.explanation import explain as explained
     from apo_bench.files.observation import as_planned, observed
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.explain_text import explanation_form, explanation_tables, sentences, total
@@ -128,7 +128,7 @@ def correct(
 def _explained(seen: Observation, made: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
     from apo_bench.correction.baselines.measured import gap_of
-    from apo_bench.correction.explain import explain as explained
+    from apo_bench.correction.explanation import explain as explained
     from apo_bench.correction.posterior import LARGE
 
     if not made.ok or 6 * len(made.goals) > LARGE or gap_of(seen, made.goals, made.dropped) > EXACT_M:

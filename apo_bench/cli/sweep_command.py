@@ -115,7 +115,7 @@ def sweep(
     """Run every combination, or the grids of a file, and print success rates with Wilson 95 % intervals."""
     from apo_bench.cli.terminal import print_cells, print_prediction
     from apo_bench.statistics.rates import tally
-    from apo_bench.sweeps.sweep import sweep as run
+    from apo_bench.sweeps.sweep import run_sweep
 
     axes = {
         "levels": levels,
@@ -132,7 +132,7 @@ def sweep(
     crew = cores() if workers is None and backend == "local" else workers
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     try:
-        rows = run(
+        rows = run_sweep(
             *(grids, out),
             workers=crew,
             limit_s=trial_limit,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.goals import Consistency, Correction, Observation
-from apo_bench.correction.explain import Explanation
+from apo_bench.correction.explanation import Explanation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.show.explain_text import covariance_form, explanation_form, sentences, total

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.directions import Direction
-from apo_bench.correction.explain import Determined, Explanation
+from apo_bench.correction.explanation import Determined, Explanation
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, extent

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly.topology import spelled
 from apo_bench.correction.directions import SHIFTS, TURNS
-from apo_bench.correction.explain import Determined, Explanation, Free, Standing
+from apo_bench.correction.explanation import Determined, Explanation, Free, Standing
 from apo_bench.correction.holding import Hold
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

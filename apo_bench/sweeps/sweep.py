@@ -36,7 +36,7 @@ LARGEST_WORKERS = 256
 BACKENDS = ("local", "ray")
 
 
-def sweep(
+def run_sweep(
     grids: SweepSpec | Sequence[SweepSpec],
     out: str | Path,
     *,

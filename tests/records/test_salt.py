@@ -28,7 +28,7 @@ from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.statistics.rates import tally
 from apo_bench.sweeps.grid import SweepSpec, load_all, units
-from apo_bench.sweeps.sweep import sweep
+from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.stages import ARM, OBSERVATION, see, show, stream
 from tests import pages
@@ -223,20 +223,20 @@ def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest
 def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same rows in this process and in two others; resumed and replayed with its salt, which nothing shows."""
     file, here, there = tmp_path / "salt", tmp_path / "here", tmp_path / "there"
-    rows = sweep(GRID, here, salt_file=file)
+    rows = run_sweep(GRID, here, salt_file=file)
     salt = read_salt(file)
     assert len(rows) == 4
     assert {one["salt"] for one in rows} == {salt.hash}
     assert json.loads((here / "run.json").read_text())["salt"] == salt.hash
-    spread = sweep(GRID, there, salt_file=file, workers=2)
+    spread = run_sweep(GRID, there, salt_file=file, workers=2)
     assert sorted(map(json.dumps, spread)) == sorted(map(json.dumps, rows))
     before = (here / "trials.jsonl").read_bytes()
-    assert sweep(GRID, here, salt_file=file) == rows
+    assert run_sweep(GRID, here, salt_file=file) == rows
     with pytest.raises(InputError, match=f"drawn with the salt {salt.hash}, and no salt file was given; give"):
-        sweep(GRID, here)
+        run_sweep(GRID, here)
     make_salt(tmp_path / "other")
     with pytest.raises(InputError, match=f"drawn with the salt {salt.hash}, and the salt file given is that of"):
-        sweep(GRID, here, salt_file=tmp_path / "other")
+        run_sweep(GRID, here, salt_file=tmp_path / "other")
     assert (here / "trials.jsonl").read_bytes() == before
     capsys.readouterr()
     command = shlex.split(replay_command(rows[0]))[1:]
@@ -253,7 +253,7 @@ def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_pictures_are_of_the_salted_trial(tmp_path: Path) -> None:
     grid = replace(GRID, levels=(0.0,), methods=("none",), trials=1)
-    (made,) = sweep(grid, tmp_path / "out", salt_file=tmp_path / "salt")
+    (made,) = run_sweep(grid, tmp_path / "out", salt_file=tmp_path / "salt")
     given = read_salt(tmp_path / "salt")
     for salt, words in ((given, "run again for this"), (None, "was not given (--salt-file), so")):
         (picture,), missed = failure_pictures([made], tmp_path / "out", salt=salt)

@@ -32,7 +32,7 @@ from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
 from apo_bench.sweeps.local import member as crew_member
 from apo_bench.sweeps.local.pool import MOST_FALSE_STARTS, spread
 from apo_bench.sweeps.stopping import Stopped, listening
-from apo_bench.sweeps.sweep import sweep
+from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.worker import Worker, lost, misbehaved
 from apo_bench.trial.fingerprint import content_hash
 from tests import pages
@@ -107,13 +107,13 @@ def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]
 
 
 def test_what_a_corrector_says_can_be_written_as_text(tmp_path: Path) -> None:
-    (said,) = sweep(grid("halves"), tmp_path / "rows")
+    (said,) = run_sweep(grid("halves"), tmp_path / "rows")
     assert "half a letter" in said["sentence"]
     said["sentence"].encode()
 
 
 def test_a_corrector_that_forks_has_one_row(tmp_path: Path) -> None:
-    rows = sweep(grid("forks", "raises", trials=2), tmp_path / "rows", workers=1)
+    rows = run_sweep(grid("forks", "raises", trials=2), tmp_path / "rows", workers=1)
     assert sorted((row["seed"], row["method"]) for row in rows) == [
         (seed, f"unruly:{method}") for seed in (0, 1) for method in ("forks", "raises")
     ]
@@ -122,8 +122,8 @@ def test_a_corrector_that_forks_has_one_row(tmp_path: Path) -> None:
 
 def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: Path) -> None:
     asked = grid("raises", "dies_of_b", "nonsense", scenarios=("block_on_block", "stick_in_tower"), trials=2)
-    one = sweep(asked, tmp_path / "one", workers=1)
-    four = sweep(asked, tmp_path / "four", workers=4)
+    one = run_sweep(asked, tmp_path / "one", workers=1)
+    four = run_sweep(asked, tmp_path / "four", workers=4)
     assert endings(one) == {
         **{
             (scenario, method): ("correct", "raised")
@@ -144,7 +144,7 @@ def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: 
 def test_an_interrupt_of_the_correctors_own_is_an_error_that_it_raised(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    rows = sweep(grid("interrupts", "raises"), tmp_path / "run", workers=1)
+    rows = run_sweep(grid("interrupts", "raises"), tmp_path / "run", workers=1)
     assert endings(rows) == {
         ("block_on_block", "interrupts"): ("correct", "raised"),
         ("block_on_block", "raises"): ("correct", "raised"),
@@ -154,7 +154,7 @@ def test_an_interrupt_of_the_correctors_own_is_an_error_that_it_raised(
 
 def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> None:
     """The clock is looked at every half second."""
-    rows = sweep(grid("slow", trials=2), tmp_path / "late", workers=1, limit_s=0.05)
+    rows = run_sweep(grid("slow", trials=2), tmp_path / "late", workers=1, limit_s=0.05)
     assert {(row["failure_stage"], row["failure_code"]) for row in rows} == {("worker", "time_limit")}
     for row in rows:
         spec = TrialSpec("block_on_block", careless=0.0, method="unruly:slow", seed=row["seed"])
@@ -171,7 +171,7 @@ def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Li
 def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = sweep(grid("raises", "nonsense", "dies_of_b"), tmp_path / "run", workers=1)
+    rows = run_sweep(grid("raises", "nonsense", "dies_of_b"), tmp_path / "run", workers=1)
     assert {row["failure_code"] for row in rows} == {"raised", "worker_died"}
     for row in rows:
         assert ("--trial-limit 600" in replay_command(row)) is (row["failure_stage"] == "worker")
@@ -182,7 +182,7 @@ def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
 def test_what_the_limit_of_the_corrector_ended_is_the_same_row_again(
     workers: int | None, limits: Limits, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (row,) = sweep(grid("hangs"), tmp_path / "run", workers=workers, limit_s=50.0, corrector_limit_s=1.5)
+    (row,) = run_sweep(grid("hangs"), tmp_path / "run", workers=workers, limit_s=50.0, corrector_limit_s=1.5)
     assert (row["failure_code"], row["sentence"]) == ("time_limit", "the corrector took longer than its limit")
     assert limits_of(read_run(tmp_path / "run")) == limits
     assert replayed(row, capsys, limits) == json.loads(json.dumps(row))
@@ -241,7 +241,7 @@ def test_a_row_on_standard_output_stands_there_alone(tmp_path: Path) -> None:
 @FOLDERS
 def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
     began = time.monotonic()
-    rows = sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=8.0)
+    rows = run_sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=8.0)
     assert endings(rows) == {
         ("block_on_block", "hangs"): ("worker", "time_limit"),
         ("block_on_block", "raises"): ("correct", "raised"),
@@ -300,7 +300,7 @@ def test_processes_that_cannot_begin_are_given_up() -> None:
 
 
 def test_a_corrector_that_removes_the_folder_of_the_rows(tmp_path: Path) -> None:
-    rows = sweep(grid("removes", "raises", trials=2), "run", workers=1)
+    rows = run_sweep(grid("removes", "raises", trials=2), "run", workers=1)
     assert len(rows) == 4
     assert {row["failure_code"] for row in rows} == {"raised"}
     assert count(tmp_path / "run") == 4

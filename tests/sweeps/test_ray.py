@@ -34,7 +34,7 @@ from apo_bench.sweeps.ray import backend as on_ray
 from apo_bench.sweeps.ray import pool as ray_crew
 from apo_bench.sweeps.ray.actor import refusal
 from apo_bench.sweeps.ray.runtime_files import parcel, wanted
-from apo_bench.sweeps.sweep import sweep
+from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.fingerprint import content_hash
 
 SPEC = SweepSpec(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
@@ -145,7 +145,7 @@ def parent(pid: int) -> int | None:
 def here(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     """The rows of `SPEC`, made in this process."""
     out = tmp_path_factory.mktemp("here")
-    sweep(SPEC, out)
+    run_sweep(SPEC, out)
     return lines(out)
 
 
@@ -162,7 +162,7 @@ def test_a_node_that_is_lost_costs_no_row_and_changes_none(cluster: Any, here: l
 
     losing = threading.Thread(target=lose)
     losing.start()
-    sweep(SPEC, tmp_path, backend="ray", address=cluster.address)
+    run_sweep(SPEC, tmp_path, backend="ray", address=cluster.address)
     losing.join()
     cluster.add_node(**NODE)
     timing = [json.loads(line) for line in text_of(tmp_path / "timing.jsonl").splitlines()]

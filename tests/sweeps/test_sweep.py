@@ -96,7 +96,7 @@ def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None
 def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
     huge = replace(SPEC, trials=1_000_000)
     with pytest.raises(InputError, match=r"up to [0-9,]+ trials, and at most 1,000,000 are allowed in one folder"):
-        runner.sweep(huge, tmp_path / "run")
+        runner.run_sweep(huge, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
@@ -118,7 +118,7 @@ def test_a_stop_is_heard_while_the_work_is_laid_out(
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have it ignored
     try:
         with pytest.raises(KeyboardInterrupt):
-            runner.sweep(replace(SPEC, trials=5), tmp_path / "run")
+            runner.run_sweep(replace(SPEC, trials=5), tmp_path / "run")
     finally:
         signal.signal(signal.SIGINT, before)
     assert counted["laid out"] == 1
@@ -144,7 +144,7 @@ def test_each_scenario_has_its_own_clearance_by_default() -> None:
 
 
 def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path: Path) -> None:
-    rows = runner.sweep(SPEC, tmp_path / "new" / "run", command="apo-bench sweep ...")
+    rows = runner.run_sweep(SPEC, tmp_path / "new" / "run", command="apo-bench sweep ...")
     assert len(rows) == ROWS
     assert read_rows(tmp_path / "new" / "run") == rows
     timing = [json.loads(line) for line in (tmp_path / "new" / "run" / "timing.jsonl").open()]
@@ -157,21 +157,21 @@ def test_a_sweep_writes_every_row_and_its_timing(counted: Counter[str], tmp_path
 
 
 def test_scenes_and_demonstrations_are_shared(counted: Counter[str], tmp_path: Path) -> None:
-    runner.sweep(SPEC, tmp_path)
+    runner.run_sweep(SPEC, tmp_path)
     assert counted == {"scene": 1, "demonstration": 3 * 2, "trial": ROWS}
 
 
 def test_a_finished_sweep_is_not_run_again(counted: Counter[str], tmp_path: Path) -> None:
-    first = runner.sweep(SPEC, tmp_path)
+    first = runner.run_sweep(SPEC, tmp_path)
     counted.clear()
-    assert runner.sweep(SPEC, tmp_path) == first
+    assert runner.run_sweep(SPEC, tmp_path) == first
     assert not counted
 
 
 def test_an_interrupted_sweep_goes_on_where_it_was_left(
     counted: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = runner.sweep(SPEC, tmp_path / "whole")
+    whole = runner.run_sweep(SPEC, tmp_path / "whole")
     quick = worker.run_trial
 
     def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
@@ -181,34 +181,34 @@ def test_an_interrupted_sweep_goes_on_where_it_was_left(
 
     monkeypatch.setattr(worker, "run_trial", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        runner.sweep(SPEC, tmp_path / "part")
+        runner.run_sweep(SPEC, tmp_path / "part")
     left = read_rows(tmp_path / "part")
     assert 0 < len(left) < ROWS
     monkeypatch.setattr(worker, "run_trial", quick)
     counted.clear()
-    assert runner.sweep(SPEC, tmp_path / "part") == whole
+    assert runner.run_sweep(SPEC, tmp_path / "part") == whole
     assert counted["trial"] == ROWS - len(left)
 
 
 @pytest.mark.parametrize("cut", [1, 40, 10_000])
 def test_a_torn_last_line_is_set_aside_and_made_again(cut: int, counted: Counter[str], tmp_path: Path) -> None:
-    whole = runner.sweep(SPEC, tmp_path)
+    whole = runner.run_sweep(SPEC, tmp_path)
     path = tmp_path / "trials.jsonl"
     text = path.read_bytes()
     torn = text[: -min(cut, len(text) - 1)]
     path.write_bytes(torn)
-    assert runner.sweep(SPEC, tmp_path) == whole
+    assert runner.run_sweep(SPEC, tmp_path) == whole
     assert path.read_bytes() == text
     assert (tmp_path / "torn.txt").read_bytes() == torn.rpartition(b"\n")[2] + b"\n"
 
 
 def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_path: Path) -> None:
-    first = runner.sweep(SPEC, tmp_path)
-    rows = runner.sweep(replace(SPEC, trials=5), tmp_path)
+    first = runner.run_sweep(SPEC, tmp_path)
+    rows = runner.run_sweep(replace(SPEC, trials=5), tmp_path)
     assert rows[: len(first)] == first
     assert {row["seed"] for row in rows} == {10, 11, 12, 13, 14}
     with pytest.raises(InputError, match="trials was 5, now 3"):
-        runner.sweep(SPEC, tmp_path)
+        runner.run_sweep(SPEC, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -224,29 +224,29 @@ def test_more_trials_of_the_same_sweep_are_welcome(counted: Counter[str], tmp_pa
 def test_a_folder_of_another_sweep_is_refused(
     change: dict[str, Any], words: str, counted: Counter[str], tmp_path: Path
 ) -> None:
-    runner.sweep(SPEC, tmp_path)
+    runner.run_sweep(SPEC, tmp_path)
     before = (tmp_path / "run.json").read_bytes()
     with pytest.raises(InputError, match=words):
-        runner.sweep(replace(SPEC, **change), tmp_path)
+        runner.run_sweep(replace(SPEC, **change), tmp_path)
     assert (tmp_path / "run.json").read_bytes() == before
 
 
 def test_rows_made_by_other_versions_are_refused(counted: Counter[str], tmp_path: Path) -> None:
-    runner.sweep(SPEC, tmp_path)
+    runner.run_sweep(SPEC, tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())
     run["versions"]["mujoco"] = "3.16.0"
     (tmp_path / "run.json").write_text(json.dumps(run))
     with pytest.raises(InputError, match=r'versions: mujoco was "3.16.0"'):
-        runner.sweep(SPEC, tmp_path)
+        runner.run_sweep(SPEC, tmp_path)
     (tmp_path / "run.json").unlink()
     with pytest.raises(InputError, match=r"no readable run\.json"):
-        runner.sweep(SPEC, tmp_path)
+        runner.run_sweep(SPEC, tmp_path)
 
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
-        runner.sweep(SPEC, tmp_path / "file" / "run")
+        runner.run_sweep(SPEC, tmp_path / "file" / "run")
 
 
 @pytest.mark.parametrize(
@@ -282,13 +282,13 @@ def test_a_sweep_that_makes_no_sense_is_refused(change: dict[str, Any], words: s
 )
 def test_names_are_checked_before_a_folder_is_made(change: dict[str, Any], words: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
-        runner.sweep(replace(SPEC, **change), tmp_path / "run")
+        runner.run_sweep(replace(SPEC, **change), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
 def test_workers_are_counted(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="0 workers"):
-        runner.sweep(SPEC, tmp_path, workers=0)
+        runner.run_sweep(SPEC, tmp_path, workers=0)
 
 
 def test_two_scenarios_of_one_name_are_refused(tmp_path: Path) -> None:
@@ -297,7 +297,7 @@ def test_two_scenarios_of_one_name_are_refused(tmp_path: Path) -> None:
     copy = tmp_path / "stick_in_tower.toml"
     copy.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
     with pytest.raises(InputError, match="two scenarios called 'stick_in_tower'"):
-        runner.sweep(replace(SPEC, scenarios=("stick_in_tower", str(copy))), tmp_path / "run")
+        runner.run_sweep(replace(SPEC, scenarios=("stick_in_tower", str(copy))), tmp_path / "run")
 
 
 @pytest.mark.slow
@@ -335,7 +335,7 @@ def test_a_range_finder_has_levels_but_no_noise_model(counted: Counter[str], tmp
     assert set(seen) == {("noise", "isotropic", True), ("noise", "camera", True), ("range", "range", False)}
     assert len(set(seen.values())) == 1
     assert {(t.eye, t.noise) for t in trials if t.method == "oracle"} == {("noise", "isotropic")}
-    rows = runner.sweep(spec, tmp_path / "eyes")
+    rows = runner.run_sweep(spec, tmp_path / "eyes")
     assert len(rows) == len(trials) == len({row_key(row) for row in rows})
     per_careless = {(t.scenario, t.seed, t.careless, t.eye) for t in trials}
     assert counted["demonstration"] == len(per_careless)
@@ -347,17 +347,17 @@ def test_there_is_no_such_eye() -> None:
 
 
 def test_a_row_that_was_made_with_something_else_is_refused(counted: Counter[str], tmp_path: Path) -> None:
-    rows = runner.sweep(SPEC, tmp_path)
+    rows = runner.run_sweep(SPEC, tmp_path)
     rows[4]["spec_hash"] = "0" * 16
     (tmp_path / "trials.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     with pytest.raises(
         InputError, match=r"holds a row of stick_in_tower, method \w+, seed 1\d, that was made with other"
     ):
-        runner.sweep(SPEC, tmp_path)
+        runner.run_sweep(SPEC, tmp_path)
 
 
 def test_grasps_are_an_axis_and_share_demonstrations(counted: Counter[str], tmp_path: Path) -> None:
-    rows = runner.sweep(replace(SPEC, grasps=("friction", "weld")), tmp_path)
+    rows = runner.run_sweep(replace(SPEC, grasps=("friction", "weld")), tmp_path)
     assert len({row_key(row) for row in rows}) == len(rows) == 2 * ROWS
     assert {(row["method"], row["grasp"]) for row in rows} == {(m, g) for m in METHODS for g in ("friction", "weld")}
     assert counted == {"scene": 2, "demonstration": 3 * 2, "trial": 2 * ROWS}
@@ -365,12 +365,12 @@ def test_grasps_are_an_axis_and_share_demonstrations(counted: Counter[str], tmp_
 
 def test_several_grids_make_one_folder(counted: Counter[str], tmp_path: Path) -> None:
     further = replace(SPEC, levels=(1.0, 2.0), methods=("paper",), trials=1)
-    rows = runner.sweep([SPEC, further], tmp_path)
+    rows = runner.run_sweep([SPEC, further], tmp_path)
     assert len({row_key(row) for row in rows}) == len(rows) == ROWS + 1
     assert len(json.loads((tmp_path / "run.json").read_text())["grids"]) == 2
     with pytest.raises(InputError, match="it had 2 grids, now 1"):
-        runner.sweep(SPEC, tmp_path)
-    assert runner.sweep([replace(SPEC, trials=4), further], tmp_path)[: len(rows)] == rows
+        runner.run_sweep(SPEC, tmp_path)
+    assert runner.run_sweep([replace(SPEC, trials=4), further], tmp_path)[: len(rows)] == rows
 
 
 def test_a_file_and_flags_make_the_same_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

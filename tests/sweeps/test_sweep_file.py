@@ -10,7 +10,7 @@ from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from apo_bench.resources import folder
 from apo_bench.sweeps.grid import SweepSpec, load_all, trial_key, units
-from apo_bench.sweeps.sweep import sweep
+from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
 WHOLE = """
@@ -164,7 +164,7 @@ BAD: list[tuple[str | bytes, str]] = [
 def test_one_sentence_for_what_is_wrong(text: str | bytes, words: str, tmp_path: Path) -> None:
     path, out = written(tmp_path, text), tmp_path / "out"
     with pytest.raises(InputError) as refused:
-        sweep(read_sweep(path), out)
+        run_sweep(read_sweep(path), out)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
     assert not out.exists()
@@ -215,6 +215,6 @@ def test_files_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_grids_of_one_sweep_have_one_arm_and_fidelity() -> None:
     first = SweepSpec(("block_on_block",))
     with pytest.raises(InputError, match="fidelity of a sweep is full and contact; run a sweep for each"):
-        sweep([first, SweepSpec(("block_on_block",), fidelity="contact")], "/no/such/folder")
+        run_sweep([first, SweepSpec(("block_on_block",), fidelity="contact")], "/no/such/folder")
     with pytest.raises(InputError, match="no grid was given"):
-        sweep([], "/no/such/folder")
+        run_sweep([], "/no/such/folder")

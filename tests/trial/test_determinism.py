@@ -18,7 +18,7 @@ from apo_bench.records.settings import TrialSpec
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.grid import SweepSpec
-from apo_bench.sweeps.sweep import sweep
+from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import show
 from apo_bench.trial.trial import run_trial
 
@@ -67,7 +67,7 @@ def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
     written = {}
     for workers in (None, 1, 2, 4):
         folder = tmp_path / str(workers)
-        rows = sweep(spec, folder, workers=workers)
+        rows = run_sweep(spec, folder, workers=workers)
         assert rows == read_rows(folder)
         written[workers] = sorted((folder / "trials.jsonl").read_bytes().splitlines())
     assert len(written[None]) == 8
@@ -77,8 +77,8 @@ def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
     spec = SweepSpec(("stick_in_tower", "stick_on_castles"), levels=(0.5,), careless=(1.0,), trials=1, seed=21)
-    one = sweep(spec, tmp_path / "one", workers=1)
-    two = sweep(spec, tmp_path / "two", workers=2)
+    one = run_sweep(spec, tmp_path / "one", workers=1)
+    two = run_sweep(spec, tmp_path / "two", workers=2)
     assert by_seed_and_method(one) == by_seed_and_method(two)
     alone = run_trial(
         TrialSpec("stick_in_tower", level_mm=0.5, level_deg=0.5, method="paper", seed=21),

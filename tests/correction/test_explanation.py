@@ -14,7 +14,7 @@ from apo_bench.assembly.placement import placed
 from apo_bench.assembly.topology import Assembly, Gap
 from apo_bench.correction.contact import contact
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.explain import Explanation, explain
+from apo_bench.correction.explanation import Explanation, explain
 from apo_bench.correction.solvers.newton import solve
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
