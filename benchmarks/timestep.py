@@ -18,7 +18,7 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
@@ -44,9 +44,9 @@ def verdicts(case: Case) -> list[bool]:
     return [bool(run_trial(_spec(case, step), scene(case.scenario, step))["success"]) for step in STEPS]
 
 
-def _spec(case: Case, step: float) -> TrialSpec:
+def _spec(case: Case, step: float) -> TrialSettings:
     level = {"level_mm": case.level, "level_deg": case.level}
-    return TrialSpec(scenario=case.scenario, seed=case.seed, careless=0.0, method="none", timestep_s=step, **level)
+    return TrialSettings(scenario=case.scenario, seed=case.seed, careless=0.0, method="none", timestep_s=step, **level)
 
 
 def main(workers: int = 2, seeds: int = 34) -> None:

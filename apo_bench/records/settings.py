@@ -36,7 +36,7 @@ LARGEST_SEED = 2**53 - 1
 
 @final
 @dataclass(frozen=True)
-class TrialSpec:
+class TrialSettings:
     """One trial: with the same code and the same assets it determines its row."""
 
     scenario: str

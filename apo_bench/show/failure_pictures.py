@@ -25,7 +25,7 @@ from apo_bench.records.key import row_key
 from apo_bench.records.own_code import left_out, own_code
 from apo_bench.records.replay_command import Files
 from apo_bench.records.salt import Salt
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.report.failures import FailurePicture, Row
 
 WIDTH, HEIGHT, QUALITY = 640, 480, 82
@@ -92,9 +92,9 @@ def _made(
     return FailurePicture(row, _jpeg(image), f"where the parts ended, as the row says; {why}, so it was not run again")
 
 
-def spec_of(row: Row, files: Files) -> TrialSpec:
+def spec_of(row: Row, files: Files) -> TrialSettings:
     """The specification of the trial that a row is of."""
-    return TrialSpec(
+    return TrialSettings(
         scenario=files.get(row["scenario"], row["scenario"]),
         level_mm=row["level"],
         level_deg=row["level_deg"],
@@ -124,7 +124,7 @@ def whole_row(folder: Path, row: Row) -> dict[str, Any]:
     return {}
 
 
-def _scene(spec: TrialSpec, scenes: dict[tuple[Any, ...], Any]) -> Any:
+def _scene(spec: TrialSettings, scenes: dict[tuple[Any, ...], Any]) -> Any:
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import build_scene
 
@@ -140,7 +140,7 @@ def _scene(spec: TrialSpec, scenes: dict[tuple[Any, ...], Any]) -> Any:
     return scenes[key]
 
 
-def _again(row: Row, spec: TrialSpec, scene: Any, content: str) -> Any:
+def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
     """The last moment of the replay, with the arm; None if it ended in another way."""
     from apo_bench.simulation.scene.render import picture_with_arm
     from apo_bench.trial.trial import run_trial

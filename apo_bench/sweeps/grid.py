@@ -17,7 +17,7 @@ from apo_bench.records.salt import Salt
 from apo_bench.records.settings import (
     RANGE,
     USUAL,
-    TrialSpec,
+    TrialSettings,
     check_careless,
     check_clearance,
     check_eye,
@@ -63,15 +63,15 @@ class SweepSpec:
     noises: tuple[str, ...] = ()
     """Empty stands for `isotropic`, and for none where no eye draws any."""
     relations: tuple[str, ...] = ("given",)
-    """What correctors are told of the contacts, as in `TrialSpec`."""
+    """What correctors are told of the contacts, as in `TrialSettings`."""
     eyes: tuple[str, ...] = ("noise",)
-    """As in `TrialSpec`; noise models are those of the eye `noise`."""
+    """As in `TrialSettings`; noise models are those of the eye `noise`."""
     grasps: tuple[str, ...] = ("friction",)
     """`friction`, or `weld` for an ideal gripper."""
     arm: str = "six_axis"
     timestep_s: float = 0.001
     fidelity: str = "full"
-    """As in `TrialSpec`; one for all trials, like the arm and the time step."""
+    """As in `TrialSettings`; one for all trials, like the arm and the time step."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
@@ -115,7 +115,7 @@ class SweepSpec:
 class Unit:
     """Trials of one scenario, clearance, seed, carelessness and eye: they share layout and demonstration."""
 
-    trials: tuple[TrialSpec, ...]
+    trials: tuple[TrialSettings, ...]
 
 
 def check_grids(grids: Sequence[SweepSpec]) -> None:
@@ -170,7 +170,7 @@ def described(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> lis
     return [_described(grid, loaded) for grid in grids]
 
 
-def trial_key(trial: TrialSpec, name: str) -> Key:
+def trial_key(trial: TrialSettings, name: str) -> Key:
     """The key of a trial whose scenario is called `name`."""
     t = trial
     where = (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg)
@@ -197,7 +197,7 @@ def _per_seed(grid: SweepSpec) -> int:
 
 def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int, salt: Salt | None) -> Iterator[Unit]:
     """The trials of a scenario and a seed, by what they share."""
-    together: dict[tuple[float, float, str], dict[TrialSpec, None]] = {}
+    together: dict[tuple[float, float, str], dict[TrialSettings, None]] = {}
     for grid in grids:
         for clearance in (grid.clearances_mm or (scenario.clearance_mm,)) if given in grid.scenarios else ():
             for trial in _trials(grid, given, clearance, seed, salt):
@@ -205,12 +205,12 @@ def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int
     return (Unit(tuple(trials)) for trials in together.values())
 
 
-def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: Salt | None) -> Iterator[TrialSpec]:
+def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: Salt | None) -> Iterator[TrialSettings]:
     def trial(
         method: str, level: Level, careless: float, way: tuple[str, str], relations: str, grasp: str
-    ) -> TrialSpec:
+    ) -> TrialSettings:
         mm, deg = level_pair(level, way[0])
-        return TrialSpec(
+        return TrialSettings(
             scenario=given,
             level_mm=mm,
             level_deg=deg,

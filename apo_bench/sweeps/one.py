@@ -19,7 +19,7 @@ from apo_bench.records.method import parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row
 from apo_bench.records.salt import read_salt
-from apo_bench.records.settings import METHOD, RANGE, TrialSpec, check_clearance
+from apo_bench.records.settings import METHOD, RANGE, TrialSettings, check_clearance
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
@@ -80,13 +80,13 @@ def run_one(request: Request) -> Row:
     return found[0]
 
 
-def _run(request: Request, spec: TrialSpec, say: Say) -> None:
+def _run(request: Request, spec: TrialSettings, say: Say) -> None:
     """Run it and say its row, then write the film."""
     with OwnCorrectors(request.corrector_limit_s) as own:
         _run_by(own.find(parsed(spec.method).plan), request, spec, say)
 
 
-def _run_by(method: Any, request: Request, spec: TrialSpec, say: Say) -> None:
+def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say) -> None:
     scenario = load_scenario(request.scenario)
     scene = build_scene(
         scenario,
@@ -106,7 +106,7 @@ def _run_by(method: Any, request: Request, spec: TrialSpec, say: Say) -> None:
         film.save(request.video)
 
 
-def _lost(request: Request, spec: TrialSpec, scenario: Scenario, code: str) -> Row:
+def _lost(request: Request, spec: TrialSettings, scenario: Scenario, code: str) -> Row:
     """The row of a trial whose process died or took too long."""
     content = content_hash(scenario, spec.scenario, find_arm(spec.arm).mjcf)
     row = lost(spec, content, code)
@@ -159,12 +159,12 @@ def watched(request: Request) -> Observation:
     return look(spec, scene, shown)
 
 
-def look(spec: TrialSpec, scene: Scene, shown: Shown) -> Observation:
+def look(spec: TrialSettings, scene: Scene, shown: Shown) -> Observation:
     """The demonstration of a trial through its eye."""
     return see(scene, shown, eye_of(spec, scene, shown), spec.seed, spec.salt)
 
 
-def _drawn(request: Request, spec: TrialSpec, scene: Scene, method: Any, film: Any) -> Row:
+def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
     shown = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
@@ -173,7 +173,7 @@ def _drawn(request: Request, spec: TrialSpec, scene: Scene, method: Any, film: A
     return row_of(spec, scene, shown, content, method=method, watch=film)
 
 
-def _measured(path: Path, spec: TrialSpec, scene: Scene, method: Any, film: Any) -> Row:
+def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
     seen = read_stated(path, scene.scenario)
     aloft = in_the_air(seen.assembly, seen.start, MEASURED_AIR_M)
     if aloft is not None:
@@ -181,7 +181,7 @@ def _measured(path: Path, spec: TrialSpec, scene: Scene, method: Any, film: Any)
     return run_measured(spec, scene, seen, read_text(path, "observation file"), method=method, watch=film)
 
 
-def _spec(request: Request, clearance_mm: float) -> TrialSpec:
+def _spec(request: Request, clearance_mm: float) -> TrialSettings:
     if request.observation:
         _refuse_contradictions(request)
     for name in ("noise", "level_deg"):
@@ -193,7 +193,7 @@ def _spec(request: Request, clearance_mm: float) -> TrialSpec:
     if request.clearance_mm is not None:
         check_clearance(request.clearance_mm)
     level = 1.0 if request.level is None else request.level
-    return TrialSpec(
+    return TrialSettings(
         scenario=request.scenario,
         level_mm=level if request.level_mm is None else request.level_mm,
         level_deg=level if request.level_deg is None else request.level_deg,

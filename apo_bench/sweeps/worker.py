@@ -18,7 +18,7 @@ from apo_bench.records.key import KEY
 from apo_bench.records.method import parsed
 from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import Row
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import Branches
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -58,7 +58,7 @@ class Worker:
         unit: Unit,
         emit: Emit,
         stopped: Callable[[], bool] = lambda: False,
-        began: Callable[[TrialSpec], None] = lambda spec: None,
+        began: Callable[[TrialSettings], None] = lambda spec: None,
     ) -> None:
         """Run the trials of a unit in their order, and emit each row with its timing.
 
@@ -101,7 +101,7 @@ class Worker:
         except InputError as error:
             return partial(_raise, Misbehaved(str(error)))
 
-    def _scene(self, spec: TrialSpec) -> tuple[Scene, str]:
+    def _scene(self, spec: TrialSettings) -> tuple[Scene, str]:
         key = (spec.scenario, spec.clearance_mm, spec.grasp)
         if key not in self._scenes:
             scene = build_scene(
@@ -117,7 +117,7 @@ class Worker:
         return self._scenes[key]
 
 
-def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
+def row_of(spec: TrialSettings, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
     """The row of a trial, also of one whose corrector misbehaved.
 
     What code of somebody's own returned may be what no row can hold; that is its failure too.
@@ -139,7 +139,7 @@ def row_of(spec: TrialSpec, scene: Scene, shown: Shown, content: str, **more: An
     return misbehaved(spec, content, shown.demonstration.code, said) if wrong else row
 
 
-def lost(spec: TrialSpec, content: str, code: str, what: str = "trial") -> Row:
+def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:
     """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
 
     Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
@@ -161,7 +161,7 @@ def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
     return row | {"demonstration": None} | result(late, success=False)
 
 
-def misbehaved(spec: TrialSpec, content: str, demonstration: str, said: str) -> Row:
+def misbehaved(spec: TrialSettings, content: str, demonstration: str, said: str) -> Row:
     """The failed row of a trial whose corrector raised an error or returned what it must not.
 
     Args:
@@ -189,6 +189,6 @@ def _raise(error: Exception, seen: Observation) -> None:
     raise error
 
 
-def _failed(spec: TrialSpec, content: str, demonstration: str | None, end: Ending) -> Row:
+def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Ending) -> Row:
     first = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
     return first | {"demonstration": demonstration} | result(end, success=False)

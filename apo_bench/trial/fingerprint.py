@@ -18,7 +18,7 @@ from apo_bench.files import json_forms as files
 from apo_bench.io.reading import read_bytes
 from apo_bench.observation.noise_file import noise_path
 from apo_bench.records.relations import WRONG
-from apo_bench.records.settings import ROW, TrialSpec
+from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.records.short_names import RESIDUALS
 from apo_bench.resources import folder
 from apo_bench.scenario.file import scenario_names
@@ -56,7 +56,7 @@ def content_pieces(scenario: Scenario, given: str | Path | Scenario, arm_file: P
     return {name: _hash(piece) for name, piece in pieces.items()}
 
 
-def spec_hash(spec: TrialSpec, content: str, observation: str = "") -> str:
+def spec_hash(spec: TrialSettings, content: str, observation: str = "") -> str:
     """16 hexadecimal digits over the content and every setting but method, seed and the scenario's path.
 
     A noise model that is a file, and noise, relations or an arm of one's own, count by what stands in the file as well;

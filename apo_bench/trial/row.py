@@ -6,14 +6,14 @@ from dataclasses import asdict
 
 from apo_bench.io.plain_text import clean
 from apo_bench.records.row import LONGEST_SENTENCE, Row
-from apo_bench.records.settings import ENV_ID, ROW, TrialSpec
+from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.confidence import UNKNOWN
 from apo_bench.trial.recognised import UNCOUNTED
 from apo_bench.trial.stages import Ending
 
 
-def head(spec: TrialSpec, scenario: Scenario, hashed: str) -> Row:
+def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
     """What was asked for.
 
     Args:

@@ -17,7 +17,7 @@ from apo_bench.observation.relations import make_relations
 from apo_bench.records.method import knows_relations, knows_truth, parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row, finite
-from apo_bench.records.settings import RANGE, TrialSpec
+from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.execution.replay_cache import Branches
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.confidence import confidence
@@ -33,7 +33,7 @@ MEASURED = MappingProxyType({"level": None, "level_deg": None, "careless": None,
 
 
 def run_trial(
-    spec: TrialSpec,
+    spec: TrialSettings,
     scene: Scene,
     *,
     shown: Shown | None = None,
@@ -68,7 +68,7 @@ def run_trial(
     return first | _carry_out(planned, scene, truth, truth, watch, spec, branches) | said | _contacts(spec, seen, told)
 
 
-def eye_of(spec: TrialSpec, scene: Scene, shown: Shown) -> Noise:
+def eye_of(spec: TrialSettings, scene: Scene, shown: Shown) -> Noise:
     """The noise model of a trial, or the range finder that watched its demonstration."""
     if spec.eye == RANGE:
         return through(scene, shown, spec.level_mm)
@@ -76,7 +76,7 @@ def eye_of(spec: TrialSpec, scene: Scene, shown: Shown) -> Noise:
 
 
 def run_measured(
-    spec: TrialSpec, scene: Scene, seen: Observation, text: str, *, method: Any = None, watch: Any = None
+    spec: TrialSettings, scene: Scene, seen: Observation, text: str, *, method: Any = None, watch: Any = None
 ) -> Row:
     """Replay an observation that came from a file: its truth is not known.
 
@@ -116,7 +116,7 @@ def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
     return np.asarray(flat @ nominal)
 
 
-def _told(spec: TrialSpec, seen: Observation, truth: Array | None) -> Observation:
+def _told(spec: TrialSettings, seen: Observation, truth: Array | None) -> Observation:
     """The observation as a corrector gets it: with the relations as given, as recognised, or wrong ones."""
     if not knows_relations(spec.method):
         return seen
@@ -125,7 +125,7 @@ def _told(spec: TrialSpec, seen: Observation, truth: Array | None) -> Observatio
     return seen if truth is None else tell(seen, make_relations(spec.relations), truth, spec.seed, spec.salt)
 
 
-def _contacts(spec: TrialSpec, seen: Observation, told: Observation) -> Row:
+def _contacts(spec: TrialSettings, seen: Observation, told: Observation) -> Row:
     """How many of the contacts that a method was told are right."""
     return counted(seen.assembly, told.assembly) if knows_relations(spec.method) else {}
 
@@ -136,7 +136,7 @@ def _carry_out(
     reference: Array,
     truth: Array | None,
     watch: Any,
-    spec: TrialSpec,
+    spec: TrialSettings,
     branches: Branches | None,
 ) -> Row:
     said = _correction(planned)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from scipy.stats import binom
 
-from apo_bench.records.settings import ROW, TrialSpec
+from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.statistics.rates import tally
@@ -62,7 +62,9 @@ def test_a_part_of_the_headline_runs_again_to_the_same_rows(name: str) -> None:
     terms = Terms({name: content_hash(load_scenario(name), name, find_arm("six_axis").mjcf)}, versions())
     worker = Worker(0, terms)
     for seed in SEEDS:
-        trials = [TrialSpec(name, LEVEL, LEVEL, CARELESS, method=m, seed=seed, fidelity=fidelity()) for m in METHODS]
+        trials = [
+            TrialSettings(name, LEVEL, LEVEL, CARELESS, method=m, seed=seed, fidelity=fidelity()) for m in METHODS
+        ]
         worker.run(Unit(tuple(trials)), lambda row, _: found.append(row))
     for method in METHODS:
         mine = [row for row in found if row["method"] == method]

@@ -142,13 +142,13 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from apo_bench.cli.show import show
     from apo_bench.correction.correctors import correct
     from apo_bench.envs.corrected import Corrected
-    from apo_bench.records.settings import METHOD, TrialSpec
+    from apo_bench.records.settings import METHOD, TrialSettings
     from apo_bench.sweeps.grid import METHODS
     from apo_bench.sweeps.one import Request
 
     commands = [signature(command).parameters["method"].default for command in (replay, correct_command, show)]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
-    assert {*commands, *doors, Request("").method, TrialSpec("").method} == {METHOD}
+    assert {*commands, *doors, Request("").method, TrialSettings("").method} == {METHOD}
     assert METHOD in METHODS
 
 

@@ -34,7 +34,7 @@ from apo_bench.correction.own_code.own import Lost, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.io.processes import descendants
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.environment_lock import Terms
@@ -393,7 +393,7 @@ def rows(worker: Worker, *methods: str) -> dict[str, dict[str, Any]]:
     from apo_bench.sweeps.grid import Unit
 
     found: dict[str, dict[str, Any]] = {}
-    asked = [TrialSpec("block_on_block", careless=0.0, method=method, seed=424243) for method in methods]
+    asked = [TrialSettings("block_on_block", careless=0.0, method=method, seed=424243) for method in methods]
     worker.run(Unit(tuple(asked)), lambda row, timing: found.update({row["method"]: dict(row)}))
     return found
 
@@ -409,7 +409,7 @@ def test_neither_truth_nor_seed_is_there(worker: Worker) -> None:
         raise ValueError(f"found {any(isinstance(one, Layout) for one in gc.get_objects())}")
 
     with pytest.raises(Misbehaved, match="found True"):
-        run_trial(TrialSpec("block_on_block", careless=0.0, method="contact", seed=1), scene, method=layouts)
+        run_trial(TrialSettings("block_on_block", careless=0.0, method="contact", seed=1), scene, method=layouts)
 
 
 def test_a_corrector_that_patches_the_judge_changes_no_other_row(worker: Worker) -> None:

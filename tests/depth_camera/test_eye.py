@@ -24,7 +24,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -194,7 +194,7 @@ def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
 
 
 def test_a_trial_through_the_range_finder() -> None:
-    spec = TrialSpec("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
+    spec = TrialSettings("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
     row = run_trial(spec, scene("stick_in_tower"), shown=watched("stick_in_tower"))
     assert row["eye"] == "range"
     assert row["success"] is True
@@ -311,7 +311,7 @@ def test_what_draws_noise_depends_on_the_eyes() -> None:
     assert SweepSpec(("block_on_block",), eyes=("range", "noise")).noises == ("isotropic",)
     assert SweepSpec(("block_on_block",), eyes=("range", "noise"), noises=("camera",)).noises == ("camera",)
     with pytest.raises(InputError, match="draws no pose noise"):
-        TrialSpec("block_on_block", eye="range", noise="camera")
+        TrialSettings("block_on_block", eye="range", noise="camera")
 
 
 @pytest.mark.parametrize("eye", [None, 3, "rang", ["range"]])

@@ -22,7 +22,7 @@ from apo_bench.envs.nullable import predicted_info, whole
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.records import outcomes
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.simulation.execution import controller as replays
 from apo_bench.trial.trial import run_trial
 
@@ -91,7 +91,7 @@ def test_a_seed_is_a_trial_whatever_came_before(env: APOReplay) -> None:
 
 def test_an_episode_is_the_row_of_its_trial(env: APOReplay) -> None:
     """Zeros, corrected, are method `paper` of `apo-bench replay --seed`."""
-    row = run_trial(TrialSpec("stick_in_tower", grasp="weld", method="paper", seed=SEED), env._scene)
+    row = run_trial(TrialSettings("stick_in_tower", grasp="weld", method="paper", seed=SEED), env._scene)
     assert row["success"] is True
     _check_episode(apo_bench.Corrected(env, "paper"), row)
     reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in env._poses.items()}
@@ -101,7 +101,7 @@ def test_an_episode_is_the_row_of_its_trial(env: APOReplay) -> None:
 def test_an_episode_that_fails_is_the_row_of_its_trial() -> None:
     """Zeros, bare, are method `none`; at this level the plan is refused before the arm moves."""
     env = APOReplay(grasp="weld", level=40)
-    spec = TrialSpec("stick_in_tower", level_mm=40.0, level_deg=40.0, grasp="weld", method="none", seed=SEED)
+    spec = TrialSettings("stick_in_tower", level_mm=40.0, level_deg=40.0, grasp="weld", method="none", seed=SEED)
     row = run_trial(spec, env._scene)
     assert row["success"] is False
     _check_episode(env, row)

@@ -18,7 +18,7 @@ from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.trial.trial import run_trial
 
 SEED = 5
@@ -155,7 +155,7 @@ def test_an_episode_with_options_is_the_row_of_its_trial() -> None:
     """At this level the plan is refused before the arm moves."""
     env = APOReplay(grasp="weld")
     env.reset(seed=SEED, options={"level": 40, "clearance_mm": 0.5})
-    spec = TrialSpec("stick_in_tower", 40.0, 40.0, clearance_mm=0.5, grasp="weld", method="none", seed=SEED)
+    spec = TrialSettings("stick_in_tower", 40.0, 40.0, clearance_mm=0.5, grasp="weld", method="none", seed=SEED)
     row = run_trial(spec, env._scene)
     _, reward, _, _, info = env.step(np.zeros((3, 6)))
     assert (reward, info["sentence"], info["predicted"]) == (float(row["success"]), row["sentence"], row["predicted"])

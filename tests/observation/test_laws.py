@@ -21,7 +21,7 @@ from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.isotropic import FLOOR, Isotropic
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
 from apo_bench.observation.observing import observe
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial import trial
@@ -216,7 +216,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
         raise Carried
 
     monkeypatch.setattr(trial, "attempt", attempt)
-    spec = TrialSpec("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
+    spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
     with pytest.raises(Carried):
         trial.run_trial(spec, scene, shown=shown, content="any")
     expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))

@@ -29,7 +29,7 @@ from apo_bench.observation.models.residuals import Residuals, compare
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.observation.observing import observe
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.trial.fingerprint import noise_content, spec_hash
 from apo_bench.trial.planning import plan
 from tests import bop_made as made_of
@@ -226,7 +226,7 @@ def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tm
     for i, source in enumerate(("whole", "inliers")):
         path.write_bytes((folder / f"{source}.csv").read_bytes())
         os.utime(path, ns=(i, i))
-        hashed = spec_hash(TrialSpec("stick_in_tower", noise=name), "content")
+        hashed = spec_hash(TrialSettings("stick_in_tower", noise=name), "content")
         seen.append((see(name, 0).goals.tobytes(), hashed, noise_content(name)[f"noise {name}"]))
     assert all(first != second for first, second in zip(*seen, strict=True))
     assert noise_content("isotropic", "anisotropic", "package.module:name") == {}

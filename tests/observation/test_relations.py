@@ -24,7 +24,7 @@ from apo_bench.observation.relations import (
     relations_name,
     told,
 )
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.trial.planning import plan
 from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream, tell
@@ -146,7 +146,7 @@ def test_the_stream_is_its_own() -> None:
     [("given", "given"), ("shifted", "shifted:2"), ("shifted:3.0", "shifted:3"), ("shifted:0.5", "shifted:0.5")],
 )
 def test_rows_spell_relations_one_way(given: str, name: str) -> None:
-    assert relations_name(given) == TrialSpec("stick_in_tower", relations=given).relations == name
+    assert relations_name(given) == TrialSettings("stick_in_tower", relations=given).relations == name
 
 
 def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
@@ -193,5 +193,5 @@ def test_no_contact_can_be_wrong_where_there_is_none() -> None:
 
 
 def test_a_specification_keeps_its_other_settings() -> None:
-    spec = TrialSpec("stick_in_tower", relations="shifted")
-    assert asdict(spec) | {"relations": "given"} == asdict(TrialSpec("stick_in_tower"))
+    spec = TrialSettings("stick_in_tower", relations="shifted")
+    assert asdict(spec) | {"relations": "given"} == asdict(TrialSettings("stick_in_tower"))

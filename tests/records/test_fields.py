@@ -10,13 +10,13 @@ import pytest
 
 from apo_bench.records.checked import row_of, timing_of, unwritable
 from apo_bench.records.fields import REQUIRED, ROW_FIELDS, TIMING_FIELDS
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.worker import lost, misbehaved, timing
 from apo_bench.trial.trial import run_trial
 
-SPEC = TrialSpec("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)
+SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pyte
     shown = show(scene, SPEC.careless, SPEC.seed)
     right = run_trial(SPEC, scene, shown=shown)
     monkeypatch.setattr(worker, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
-    mine = TrialSpec("block_on_block", method="mine:correct")
+    mine = TrialSettings("block_on_block", method="mine:correct")
     row = worker.row_of(mine, scene, shown, "0")
     assert (row["failure_stage"], row["failure_code"]) == ("correct", "raised")
     assert "returned what no row can hold (field p_value:" in row["sentence"]

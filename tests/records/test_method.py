@@ -4,7 +4,7 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.records.method import checked_method, knows_relations, knows_truth, parsed
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.statistics.rates import rank
 from apo_bench.sweeps.grid import SweepSpec, units
@@ -46,7 +46,7 @@ def test_a_wrong_name_is_refused(name, said):
 
 
 def test_one_method_has_one_name():
-    assert TrialSpec("stick_in_tower", method="none+search").method == "search"
+    assert TrialSettings("stick_in_tower", method="none+search").method == "search"
     assert SweepSpec(("stick_in_tower",), methods=("search", "none+search", "none")).methods == ("search", "none")
 
 

@@ -21,7 +21,7 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import salt as module
 from apo_bench.records.replay_command import replay_command
 from apo_bench.records.salt import Salt, make_salt, read_salt, salt_of_sweep
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.report.compare import compare
 from apo_bench.report.report import report
 from apo_bench.show.failure_pictures import failure_pictures
@@ -77,7 +77,7 @@ def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
 
 
 def test_nothing_that_is_printed_or_written_shows_the_salt() -> None:
-    spec = TrialSpec("block_on_block", salt=HERE)
+    spec = TrialSettings("block_on_block", salt=HERE)
     for text in (repr(spec), str(spec), repr(HERE), f"{HERE}", HERE.hash):
         assert HERE.secret.hex() not in text
         assert repr(HERE.secret)[2:-1] not in text
@@ -87,9 +87,9 @@ def test_nothing_that_is_printed_or_written_shows_the_salt() -> None:
 
 
 def test_rows_of_two_salts_have_two_hashes() -> None:
-    specs = [TrialSpec("block_on_block", salt=salt) for salt in (None, HERE, THERE)]
+    specs = [TrialSettings("block_on_block", salt=salt) for salt in (None, HERE, THERE)]
     assert len({spec_hash(spec, "content") for spec in specs}) == 3
-    again = TrialSpec("block_on_block", salt=Salt(HERE.secret), seed=9, method="paper")
+    again = TrialSettings("block_on_block", salt=Salt(HERE.secret), seed=9, method="paper")
     assert spec_hash(again, "content") == spec_hash(specs[1], "content")
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from apo_bench.cli import app as cli
 from apo_bench.records.replay_command import milli, number, replay_command
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.report.failures import sample
 from apo_bench.report.report import report
 from apo_bench.scenario.file import load_scenario
@@ -22,7 +22,7 @@ from apo_bench.trial.trial import run_trial
 from tests import pages
 from tests.statistics.test_rates import row, write
 
-SPEC = TrialSpec("block_on_block", level_mm=3.0, level_deg=2.0, careless=0.0, method="none", seed=5)
+SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, careless=0.0, method="none", seed=5)
 SPECS = (SPEC, replace(SPEC, method="contact"), replace(SPEC, seed=1, level_mm=10.0, level_deg=1.0))
 
 

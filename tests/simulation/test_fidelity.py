@@ -11,7 +11,7 @@ import pytest
 from apo_bench.assembly.goals import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest, replay
 from apo_bench.simulation.execution.prepare import moves
@@ -37,7 +37,7 @@ def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
 
 
 def row(method, fidelity, *, grasp="friction", level=1.0, branches=None):
-    spec = TrialSpec("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
+    spec = TrialSettings("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
     return json.dumps(run_trial(spec, scene(grasp=grasp), shown=shown(grasp=grasp), branches=branches))
 
 
@@ -206,7 +206,7 @@ def test_sleep_ends_with_the_replay():
 
 def test_contact_is_refused_for_the_ideal_gripper():
     with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
-        TrialSpec("stick_in_tower", grasp="weld", fidelity="contact")
+        TrialSettings("stick_in_tower", grasp="weld", fidelity="contact")
 
 
 class Restless:
@@ -236,7 +236,7 @@ def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
 
 @pytest.mark.parametrize(("method", "level", "seed"), [("contact", 4.0, 1), ("paper", 2.0, 64)])
 def test_sticks_that_rocked_for_ever_come_to_rest(method, level, seed):
-    spec = TrialSpec("stick_in_tower", level, level, 1.0, method=method, seed=seed)
+    spec = TrialSettings("stick_in_tower", level, level, 1.0, method=method, seed=seed)
     assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
 
 

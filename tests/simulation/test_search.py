@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Plan
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import Branches
@@ -76,7 +76,7 @@ def test_what_is_farther_off_than_the_spiral_is_not_found():
 
 
 def row(method, level, branches=None):
-    spec = TrialSpec("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
+    spec = TrialSettings("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
     return run_trial(spec, scene("stick_in_tower"), shown=shown("stick_in_tower"), branches=branches)
 
 

@@ -22,7 +22,7 @@ from apo_bench.errors import InputError
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.replay_command import replay_command
 from apo_bench.records.run_file import read_run
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.report.page.ran import limits_of
 from apo_bench.report.report import report
 from apo_bench.scenario.file import load_scenario
@@ -157,7 +157,7 @@ def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> N
     rows = run_sweep(grid("slow", trials=2), tmp_path / "late", workers=1, limit_s=0.05)
     assert {(row["failure_stage"], row["failure_code"]) for row in rows} == {("worker", "time_limit")}
     for row in rows:
-        spec = TrialSpec("block_on_block", careless=0.0, method="unruly:slow", seed=row["seed"])
+        spec = TrialSettings("block_on_block", careless=0.0, method="unruly:slow", seed=row["seed"])
         same = {name: row[name] for name in ("spec_hash", "clearance_mm")}
         assert row == {**lost(spec, "", "time_limit"), **same}
 
@@ -252,7 +252,7 @@ def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) ->
 
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
-    spec = TrialSpec("block_on_block", method="paper", seed=4)
+    spec = TrialSettings("block_on_block", method="paper", seed=4)
     died, late = lost(spec, "abc", "worker_died"), lost(spec, "abc", "time_limit")
     raised = misbehaved(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
     assert list(died) == list(late) == list(raised)
@@ -265,7 +265,7 @@ def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
 
 
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
-    unit = Unit((TrialSpec("block_on_block", method="none"),))
+    unit = Unit((TrialSettings("block_on_block", method="none"),))
     with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
         Worker(0, Terms({"block_on_block": "0123456789abcdef"}, versions())).run(unit, lambda row, timing: None)
     with pytest.raises(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.trial import code_version, fingerprint
@@ -107,6 +107,6 @@ def test_ones_own_code_counts_where_it_makes_noise_relations_or_arms(
     assert list(one.values()) != list(two.values())
     assert own_content("relations", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
     assert own_content("arm", "no_such_module:arm") == own_content("noise", "builtins:print") == {}
-    first = spec_hash(TrialSpec("block_on_block", noise="own_noise_1:blur"), "ab")
+    first = spec_hash(TrialSettings("block_on_block", noise="own_noise_1:blur"), "ab")
     monkeypatch.setattr(fingerprint, "_module_hash", lambda module: "other")
-    assert spec_hash(TrialSpec("block_on_block", noise="own_noise_1:blur"), "ab") != first
+    assert spec_hash(TrialSettings("block_on_block", noise="own_noise_1:blur"), "ab") != first

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from apo_bench.records.run_folder import read_rows
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.grid import SweepSpec
@@ -53,7 +53,7 @@ def test_layout_and_hand_do_not_depend_on_carelessness(scene: Scene) -> None:
 
 
 def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> None:
-    spec = TrialSpec("stick_on_castles", grasp="weld", method="paper", seed=3)
+    spec = TrialSettings("stick_on_castles", grasp="weld", method="paper", seed=3)
     shown = show(scene, 1.0, 3)
     first = run_trial(spec, scene, shown=shown)
     assert first["sim_seconds"] > 1.0
@@ -81,7 +81,7 @@ def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None
     two = run_sweep(spec, tmp_path / "two", workers=2)
     assert by_seed_and_method(one) == by_seed_and_method(two)
     alone = run_trial(
-        TrialSpec("stick_in_tower", level_mm=0.5, level_deg=0.5, method="paper", seed=21),
+        TrialSettings("stick_in_tower", level_mm=0.5, level_deg=0.5, method="paper", seed=21),
         build_scene(load_scenario("stick_in_tower")),
     )
     assert alone in two

@@ -12,7 +12,7 @@ import pytest
 
 from apo_bench.cli import app as cli
 from apo_bench.records.relations import RECOGNISED
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.report.figures.recognised import draw_recognitions
 from apo_bench.report.tables.recognised import ALL, NONE, recognition_lines, recognitions, write_recognitions
 from apo_bench.scenario.file import load_scenario
@@ -23,7 +23,7 @@ from apo_bench.trial.trial import run_trial
 from tests import pages
 
 SEEN = str(Path(__file__).parents[2] / "docs" / "seen.csv")
-SPEC = TrialSpec("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)
+SPEC = TrialSettings("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)
 
 
 @pytest.fixture(scope="module")
@@ -46,20 +46,20 @@ def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) 
 
 @pytest.mark.parametrize("relations", RECOGNISED)
 def test_a_trial_says_how_many_contacts_were_recognised(scene: Scene, shown: Shown, relations: str) -> None:
-    made = run_trial(TrialSpec(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
+    made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
     assert made["success"] is True
     assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (2, 0, 0)
     assert (made["relations"], made["wrong_relation"]) == (relations, None)
 
 
 def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: Shown) -> None:
-    made = run_trial(TrialSpec(**(asdict(SPEC) | {"method": "none"})), scene, shown=shown)
+    made = run_trial(TrialSettings(**(asdict(SPEC) | {"method": "none"})), scene, shown=shown)
     assert {name: made[name] for name in UNCOUNTED} == dict(UNCOUNTED)
 
 
 def test_missed_and_false_relations_are_counted_like_recognised_ones(scene: Scene, shown: Shown) -> None:
     for relations, counts in (("missed", (1, 1, 0)), ("false", (2, 0, 1)), ("given", (2, 0, 0))):
-        made = run_trial(TrialSpec(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
+        made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
         assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == counts
 
 

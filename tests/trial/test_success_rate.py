@@ -18,7 +18,7 @@ import pytest
 from scipy.stats import binom
 
 from apo_bench.records.row import Row
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import Shown, show
@@ -42,9 +42,11 @@ CASES = [
 ]
 
 
-def spec(scenario: str, method: str, seed: int) -> TrialSpec:
+def spec(scenario: str, method: str, seed: int) -> TrialSettings:
     level, careless = (0.0, 0.0) if method == "oracle" else (1.0, 1.0)
-    return TrialSpec(scenario=scenario, method=method, seed=seed, level_mm=level, level_deg=level, careless=careless)
+    return TrialSettings(
+        scenario=scenario, method=method, seed=seed, level_mm=level, level_deg=level, careless=careless
+    )
 
 
 @cache

@@ -18,7 +18,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import outcomes
-from apo_bench.records.settings import ENV_ID, LARGEST_SEED, ROW, TrialSpec, level_pair
+from apo_bench.records.settings import ENV_ID, LARGEST_SEED, ROW, TrialSettings, level_pair
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -28,7 +28,7 @@ from apo_bench.trial.planning import plan
 from apo_bench.trial.stages import Shown, see, show, stream
 from apo_bench.trial.trial import nominal_where_seen, run_measured, run_trial
 
-SPEC = TrialSpec("stick_in_tower", grasp="weld", method="none", seed=5)
+SPEC = TrialSettings("stick_in_tower", grasp="weld", method="none", seed=5)
 KEYS = (
     *("schema", "env_id", "spec_hash", "scenario", "level", "careless", "clearance_mm", "noise", "grasp"),
     *("relations", "method", "seed", "timestep_s", "thresholds", "demonstration", "success", "loose_success"),
@@ -362,7 +362,7 @@ def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown
 )
 def test_a_specification_is_checked_at_the_door(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        TrialSpec(**(asdict(SPEC) | changes))
+        TrialSettings(**(asdict(SPEC) | changes))
 
 
 def test_a_level_is_one_number_or_two() -> None:
@@ -379,17 +379,17 @@ def test_a_level_of_a_ray_is_one_number() -> None:
     assert level_pair(2, "range") == (2.0, 0.0)
     with pytest.raises(InputError, match="one number is allowed, mm per ray"):
         level_pair((1.0, 2.0), "range")
-    for make in (lambda: level_pair(51, "range"), lambda: TrialSpec("stick_in_tower", level_mm=51, eye="range")):
+    for make in (lambda: level_pair(51, "range"), lambda: TrialSettings("stick_in_tower", level_mm=51, eye="range")):
         with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm per ray"):
             make()
     with pytest.raises(InputError, match="where 1 means a standard deviation of 1 mm and 1 degree"):
-        TrialSpec("stick_in_tower", level_mm=51)
+        TrialSettings("stick_in_tower", level_mm=51)
 
 
 @pytest.mark.parametrize("relations", ["recognised:3", "recognised-twice:3", "given:1", "missed:2", "false:"])
 def test_only_shifted_relations_have_a_size(relations: str) -> None:
     with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
-        TrialSpec("stick_in_tower", relations=relations)
+        TrialSettings("stick_in_tower", relations=relations)
 
 
 def observed(scene: Scene, shown: Shown, level: float = 1.0) -> Observation:

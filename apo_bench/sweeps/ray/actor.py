@@ -13,7 +13,7 @@ from typing import Any, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.row import Row
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import Terms
@@ -103,7 +103,7 @@ class Hand:
         except BaseException:
             os._exit(1)
 
-    def _began(self, spec: TrialSpec) -> None:
+    def _began(self, spec: TrialSettings) -> None:
         self._say("began")
 
     def _emit(self, row: Row, timing: Timing) -> None:

@@ -14,7 +14,7 @@ from typing import Any, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.method import is_own
-from apo_bench.records.settings import TrialSpec
+from apo_bench.records.settings import TrialSettings
 from apo_bench.sweeps.grid import Unit
 
 Tell = Callable[[tuple[Any, ...]], None]
@@ -45,7 +45,7 @@ class Post:
     node: str | None = None
     """None until it has said so."""
     host: str = ""
-    unit: list[TrialSpec] = field(default_factory=list)
+    unit: list[TrialSettings] = field(default_factory=list)
     """Trials without a row; the first may be under way."""
     heard: int = 0
     since: float | None = None
@@ -71,7 +71,7 @@ class Crew:
         self._waiting = deque(list(unit.trials) for unit in work)
         self._make, self._ask_size, self._limit_s = make, size, limit_s
         self._size, self._looked = size(), time.monotonic()
-        self._deaths: Counter[TrialSpec] = Counter()
+        self._deaths: Counter[TrialSettings] = Counter()
         self._made = self._false_starts = 0
         self._begun = False
         self._clock, self._ticked = 0.0, time.monotonic()
@@ -214,7 +214,7 @@ class Crew:
         if rest:
             self._waiting.appendleft(rest)
 
-    def _gives_up(self, rest: Sequence[TrialSpec], why: str) -> bool:
+    def _gives_up(self, rest: Sequence[TrialSettings], why: str) -> bool:
         """Whether workers end too often before a trial began; if that is the corrector's doing, its trial is lost."""
         self._false_starts += 1
         if self._false_starts >= FALSE_STARTS and self._begun and rest and is_own(rest[0].method):
