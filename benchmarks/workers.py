@@ -16,7 +16,7 @@ from pathlib import Path
 
 from apo_bench.records.row import Row
 from apo_bench.simulation.scene.arm import find_arm
-from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, load_all, units
 from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.worker import Timing
@@ -47,13 +47,13 @@ def rows_per_second(workers: int, trials: int) -> float:
     """Of trials at fidelity contact, from the second seed on."""
     grid = SweepSpec(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
     loaded, arm = load_all([grid]), find_arm(grid.arm).mjcf
-    terms = Terms({given: content_hash(one, given, arm) for given, one in loaded.items()}, versions())
+    lock = EnvironmentLock({given: content_hash(one, given, arm) for given, one in loaded.items()}, versions())
     ended: list[tuple[float, int]] = []
 
     def emit(row: Row, timing: Timing) -> None:
         ended.append((time.perf_counter(), row["seed"]))
 
-    spread(tuple(units([grid], loaded)), terms, workers=workers, limit_s=600.0, emit=emit)
+    spread(tuple(units([grid], loaded)), lock, workers=workers, limit_s=600.0, emit=emit)
     warm = max(at for at, seed in ended if seed == grid.seed)
     later = [at for at, _ in ended if at > warm]
     return len(later) / (later[-1] - warm)

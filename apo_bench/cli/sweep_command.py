@@ -129,12 +129,12 @@ def sweep(
     }
     settings = {"trials": trials, "seed": seed, "arm": arm, "timestep_ms": timestep_ms, "fidelity": fidelity}
     grids = _grids(scenarios, axes, {name: value for name, value in settings.items() if value is not None})
-    crew = cores() if workers is None and backend == "local" else workers
+    used = cores() if workers is None and backend == "local" else workers
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     try:
         rows = run_sweep(
             *(grids, out),
-            workers=crew,
+            workers=used,
             limit_s=trial_limit,
             corrector_limit_s=corrector_limit,
             backend=backend,

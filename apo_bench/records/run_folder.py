@@ -29,7 +29,7 @@ CHUNK = 1 << 16
 
 
 @final
-class Journal:
+class RunFolder:
     """Appends rows to the folder of a sweep, and lets nobody else do so meanwhile; a context manager."""
 
     def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
@@ -62,7 +62,7 @@ class Journal:
                 f"the folder '{folder}' cannot be written ({error.strerror}); choose another one with --out."
             ) from error
 
-    def __enter__(self) -> Journal:
+    def __enter__(self) -> RunFolder:
         return self
 
     def __exit__(self, *_: object) -> None:

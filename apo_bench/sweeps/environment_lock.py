@@ -1,4 +1,4 @@
-"""The terms of a sweep: what all its rows are made with, wherever they are made."""
+"""The environment lock of a sweep: what all its rows are made with, wherever they are made."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PACKAGES = (
 
 @final
 @dataclass(frozen=True)
-class Terms:
+class EnvironmentLock:
     """Stated by the process that starts a sweep; a worker that finds anything else where it is refuses to work."""
 
     content: Mapping[str, str]

@@ -9,7 +9,7 @@ from typing import Any, final
 
 from apo_bench.io.plain_text import clean
 
-Tell = Callable[[Mapping[str, Any]], None]
+Count = Callable[[Mapping[str, Any]], None]
 """Takes every row as it comes."""
 BESIDE = ("scenario", "clearance_mm", "grasp", "noise", "relations", "careless", "method")
 """What tells the lines of the table apart; its columns are levels."""
@@ -19,7 +19,7 @@ PER_SECOND = 2.0
 
 
 @contextmanager
-def progress(total: int) -> Iterator[Tell]:
+def progress(total: int) -> Iterator[Count]:
     """Show how many of `total` trials have ended, how long the rest will take, and success by cell.
 
     The cells that fit the terminal are those that had a trial last.
@@ -59,12 +59,12 @@ def progress(total: int) -> Iterator[Tell]:
         def __rich__(self) -> Any:
             return Group(bar.get_renderable(), rates.table(max(1, console.size.height - FRAME)))
 
-    def tell(row: Mapping[str, Any]) -> None:
+    def count(row: Mapping[str, Any]) -> None:
         rates.count(row)
         bar.advance(task)
 
     with Live(Picture(), console=console, refresh_per_second=PER_SECOND, transient=True):
-        yield tell
+        yield count
 
 
 @final

@@ -15,14 +15,14 @@ from apo_bench.records.method import parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row
 from apo_bench.records.run_file import run_record
-from apo_bench.records.run_folder import Journal
+from apo_bench.records.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
 from apo_bench.records.settings import level_pair
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, find_arm
 from apo_bench.simulation.scene.physics import physics
-from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
 from apo_bench.sweeps.local.pool import check_limit, spread
 from apo_bench.sweeps.progress import progress
@@ -79,35 +79,35 @@ def run_sweep(
     here = workers is None and backend == "local"
     loaded, arm = _checked(grids, corrector_limit_s)
     content = {given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}
-    terms = Terms(content, versions(), corrector_limit_s)
+    lock = EnvironmentLock(content, versions(), corrector_limit_s)
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
     made_of = _content(grids, loaded, arm)
-    run = run_record(described(grids, loaded), made_of, code_files(), terms.versions, files, command, salt, limits)
-    with listening() as check, Journal(Path(out), run) as journal:
-        work = _left(units(grids, loaded, salt), loaded, terms, journal, check)
-        with progress(sum(len(unit.trials) for unit in work)) as tell:
+    run = run_record(described(grids, loaded), made_of, code_files(), lock.versions, files, command, salt, limits)
+    with listening() as check, RunFolder(Path(out), run) as store:
+        work = _left(units(grids, loaded, salt), loaded, lock, store, check)
+        with progress(sum(len(unit.trials) for unit in work)) as count:
 
             def emit(row: Row, timing: Timing) -> None:
                 kept = row if here else in_time(row, timing, limit_s)
-                journal.append(kept, timing)
-                tell(kept)
+                store.append(kept, timing)
+                count(kept)
 
             if backend == "ray":
                 from apo_bench.sweeps.ray.backend import spread as spread_on_ray
 
-                spread_on_ray(work, terms, workers=workers, limit_s=limit_s, emit=emit, check=check, address=address)
+                spread_on_ray(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check, address=address)
             elif workers is None:
-                _here(work, terms, emit, check)
+                _here(work, lock, emit, check)
             else:
-                spread(work, terms, workers=workers, limit_s=limit_s, emit=emit, check=check)
-        return journal.rows()
+                spread(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check)
+        return store.rows()
 
 
-def _here(work: Sequence[Unit], terms: Terms, emit: Emit, check: Check) -> None:
+def _here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Check) -> None:
     """Run the work in this process."""
-    worker = Worker(0, terms)
+    worker = Worker(0, lock)
     try:
         for unit in work:
             worker.run(unit, emit, began=lambda spec: check())
@@ -117,7 +117,7 @@ def _here(work: Sequence[Unit], terms: Terms, emit: Emit, check: Check) -> None:
 
 
 def _left(
-    work: Iterable[Unit], loaded: Mapping[str, Scenario], terms: Terms, journal: Journal, check: Check
+    work: Iterable[Unit], loaded: Mapping[str, Scenario], lock: EnvironmentLock, store: RunFolder, check: Check
 ) -> list[Unit]:
     """The trials that have no row yet; the rows that there are must be what those trials would give."""
     left, hashes = [], {}
@@ -125,16 +125,16 @@ def _left(
         check()
         trials = []
         for trial in unit.trials:
-            row_hash = journal.finished.get(trial_key(trial, loaded[trial.scenario].name))
+            row_hash = store.finished.get(trial_key(trial, loaded[trial.scenario].name))
             if row_hash is None:
                 trials.append(trial)
                 continue
             cell = (trial.scenario, *(getattr(trial, name) for name in _CELL))
             if cell not in hashes:
-                hashes[cell] = spec_hash(trial, terms.content[trial.scenario])
+                hashes[cell] = spec_hash(trial, lock.content[trial.scenario])
             if row_hash != hashes[cell]:
                 raise InputError(
-                    f"'{journal.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                    f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
                     f"{trial.seed}, that was made with other code or settings; choose another folder."
                 )
         if trials:

@@ -22,7 +22,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import Branches
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.row import head, result
@@ -40,18 +40,18 @@ ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
 class Worker:
     """Runs units of work; compiles each scene once, and imports each corrector of one's own once."""
 
-    def __init__(self, number: int, terms: Terms) -> None:
+    def __init__(self, number: int, lock: EnvironmentLock) -> None:
         """Args:
         number: Tells workers apart in `timing.jsonl`.
 
         Raises:
             InputError: Packages of other versions are installed here.
         """
-        terms.check_versions()
+        lock.check_versions()
         self.number = number
-        self._terms = terms
+        self._lock = lock
         self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
-        self._own = OwnCorrectors(terms.corrector_limit_s)
+        self._own = OwnCorrectors(lock.corrector_limit_s)
 
     def run(
         self,
@@ -112,7 +112,7 @@ class Worker:
                 timestep_s=spec.timestep_s,
             )
             content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-            self._terms.check_content(spec.scenario, content)
+            self._lock.check_content(spec.scenario, content)
             self._scenes[key] = (scene, content)
         return self._scenes[key]
 
@@ -145,7 +145,7 @@ def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> R
     Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
 
     Args:
-        content: From the terms of the sweep: `terms.content[spec.scenario]`.
+        content: From the lock of the sweep: `lock.content[spec.scenario]`.
         code: `worker_died` or `time_limit`.
         what: Whose process died or whose limit it was: `trial` or `corrector`.
     """

@@ -19,7 +19,7 @@ from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.statistics.rates import tally
-from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import Unit, load_all, units
 from apo_bench.sweeps.sweep_file import read_sweep
 from apo_bench.sweeps.worker import Worker
@@ -59,8 +59,8 @@ def key(row: dict[str, Any]) -> tuple[Any, ...]:
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_a_part_of_the_headline_runs_again_to_the_same_rows(name: str) -> None:
     kept, found = {key(row): row for row in rows()}, list[dict[str, Any]]()
-    terms = Terms({name: content_hash(load_scenario(name), name, find_arm("six_axis").mjcf)}, versions())
-    worker = Worker(0, terms)
+    lock = EnvironmentLock({name: content_hash(load_scenario(name), name, find_arm("six_axis").mjcf)}, versions())
+    worker = Worker(0, lock)
     for seed in SEEDS:
         trials = [
             TrialSettings(name, LEVEL, LEVEL, CARELESS, method=m, seed=seed, fidelity=fidelity()) for m in METHODS

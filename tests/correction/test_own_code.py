@@ -37,7 +37,7 @@ from apo_bench.io.processes import descendants
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.worker import Worker
 from apo_bench.trial.trial import run_trial
 from tests import scenes
@@ -382,9 +382,9 @@ def worker(folder: Path) -> Iterator[Worker]:
         def __getitem__(self, name: str) -> str:
             return ""
 
-    terms = Terms(Any_(), {})
-    object.__setattr__(terms, "check_content", lambda given, found: None)
-    made = Worker(0, terms)
+    lock = EnvironmentLock(Any_(), {})
+    object.__setattr__(lock, "check_content", lambda given, found: None)
+    made = Worker(0, lock)
     yield made
     made.close()
 

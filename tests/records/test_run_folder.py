@@ -20,12 +20,12 @@ from typing import Any
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.records import run_folder as journals
+from apo_bench.records import run_folder
 from apo_bench.records.key import KEY
 from apo_bench.records.run_file import run_record
-from apo_bench.records.run_folder import Journal, read_rows
+from apo_bench.records.run_folder import RunFolder, read_rows
 from apo_bench.records.settings import ROW
-from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.environment_lock import versions
 from apo_bench.trial.code_version import code_files
 from apo_bench.trial.row import result
 from apo_bench.trial.stages import Ending
@@ -33,13 +33,14 @@ from apo_bench.trial.stages import Ending
 GRID = {"scenarios": ["block_on_block"], "levels": [1.0], "trials": 60}
 CONTENT = {"block_on_block, scenario": "11", "block_on_block, part cube": "22"}
 VERSIONS = versions()
-CODE = {"simulation/attach.py": "33", "judge.py": "44"}
+ATTACH = "simulation/execution/attach.py"
+CODE = {ATTACH: "33", "judging/verdict.py": "44"}
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
 
 
 def run(**changed: Any) -> dict[str, Any]:
     said = {"grids": [GRID], "content": CONTENT, "code": CODE, "files": {}, "command": "apo-bench sweep"} | changed
-    return run_record(terms=Terms({}, VERSIONS), **said)
+    return run_record(versions=VERSIONS, **said)
 
 
 def row(seed: int) -> dict[str, Any]:
@@ -57,9 +58,9 @@ def line(seed: int) -> bytes:
 @pytest.mark.parametrize("what", ["folder", "file", "other"])
 def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "run"
-    with Journal(folder, run()) as journal:
+    with RunFolder(folder, run()) as store:
         for seed in range(4):
-            journal.append(row(seed), {"seed": seed})
+            store.append(row(seed), {"seed": seed})
             if what == "folder" and seed in (1, 3):
                 shutil.rmtree(folder.parent)
             elif what == "file" and seed == 2:
@@ -67,11 +68,11 @@ def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path
             elif what == "other" and seed == 2:
                 (folder / "trials.jsonl").replace(folder / "elsewhere")
                 (folder / "trials.jsonl").write_text("forged")
-        assert [one["seed"] for one in journal.rows()] == [0, 1, 2, 3]
+        assert [one["seed"] for one in store.rows()] == [0, 1, 2, 3]
     assert (folder / "trials.jsonl").read_bytes() == b"".join(map(line, range(4)))
     assert (folder / "timing.jsonl").read_bytes().count(b"\n") == 4
-    with Journal(folder, run()) as journal:
-        assert len(journal.finished) == 4
+    with RunFolder(folder, run()) as store:
+        assert len(store.finished) == 4
 
 
 def test_rows_are_put_back_where_the_current_folder_is_gone_too(
@@ -79,37 +80,37 @@ def test_rows_are_put_back_where_the_current_folder_is_gone_too(
 ) -> None:
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    with Journal(Path("run"), run()) as journal:
-        journal.append(row(0), {})
+    with RunFolder(Path("run"), run()) as store:
+        store.append(row(0), {})
         shutil.rmtree(tmp_path / "here")
-        assert [one["seed"] for one in journal.rows()] == [0]
+        assert [one["seed"] for one in store.rows()] == [0]
     assert (tmp_path / "here" / "run" / "trials.jsonl").read_bytes() == line(0)
 
 
 def test_rows_that_are_cut_off_meanwhile_are_said_to_be_lost(tmp_path: Path) -> None:
-    with Journal(tmp_path, run()) as journal:
-        journal.append(row(0), {})
+    with RunFolder(tmp_path, run()) as store:
+        store.append(row(0), {})
         os.truncate(tmp_path / "trials.jsonl", 10)
         with pytest.raises(RuntimeError, match=r"were removed from .* by somebody else, and are lost"):
-            journal.append(row(1), {})
+            store.append(row(1), {})
 
 
 def test_a_place_where_nothing_can_be_put_back_is_one_sentence(tmp_path: Path) -> None:
-    with Journal(tmp_path / "run", run()) as journal:
-        journal.append(row(0), {})
+    with RunFolder(tmp_path / "run", run()) as store:
+        store.append(row(0), {})
         shutil.rmtree(tmp_path / "run")
         (tmp_path / "run").write_text("a file stands here")
         with pytest.raises(RuntimeError, match=r"cannot be put back \("):
-            journal.append(row(1), {})
+            store.append(row(1), {})
 
 
 def write(folder: Path, seeds: range, pause_s: float = 0.0) -> None:
     """What a sweep does: the rows that are not there yet."""
-    with Journal(folder, run()) as journal:
-        there = {key[2] for key in journal.finished}
+    with RunFolder(folder, run()) as store:
+        there = {key[2] for key in store.finished}
         for seed in seeds:
             if seed not in there:
-                journal.append(row(seed), {"seed": seed, "trial_s": 1.0})
+                store.append(row(seed), {"seed": seed, "trial_s": 1.0})
                 time.sleep(pause_s)
 
 
@@ -163,7 +164,7 @@ def test_the_last_line_may_be_cut_anywhere(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_a_torn_tail_may_be_longer_than_is_read_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(journals, "CHUNK", 7)
+    monkeypatch.setattr(run_folder, "CHUNK", 7)
     write(tmp_path, range(2))
     with (tmp_path / "trials.jsonl").open("ab") as file:
         file.write(b"\0" * 100)
@@ -211,8 +212,8 @@ def test_a_write_may_take_several_turns(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_only_one_process_writes(tmp_path: Path) -> None:
-    with Journal(tmp_path, run()), pytest.raises(InputError, match="another sweep is writing to"):
-        Journal(tmp_path, run())
+    with RunFolder(tmp_path, run()), pytest.raises(InputError, match="another sweep is writing to"):
+        RunFolder(tmp_path, run())
     write(tmp_path, range(1))
 
 
@@ -249,7 +250,7 @@ def test_run_json_is_the_old_one_or_the_new_one(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr(os, "fsync", dies)
     with pytest.raises(InputError, match=r"cannot be written \(No space left on device\)"):
-        Journal(tmp_path, run(grids=[GRID | {"trials": 80}]))
+        RunFolder(tmp_path, run(grids=[GRID | {"trials": 80}]))
     assert (tmp_path / "run.json").read_bytes() == before
     monkeypatch.undo()
     write(tmp_path, range(2))
@@ -258,7 +259,10 @@ def test_run_json_is_the_old_one_or_the_new_one(tmp_path: Path, monkeypatch: pyt
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"code": CODE | {"simulation/attach.py": "99"}}, "(code: apo_bench/simulation/execution/attach.py changed)"),
+        (
+            {"code": CODE | {"simulation/execution/attach.py": "99"}},
+            "(code: apo_bench/simulation/execution/attach.py changed)",
+        ),
         ({"code": {**CODE, "new.py": "1", "a.py": "2"}}, "(code: apo_bench/a.py and 1 more changed)"),
         ({"code": {}}, "(code: apo_bench/judging/verdict.py and 1 more changed)"),
         (
@@ -275,10 +279,10 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
     write(tmp_path, range(2))
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     with pytest.raises(InputError) as refused:
-        Journal(tmp_path, run(**changed))
+        RunFolder(tmp_path, run(**changed))
     assert words in str(refused.value)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-    assert Journal(tmp_path, run(grids=[GRID | {"trials": 99}])).finished
+    assert RunFolder(tmp_path, run(grids=[GRID | {"trials": 99}])).finished
 
 
 @pytest.mark.parametrize(
@@ -313,17 +317,17 @@ def test_a_folder_of_something_else(name: str, text: str, words: str, tmp_path: 
 
 
 def test_a_folder_without_rows_is_anybodys(tmp_path: Path) -> None:
-    with Journal(tmp_path, run()):
+    with RunFolder(tmp_path, run()):
         pass
-    with Journal(tmp_path, run(grids=[GRID | {"levels": [3.0]}])) as journal:
-        assert not journal.finished
+    with RunFolder(tmp_path, run(grids=[GRID | {"levels": [3.0]}])) as store:
+        assert not store.finished
 
 
 def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file" / "run", Path("/proc/none"), Path("/sys/kernel")):
         with pytest.raises(InputError, match="cannot be written"):
-            Journal(folder, run())
+            RunFolder(folder, run())
 
 
 def test_the_real_code_is_named_by_its_files() -> None:

@@ -206,7 +206,7 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json.new", "torn.txt"])
 def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
-    from apo_bench.records.run_folder import Journal
+    from apo_bench.records.run_folder import RunFolder
 
     folder, target = tmp_path / "run", tmp_path / "target"
     folder.mkdir()
@@ -215,7 +215,7 @@ def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None
         (folder / "trials.jsonl").write_text('{"torn', encoding="utf-8")
     (folder / name).symlink_to(target)
     with pytest.raises(InputError, match="is a symbolic link"):
-        Journal(folder, {})
+        RunFolder(folder, {})
     assert target.read_bytes() == b""
 
 

@@ -27,7 +27,7 @@ from apo_bench.report.page.ran import limits_of
 from apo_bench.report.report import report
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
-from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
 from apo_bench.sweeps.local import member as crew_member
 from apo_bench.sweeps.local.pool import MOST_FALSE_STARTS, spread
@@ -267,18 +267,20 @@ def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
     unit = Unit((TrialSettings("block_on_block", method="none"),))
     with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
-        Worker(0, Terms({"block_on_block": "0123456789abcdef"}, versions())).run(unit, lambda row, timing: None)
+        Worker(0, EnvironmentLock({"block_on_block": "0123456789abcdef"}, versions())).run(
+            unit, lambda row, timing: None
+        )
     with pytest.raises(
         InputError, match=r"has mujoco .*, the process that started the sweep 1\.2\.3; install the same"
     ):
-        Worker(0, Terms({}, versions() | {"mujoco": "1.2.3"}))
+        Worker(0, EnvironmentLock({}, versions() | {"mujoco": "1.2.3"}))
 
 
 def test_what_a_worker_refuses_ends_the_sweep() -> None:
     asked = grid("raises")
-    terms = Terms({"block_on_block": "0123456789abcdef"}, versions())
+    lock = EnvironmentLock({"block_on_block": "0123456789abcdef"}, versions())
     with pytest.raises(InputError, match="has other code or other files"):
-        spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+        spread(tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None)
 
 
 @dataclass(frozen=True)
@@ -293,9 +295,9 @@ class Deadly:
 
 def test_processes_that_cannot_begin_are_given_up() -> None:
     asked = grid("raises")
-    terms: Any = Deadly()
+    lock: Any = Deadly()
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
-        spread(tuple(units([asked], load_all([asked]))), terms, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+        spread(tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None)
     assert MOST_FALSE_STARTS == 3
 
 
@@ -313,7 +315,7 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
     """The first process is killed after its first row, and those after it before they begin."""
     asked = replace(grid("raises", trials=2), methods=tuple(m if m == "none" else f"unruly:{m}" for m in methods))
     content = content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").mjcf)
-    terms = Terms({"block_on_block": content}, versions())
+    lock = EnvironmentLock({"block_on_block": content}, versions())
     asked_for: list[Any] = []
 
     def start(target: Any, *given: Any) -> Any:
@@ -334,9 +336,9 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
     work = tuple(units([asked], load_all([asked])))
     if "none" in methods:
         with pytest.raises(RuntimeError, match="before they have begun a trial"):
-            spread(work, terms, workers=1, limit_s=60.0, emit=emit)
+            spread(work, lock, workers=1, limit_s=60.0, emit=emit)
     else:
-        spread(work, terms, workers=1, limit_s=60.0, emit=emit)
+        spread(work, lock, workers=1, limit_s=60.0, emit=emit)
         assert [row["failure_code"] for row in rows] == ["raised", "worker_died"]
 
 

@@ -56,8 +56,8 @@ def test_the_cells_of_the_last_trials_are_shown() -> None:
 
 
 def test_nothing_is_shown_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress(2) as tell:
-        tell(row("none", 1.0, True))
+    with progress(2) as count:
+        count(row("none", 1.0, True))
     assert capsys.readouterr() == ("", "")
 
 
@@ -67,8 +67,8 @@ def test_a_terminal_sees_how_many_trials_are_left(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("TERM", "xterm")
     with os.fdopen(theirs, "w") as terminal:
         monkeypatch.setattr(sys, "stderr", terminal)
-        with progress(3) as tell:
-            tell(row("none", 1.0, True))
+        with progress(3) as count:
+            count(row("none", 1.0, True))
     seen = ""
     with suppress(OSError):  # how a terminal that nobody writes to any more ends
         while text := os.read(ours, 100_000):

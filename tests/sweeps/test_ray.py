@@ -27,7 +27,7 @@ from apo_bench.records.key import row_key
 from apo_bench.records.row import Row
 from apo_bench.resources import folder
 from apo_bench.simulation.scene.arm import find_arm
-from apo_bench.sweeps.environment_lock import Terms, versions
+from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
 from apo_bench.sweeps.ray import actor as ray_hand
 from apo_bench.sweeps.ray import backend as on_ray
@@ -108,10 +108,12 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
         time.sleep(0.1)
 
 
-def terms_of(spec: SweepSpec) -> tuple[tuple[Unit, ...], Terms]:
+def lock_of(spec: SweepSpec) -> tuple[tuple[Unit, ...], EnvironmentLock]:
     loaded = load_all([spec])
     arm = find_arm(spec.arm).mjcf
-    return tuple(units([spec], loaded)), Terms({g: content_hash(s, g, arm) for g, s in loaded.items()}, versions())
+    return tuple(units([spec], loaded)), EnvironmentLock(
+        {g: content_hash(s, g, arm) for g, s in loaded.items()}, versions()
+    )
 
 
 def lines(out: Path) -> list[bytes]:
@@ -212,11 +214,11 @@ def test_a_trial_that_ends_its_worker_or_hangs_is_one_failed_row(cluster: Any, o
     methods = tuple(f"code_of_mine:{name}" for name in ("dies", "raises", "hangs"))
     shutil.copy(folder("scenarios") / "block_on_block.toml", own / "mine.toml")
     spec = replace(SPEC, scenarios=("mine.toml",), methods=methods, trials=1)
-    work, terms = terms_of(spec)
+    work, lock = lock_of(spec)
     rows: list[Row] = []
     on_ray.spread(
         work,
-        terms,
+        lock,
         workers=None,
         limit_s=3.0,
         emit=lambda row, timing: rows.append(row),
@@ -234,8 +236,8 @@ def test_a_trial_that_ends_its_worker_or_hangs_is_one_failed_row(cluster: Any, o
 
 @pytest.mark.slow
 def test_nodes_with_other_packages_or_code_are_refused(cluster: Any) -> None:
-    work, terms = terms_of(SPEC)
-    other = replace(terms, versions={**terms.versions, "mujoco": "3.0.0"})
+    work, lock = lock_of(SPEC)
+    other = replace(lock, versions={**lock.versions, "mujoco": "3.0.0"})
     with pytest.raises(InputError, match=rf"the node '{socket.gethostname()}' .* mujoco .* 3\.0\.0"):
         on_ray.spread(work, other, workers=1, limit_s=60.0, emit=refuse_row, address=cluster.address)
 
@@ -249,16 +251,16 @@ def refuse_row(row: Row, timing: dict[str, Any]) -> None:
 
 
 def test_what_speaks_against_a_node_is_one_sentence(own: Path) -> None:
-    work, terms = terms_of(replace(SPEC, methods=("code_of_mine:raises",)))
+    work, lock = lock_of(replace(SPEC, methods=("code_of_mine:raises",)))
     asked = wanted(work)
-    assert refusal(pickle.dumps((terms, asked))) is None
-    other = dict.fromkeys(terms.content, "0" * 16)
+    assert refusal(pickle.dumps((lock, asked))) is None
+    other = dict.fromkeys(lock.content, "0" * 16)
     changed = dict.fromkeys(asked.content, "0" * 16)
     for packed, words in (
-        ((replace(terms, content=other), asked), "other code or other files for 'carried_bridge'"),
-        ((terms, replace(asked, content=changed)), "the file behind the method code_of_mine:raises is another one"),
-        ((terms, replace(asked, methods=("not_there:at_all",))), "cannot be imported"),
-        ((terms, replace(asked, scenarios=("missing.toml",))), "missing.toml"),
+        ((replace(lock, content=other), asked), "other code or other files for 'carried_bridge'"),
+        ((lock, replace(asked, content=changed)), "the file behind the method code_of_mine:raises is another one"),
+        ((lock, replace(asked, methods=("not_there:at_all",))), "cannot be imported"),
+        ((lock, replace(asked, scenarios=("missing.toml",))), "missing.toml"),
     ):
         said = refusal(pickle.dumps(packed)) or ""
         assert words in said
@@ -283,11 +285,11 @@ def test_files_below_the_current_folder_travel_and_no_others(
 
 
 def test_news_are_told_again_until_they_have_arrived(monkeypatch: pytest.MonkeyPatch) -> None:
-    work, terms = terms_of(replace(SPEC, trials=1))
+    work, lock = lock_of(replace(SPEC, trials=1))
     met = [threading.Event(), threading.Event()]
 
     class Quick:
-        def __init__(self, number: int, terms: Terms) -> None:
+        def __init__(self, number: int, lock: EnvironmentLock) -> None:
             pass
 
         def run(self, unit: Unit, emit: Any, stopped: Any, began: Any) -> None:
@@ -299,7 +301,7 @@ def test_news_are_told_again_until_they_have_arrived(monkeypatch: pytest.MonkeyP
                 emit({"method": spec.method}, {"host": "h"})
 
     monkeypatch.setattr(ray_hand, "Worker", Quick)
-    hand = ray_hand.Hand(0, pickle.dumps((terms, wanted(work))), "node 1")
+    hand = ray_hand.Hand(0, pickle.dumps((lock, wanted(work))), "node 1")
     assert hand.news(0, 0.0) == []
     hand.take(work[0])
     assert hand.news(0, 60.0) == hand.news(0, 60.0) == [("began",)]
@@ -315,11 +317,11 @@ def test_news_are_told_again_until_they_have_arrived(monkeypatch: pytest.MonkeyP
 
 def test_code_that_ends_its_thread_ends_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thread that ends would leave its worker waiting for nothing until the limit of the trial."""
-    work, terms = terms_of(replace(SPEC, trials=1))
+    work, lock = lock_of(replace(SPEC, trials=1))
     ended = threading.Event()
 
     class Leaving:
-        def __init__(self, number: int, terms: Terms) -> None:
+        def __init__(self, number: int, lock: EnvironmentLock) -> None:
             pass
 
         def run(self, *_: Any) -> None:
@@ -327,7 +329,7 @@ def test_code_that_ends_its_thread_ends_the_process(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(ray_hand, "Worker", Leaving)
     monkeypatch.setattr(ray_hand.os, "_exit", lambda code: ended.set())
-    ray_hand.Hand(0, pickle.dumps((terms, wanted(work))), "node 1").take(work[0])
+    ray_hand.Hand(0, pickle.dumps((lock, wanted(work))), "node 1").take(work[0])
     assert ended.wait(60.0)
 
 
@@ -403,7 +405,7 @@ def test_each_trial_has_one_row_whatever_is_answered(
     monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
     ray = Nodes(monkeypatch, list(answers))
     heard: list[Any] = []
-    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
     for _ in range(30):
         if crew.busy:
             crew.turn(heard.append)
@@ -418,7 +420,7 @@ def test_the_loss_of_a_node_is_no_fault_of_a_trial(monkeypatch: pytest.MonkeyPat
     ray = Nodes(monkeypatch, [HELLO, BEGAN, Gone()] * 9 + [HELLO, ENDED, ...])
     ray.alive = False
     heard: list[Any] = []
-    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
     while crew.busy:
         crew.turn(heard.append)
     assert [news[0] for news in heard] == ["row", "row"]
@@ -427,7 +429,7 @@ def test_the_loss_of_a_node_is_no_fault_of_a_trial(monkeypatch: pytest.MonkeyPat
 def test_workers_that_never_begin_end_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
     ray = Nodes(monkeypatch, [Gone("no room")] * 9)
-    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
     for _ in range(ray_crew.FALSE_STARTS - 1):
         crew.turn(refuse_news)
     with pytest.raises(RuntimeError, match="end before they have begun a trial: no room"):
@@ -439,7 +441,7 @@ def test_workers_that_begin_no_more_cost_the_trials_of_own_correctors(monkeypatc
     ray = Nodes(monkeypatch, [HELLO, ENDED[:2], *[Gone()] * (ray_crew.DEATHS - 1), *[HELLO, Gone()] * 9])
     heard: list[Any] = []
     spec = replace(SPEC, methods=("not_there:one", "not_there:two"), trials=1)
-    crew = ray_crew.Crew(terms_of(spec)[0], lambda number: ray.actor, lambda: 1, 60.0)
+    crew = ray_crew.Crew(lock_of(spec)[0], lambda number: ray.actor, lambda: 1, 60.0)
     for _ in range(30):
         if crew.busy:
             crew.turn(heard.append)
@@ -453,7 +455,7 @@ def test_a_driver_that_was_asleep_finds_nobody_late(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(ray_crew, "TURN_S", 0.2)
     ray = Nodes(monkeypatch, [HELLO, BEGAN, ..., HELLO, ENDED[2:], ...])
     heard: list[Any] = []
-    crew = ray_crew.Crew(terms_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
     for seconds in (0.0, 0.0, 3600.0):
         now[0] += seconds
         crew.turn(heard.append)

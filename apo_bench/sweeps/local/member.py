@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any, final
 
 from apo_bench.errors import InputError
-from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.process import enter, kill, speaker, start
 from apo_bench.sweeps.worker import Emit, Worker
@@ -24,9 +24,9 @@ GOING_S = 2.0
 class Member:
     """A process, and what it is doing."""
 
-    def __init__(self, number: int, terms: Terms) -> None:
+    def __init__(self, number: int, lock: EnvironmentLock) -> None:
         self.number = number
-        self.terms = terms
+        self.lock = lock
         self.unit: Unit | None = None
         self.done = 0
         """How many trials of its unit have a row."""
@@ -44,7 +44,7 @@ class Member:
     def give(self, unit: Unit) -> None:
         """Have it do a unit of work; it is started where it is not running."""
         if self.process is None:
-            self.process, self.pipe = start(_work, self.number, self.terms)
+            self.process, self.pipe = start(_work, self.number, self.lock)
         self.unit, self.done, self.since, self.heard = unit, 0, None, time.monotonic()
         with suppress(OSError):
             self.pipe.send(unit)
@@ -95,18 +95,18 @@ class Member:
         self.process = self.pipe = self.unit = None
 
 
-def _work(number: int, terms: Terms, pipe: Any) -> None:
+def _work(number: int, lock: EnvironmentLock, pipe: Any) -> None:
     """The life of a worker process."""
     enter()
     with suppress(EOFError, OSError):
-        pipe.send(_last_word(number, terms, pipe))
+        pipe.send(_last_word(number, lock, pipe))
 
 
-def _last_word(number: int, terms: Terms, pipe: Any) -> tuple[str, ...]:
+def _last_word(number: int, lock: EnvironmentLock, pipe: Any) -> tuple[str, ...]:
     """Do unit after unit, and say why there is no next."""
     say, worker = speaker(pipe), None
     try:
-        worker = Worker(number, terms)
+        worker = Worker(number, lock)
         while (unit := pipe.recv()) is not None:
             worker.run(
                 unit,

@@ -10,7 +10,7 @@ from multiprocessing import connection
 
 from apo_bench.errors import InputError
 from apo_bench.records.method import is_own
-from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.member import Member
 from apo_bench.sweeps.stopping import Check, never
@@ -35,7 +35,7 @@ def check_limit(limit_s: float) -> None:
 
 
 def spread(
-    work: Sequence[Unit], terms: Terms, *, workers: int, limit_s: float, emit: Emit, check: Check = never
+    work: Sequence[Unit], lock: EnvironmentLock, *, workers: int, limit_s: float, emit: Emit, check: Check = never
 ) -> None:
     """Run all units in `workers` processes and emit one row per trial, in the order in which trials end.
 
@@ -51,7 +51,7 @@ def spread(
         Stopped: Passed on after the rows of the trials that had ended were emitted.
     """
     waiting = deque(work)
-    crew = [Member(number, terms) for number in range(min(workers, len(work)))]
+    crew = [Member(number, lock) for number in range(min(workers, len(work)))]
     try:
         while waiting or any(member.unit for member in crew):
             check()
@@ -100,7 +100,7 @@ def _replace(
     given_up = since is None and _gives_up(member, code, begun_before and spec is not None and is_own(spec.method))
     member.end()
     if spec is not None and (since is not None or given_up):
-        row = lost(spec, member.terms.content[spec.scenario], code)
+        row = lost(spec, member.lock.content[spec.scenario], code)
         emit(row, timing(row, member.number, None, None, None if since is None else time.monotonic() - since))
         done += 1
     if unit.trials[done:]:

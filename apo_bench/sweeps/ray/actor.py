@@ -16,7 +16,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
-from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.ray.runtime_files import Wanted, check_here
 from apo_bench.sweeps.worker import Timing, Worker
@@ -30,23 +30,23 @@ def refusal(packed: bytes) -> str | None:
     """Why trials cannot run on this machine as they do where the sweep was started; None if they can.
 
     Args:
-        packed: The pickled `Terms` and `Wanted` of the sweep.
+        packed: The pickled `EnvironmentLock` and `Wanted` of the sweep.
     """
     try:
-        terms, asked = _unpacked(packed)
-        terms.check_versions()
+        lock, asked = _unpacked(packed)
+        lock.check_versions()
         check_here(asked)
         for given in asked.scenarios:
             for arm in asked.arms:
-                terms.check_content(given, content_hash(load_scenario(given), given, find_arm(arm).mjcf))
+                lock.check_content(given, content_hash(load_scenario(given), given, find_arm(arm).mjcf))
     except InputError as error:
         return f"the node '{platform.node()}' cannot work as this machine does: {error}"
     return None
 
 
-def _unpacked(packed: bytes) -> tuple[Terms, Wanted]:
-    terms, asked = pickle.loads(packed)
-    return terms, asked
+def _unpacked(packed: bytes) -> tuple[EnvironmentLock, Wanted]:
+    lock, asked = pickle.loads(packed)
+    return lock, asked
 
 
 @final
@@ -64,7 +64,7 @@ class Hand:
         node: The id of the node that it is on.
         """
         self._number, self._node = number, node
-        self._terms, _ = _unpacked(packed)
+        self._lock, _ = _unpacked(packed)
         self._orders: queue.SimpleQueue[Unit] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._news: deque[News] = deque()
@@ -92,7 +92,7 @@ class Hand:
     def _live(self) -> None:
         """The life of the thread; code of the user's that ends it, as `sys.exit` does, ends the process."""
         try:
-            worker = Worker(self._number, self._terms)
+            worker = Worker(self._number, self._lock)
             while True:
                 worker.run(self._orders.get(), self._emit, self._stop.is_set, self._began)
                 self._say("done")

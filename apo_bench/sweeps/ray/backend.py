@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.errors import InputError
-from apo_bench.sweeps.environment_lock import Terms
+from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.ray.driver import GRACE_S, Job, drive
 from apo_bench.sweeps.ray.runtime_files import parcel, wanted
@@ -66,7 +66,7 @@ def check_ray(address: str | None) -> None:
 
 def spread(
     work: Sequence[Unit],
-    terms: Terms,
+    lock: EnvironmentLock,
     *,
     workers: int | None,
     limit_s: float,
@@ -91,7 +91,7 @@ def spread(
         return
     check_ray(address)
     asked = wanted(work)
-    job = Job(tuple(work), pickle.dumps((terms, asked)), parcel(asked), address, workers, limit_s)
+    job = Job(tuple(work), pickle.dumps((lock, asked)), parcel(asked), address, workers, limit_s)
 
     def take(news: tuple[Any, ...]) -> bool:
         """Emit what is a row, or what stands for one; False for anything else."""
@@ -100,7 +100,7 @@ def spread(
             emit(*said)
         elif kind == "lost":
             spec, code, number, seconds, place = said
-            row = lost(spec, terms.content[spec.scenario], code)
+            row = lost(spec, lock.content[spec.scenario], code)
             emit(row, timing(row, number, None, None, seconds) | place)
         return kind in ("row", "lost")
 

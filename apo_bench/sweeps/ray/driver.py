@@ -44,7 +44,7 @@ class Job:
 
     work: Sequence[Unit]
     packed: bytes
-    """The pickled `Terms` and `Wanted`, for the workers."""
+    """The pickled `EnvironmentLock` and `Wanted`, for the workers."""
     files: Mapping[str, Path]
     """From `parcel`."""
     address: str | None
