@@ -12,7 +12,7 @@ from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import FARTHEST_M, rigid
 
-ASYMMETRY = 1e-9
+_ASYMMETRY = 1e-9
 """Of its largest entry, how far a covariance may be from symmetric."""
 
 
@@ -41,7 +41,7 @@ def check_observations(seen: Sequence[Any]) -> None:
     _check_poses(np.concatenate([one.goals for one in seen]), lambda j: f"the goal of {_operation(seen, j)}")
     C = np.concatenate([one.covariance for one in seen])
     off, size = (np.abs(M).max(axis=(1, 2), initial=0.0) for M in (C - np.swapaxes(C, 1, 2), C))
-    for j in map(int, np.flatnonzero(off > ASYMMETRY * size)):
+    for j in map(int, np.flatnonzero(off > _ASYMMETRY * size)):
         raise InputError(
             f"the covariance of {_operation(seen, j)} is not symmetric; entry (i, j) must equal entry (j, i)."
         )

@@ -26,14 +26,14 @@ LEVEL = 0.01
 """False alarms that are accepted."""
 MOST = 64
 """Relations that are left out in turn; of more, those that pull hardest."""
-Measure = Callable[[NDArray[np.bool_]], Consistency]
+_Measure = Callable[[NDArray[np.bool_]], Consistency]
 """The test of a correction by some of the contacts, (c,)."""
 SOFT_M = 0.05e-3
 """Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured."""
 
 
 def suspects(
-    assembly: Assembly, among: NDArray[np.bool_], measure: Measure, pull: Callable[[], Array]
+    assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, pull: Callable[[], Array]
 ) -> tuple[Suspect, ...]:
     """Every relation that has contacts `among`, (c,), those considered, left out in turn; the most suspect first.
 
@@ -48,7 +48,7 @@ def suspects(
     return _ranked(assembly, among, measure, [(f"R{i + 1}", every[i]) for i in considered])
 
 
-def narrowed(assembly: Assembly, among: NDArray[np.bool_], measure: Measure, relation: str) -> tuple[Suspect, ...]:
+def narrowed(assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, relation: str) -> tuple[Suspect, ...]:
     """The same for every contact of one relation, such as `R3`; each is called `R3: stick.py on castle1.spy`."""
     arc = assembly.arcs()[int(relation.removeprefix("R")) - 1]
     contacts = assembly.relations()
@@ -56,7 +56,7 @@ def narrowed(assembly: Assembly, among: NDArray[np.bool_], measure: Measure, rel
 
 
 def _ranked(
-    assembly: Assembly, among: NDArray[np.bool_], measure: Measure, groups: Sequence[tuple[str, tuple[int, ...]]]
+    assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, groups: Sequence[tuple[str, tuple[int, ...]]]
 ) -> tuple[Suspect, ...]:
     """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
     relations, found = assembly.relations(), list[Suspect]()

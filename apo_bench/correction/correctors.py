@@ -19,10 +19,10 @@ from apo_bench.geometry.rigid import rigid
 from apo_bench.names import resolve
 from apo_bench.records.short_names import CORRECTORS
 
-Corrector = Callable[[Observation], Correction]
+_Corrector = Callable[[Observation], Correction]
 """Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
 
-STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
+_STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
 
 
 class Misbehaved(InputError):
@@ -73,9 +73,9 @@ def _admitted(found: Any, seen: Observation, chosen: Any, name: str) -> Correcti
     """What a corrector returned, as a `Correction` that makes sense."""
     if not isinstance(found, Correction):
         return measured(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
-    if found.status not in STATUSES:
+    if found.status not in _STATUSES:
         raise InputError(
-            f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(STATUSES)}."
+            f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(_STATUSES)}."
         )
     goals = _bare(found.goals, len(seen.goals), name)
     found = checked(found, seen.assembly, name)

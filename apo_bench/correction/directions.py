@@ -17,9 +17,9 @@ from apo_bench.geometry.arrays import Array, frozen
 
 SHIFTS = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
-LENGTH_M = 0.05
+_LENGTH_M = 0.05
 """Way of a point per radian, at which a turn weighs as much as a shift."""
-ZERO = 1e-6
+_ZERO = 1e-6
 """Components below this part of the largest one are rounding."""
 
 
@@ -43,9 +43,9 @@ class Direction:
         """The axes that take part, the most important first; of a turn whose point is not the origin, the axes only."""
         words = TURNS if self.turns else SHIFTS
         order = np.argsort(-np.abs(self.axis).round(6), kind="stable")
-        own = [words[i] for i in order if abs(self.axis[i]) > ZERO]
-        screwed = abs(self.pitch_m) > ZERO * LENGTH_M
-        return (*own, *(SHIFTS[i] for i in order if screwed and abs(self.axis[i]) > ZERO))
+        own = [words[i] for i in order if abs(self.axis[i]) > _ZERO]
+        screwed = abs(self.pitch_m) > _ZERO * _LENGTH_M
+        return (*own, *(SHIFTS[i] for i in order if screwed and abs(self.axis[i]) > _ZERO))
 
     @property
     def turns(self) -> bool:
@@ -70,17 +70,17 @@ class Direction:
 
 def directions(space: Array) -> tuple[Direction, ...]:
     """A readable basis of a space of body twists, given by the columns of (6, f), [m, rad]: shifts, then turns."""
-    weights = np.array([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M])
+    weights = np.array([1.0, 1.0, 1.0, _LENGTH_M, _LENGTH_M, _LENGTH_M])
     F = _span(space * weights[:, None])
     _, w, Vt = np.linalg.svd(F[3:], full_matrices=True)
-    turning = int(np.count_nonzero(w > ZERO))
+    turning = int(np.count_nonzero(w > _ZERO))
     shifts = _aligned(_span(F[:3] @ Vt[turning:].T))
     turns = F @ Vt[:turning].T
     found = [Direction(np.concatenate([axis, np.zeros(3)])) for axis in shifts]
     for axis in _aligned(_span(turns[3:])):
-        one = turns @ np.linalg.lstsq(turns[3:], axis, rcond=None)[0] * LENGTH_M
+        one = turns @ np.linalg.lstsq(turns[3:], axis, rcond=None)[0] * _LENGTH_M
         v = one[:3] - sum((b @ one[:3]) * b for b in shifts)
-        found.append(Direction(np.concatenate([np.where(np.abs(v) < ZERO * LENGTH_M, 0.0, v), axis])))
+        found.append(Direction(np.concatenate([np.where(np.abs(v) < _ZERO * _LENGTH_M, 0.0, v), axis])))
     return tuple(found)
 
 
@@ -93,7 +93,7 @@ def held(free: Sequence[Direction]) -> tuple[str, ...]:
 def _span(columns: Array) -> Array:
     """An orthonormal basis of the column space."""
     U, w, _ = np.linalg.svd(columns, full_matrices=False)
-    return U[:, : np.count_nonzero(w > ZERO * w.max(initial=0.0))]
+    return U[:, : np.count_nonzero(w > _ZERO * w.max(initial=0.0))]
 
 
 def _aligned(basis: Array) -> list[Array]:
@@ -103,6 +103,6 @@ def _aligned(basis: Array) -> list[Array]:
         i = int(np.argmax(np.diag(P).round(6)))
         b = P[:, i] / np.linalg.norm(P[:, i])
         P = P - np.outer(b, b)
-        b = np.where(np.abs(b) < ZERO, 0.0, b)
+        b = np.where(np.abs(b) < _ZERO, 0.0, b)
         found.append(b / np.linalg.norm(b))
     return found

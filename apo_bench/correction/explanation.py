@@ -29,7 +29,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
-ZERO = 1e-7
+_ZERO = 1e-7
 """Of an orthonormal basis, components below are rounding."""
 
 
@@ -141,7 +141,7 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
                 part=assembly.operations[k].main,
                 rank=6 - own.shape[1],
                 fixed=held(named),
-                free=tuple(Free(d, deviation(C, d), _along(k, own, B[k], d)) for d in named),
+                free=tuple(Free(d, _deviation(C, d), _along(k, own, B[k], d)) for d in named),
                 through=tuple(every[i] for i in needed),
                 agreeing=tuple(every[i] for i in relations.direct(k) if i not in needed and every[i].made == k),
                 covariance=C,
@@ -159,7 +159,7 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
     )
 
 
-def deviation(C: Array, direction: Direction) -> float:
+def _deviation(C: Array, direction: Direction) -> float:
     """The standard deviation along a direction, given the covariance of the body twist, (6, 6): [m] or [rad]."""
     half = slice(3, 6) if direction.turns else slice(0, 3)
     return float(np.sqrt(direction.axis @ C[half, half] @ direction.axis))
@@ -180,7 +180,7 @@ def _own(known: Freedom, n: int) -> Iterator[Array]:
             yield left
             continue
         _, w, Vt = np.linalg.svd(left[6 * k : 6 * k + 6], full_matrices=True)
-        count = int(np.count_nonzero(w > ZERO))
+        count = int(np.count_nonzero(w > _ZERO))
         yield left @ (Vt[:count].T / w[:count])
         left = left @ Vt[count:].T
 
@@ -204,8 +204,8 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Ar
         spread, unit = reach @ free, np.linalg.norm(reach, axis=1)[:, None]
         U, w, _ = np.linalg.svd(spread / unit, full_matrices=False)
         C = spread @ spread.T
-        named = directions(unit * U[:, w > ZERO])
-        loose = tuple(Free(d, deviation(C, d)) for d in named)
+        named = directions(unit * U[:, w > _ZERO])
+        loose = tuple(Free(d, _deviation(C, d)) for d in named)
         placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
         found.append(Standing(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
     return tuple(sorted(found, key=lambda one: one.placed))

@@ -13,10 +13,10 @@ from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-CLOSE_M = 0.005
-DEVIATIONS = 2.5
+_CLOSE_M = 0.005
+_DEVIATIONS = 2.5
 """Of one ray, over a smoothed image in which noise is half of that."""
-AROUND = 12
+_AROUND = 12
 """Pixels around a region that a wrong model may cover."""
 
 
@@ -29,7 +29,7 @@ def explained(
         images: (views, height, width), measured distances, smoothed, [m].
         appeared: Per view.
     """
-    close = max(CLOSE_M, DEVIATIONS * noise_m)
+    close = max(_CLOSE_M, _DEVIATIONS * noise_m)
     good = bad = 0
     to = pose.inverse(T)
     for view, image, mask in zip(views, images, appeared, strict=True):
@@ -51,6 +51,6 @@ def _around(mask: Mask) -> NDArray[np.int64]:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return np.zeros(0, dtype=np.int64)
-    v = np.arange(max(0, rows[0] - AROUND), min(height, rows[-1] + 1 + AROUND), 2)
-    u = np.arange(max(0, columns[0] - AROUND), min(width, columns[-1] + 1 + AROUND), 2)
+    v = np.arange(max(0, rows[0] - _AROUND), min(height, rows[-1] + 1 + _AROUND), 2)
+    u = np.arange(max(0, columns[0] - _AROUND), min(width, columns[-1] + 1 + _AROUND), 2)
     return np.asarray((v[:, None] * width + u).ravel())

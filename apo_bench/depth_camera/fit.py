@@ -12,9 +12,9 @@ from apo_bench.depth_camera.distance import Shape, signed_distance
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-ARM_M = 0.04
+_ARM_M = 0.04
 """Length by which turns are weighed against shifts: half a part."""
-LEAST_NOISE_M = 0.0001
+_LEAST_NOISE_M = 0.0001
 """What one point is worth at best, [m]: the shape is not known better than to a tenth of a millimetre."""
 BENT_M = 0.003
 """Noise of this size doubles the covariance: beside an edge the nearest surface is then often not the one that was
@@ -68,7 +68,7 @@ def refined(shape: Shape, points: Points, starts: Array, width_m: float, turns: 
     widths w belong to something else and hardly count.
     """
     T, damping = np.array(starts), np.full(len(starts), 1e-3)
-    scale = np.array([1.0] * 3 + [1.0 / ARM_M] * 3)
+    scale = np.array([1.0] * 3 + [1.0 / _ARM_M] * 3)
     d, J = _rows(shape, points, T)
     cost = _loss(d, width_m)
     for _ in range(turns):
@@ -100,11 +100,11 @@ def covariance(shape: Shape, points: Points, T: Array, width_m: float, noise_m: 
     d, J = (a[0] for a in _rows(shape, points, T[None]))
     weight = 1.0 / (1.0 + (d / width_m) ** 2) ** 2
     WJ = J * weight[:, None]
-    loose = float(weight.mean()) * (max(noise_m, LEAST_NOISE_M) / PRIOR) ** 2
+    loose = float(weight.mean()) * (max(noise_m, _LEAST_NOISE_M) / PRIOR) ** 2
     inverse = np.linalg.inv(J.T @ WJ + np.diag(loose))
     gradient = -J[:, :3]
     slope = np.einsum("ni,ni->n", gradient @ T[:3, :3].T, points.ray)
-    variance = (noise_m * slope) ** 2 + LEAST_NOISE_M**2
+    variance = (noise_m * slope) ** 2 + _LEAST_NOISE_M**2
     middle = WJ.T @ (variance[:, None] * WJ)
     for v in np.unique(points.view):
         common = WJ.T @ np.where(points.view == v, bias_m * slope, 0.0)

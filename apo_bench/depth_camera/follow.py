@@ -21,9 +21,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 
-GONE = 0.5
+_GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""
-GRID = 3
+_GRID = 3
 """Every so many pixels are asked what is seen there."""
 
 
@@ -134,15 +134,15 @@ def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared:
     seen, gone = np.zeros(len(parts)), np.zeros(len(parts))
     for owner, region in zip(owners, compared, strict=True):
         seen += np.bincount(owner[owner >= 0], minlength=len(parts))
-        gone += np.bincount(owner[(owner >= 0) & region.vanished[::GRID, ::GRID]], minlength=len(parts))
-    return frozenset(part for part, n, m in zip(parts, seen, gone, strict=True) if n and m >= GONE * n)
+        gone += np.bincount(owner[(owner >= 0) & region.vanished[::_GRID, ::_GRID]], minlength=len(parts))
+    return frozenset(part for part, n, m in zip(parts, seen, gone, strict=True) if n and m >= _GONE * n)
 
 
 def _owners(view: View, shapes: Mapping[str, Shape], believed: Poses) -> NDArray[np.int64]:
     """Which part every few pixels of a view should show, by number, -1 for none."""
     owner = np.concatenate([np.full(len(shape.center), i) for i, shape in enumerate(shapes.values())])
     scene = joined(_posed(shape, believed[part]) for part, shape in shapes.items())
-    pixels = np.arange(view.height * view.width).reshape(view.height, view.width)[::GRID, ::GRID]
+    pixels = np.arange(view.height * view.width).reshape(view.height, view.width)[::_GRID, ::_GRID]
     _, box = struck(scene, view.origin, view.rays[pixels.ravel()])
     return np.where(box < 0, -1, owner[box]).reshape(pixels.shape)
 

@@ -18,18 +18,18 @@ from apo_bench.depth_camera.starts import starts
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry.arrays import Array
 
-COARSE, MIDDLE, FINE = 150, 500, 3000
+_COARSE, _MIDDLE, _FINE = 150, 500, 3000
 """Points of a first fit from every start, of the best of these, and of the last fit."""
-BEST = 4
+_BEST = 4
 """Starts that are followed further: one fit in some ends beside the true place, so never only one."""
-WIDTH_M = 0.0015
+_WIDTH_M = 0.0015
 """Points this far away from a surface are half doubted; three standard deviations if that is more."""
-WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
+_WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
 """A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
-WELL_SEEN.flags.writeable = False
-WIDE_M = 0.012
+_WELL_SEEN.flags.writeable = False
+_WIDE_M = 0.012
 """The same at the beginning of a fit: from there the width is narrowed, so that no end of a part is left behind."""
-LEAST_EXPLAINED = 0.6
+_LEAST_EXPLAINED = 0.6
 """A model that explains less was not recognised."""
 ALIKE = 0.03
 """What explains this much less than the best cannot be told from it so."""
@@ -79,7 +79,7 @@ class Appearance:
 
     @property
     def width_m(self) -> float:
-        return max(WIDTH_M, 3.0 * self.noise_m)
+        return max(_WIDTH_M, 3.0 * self.noise_m)
 
 
 @final
@@ -104,9 +104,9 @@ def located(model: Model, seen: Appearance, points: Points) -> Located | None:
     if len(points) < 6:
         return None
     best, _ = _best(model, seen, points)
-    T, C = _fine(model.shape, seen, points.thinned(FINE), best)
+    T, C = _fine(model.shape, seen, points.thinned(_FINE), best)
     share = _share(model, seen, T)
-    if share < LEAST_EXPLAINED:
+    if share < _LEAST_EXPLAINED:
         return None
     if model.main is not None:
         main, rest = (Shape(*(a[part] for a in model.shape)) for part in (slice(model.main), slice(model.main, None)))
@@ -114,8 +114,8 @@ def located(model: Model, seen: Appearance, points: Points) -> Located | None:
         d = np.abs(signed_distance(main, local)[0])
         own = points.only((d < 2.0 * seen.width_m) & (d < np.abs(signed_distance(rest, local)[0])))
         if len(own) >= 6:
-            alone = _fine(main, seen, own.thinned(FINE), T)
-            if (np.sqrt(np.diag(alone[1])) < WELL_SEEN).all():
+            alone = _fine(main, seen, own.thinned(_FINE), T)
+            if (np.sqrt(np.diag(alone[1])) < _WELL_SEEN).all():
                 T, C = alone
     return Located(T, C, share)
 
@@ -136,10 +136,10 @@ def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Arr
 def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
     """The best few of the fits from all starts."""
     begun = starts(model.shape, points.at, model.same)
-    first = refined(model.shape, points.thinned(COARSE), begun, max(WIDE_M, 3.0 * seen.width_m), 10)
-    best = first.T[np.argsort(first.cost, kind="stable")[:BEST]]
-    middle = points.thinned(MIDDLE)
-    nearer = refined(model.shape, middle, best, np.sqrt(seen.width_m * max(WIDE_M, 3.0 * seen.width_m)), 8)
+    first = refined(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * seen.width_m), 10)
+    best = first.T[np.argsort(first.cost, kind="stable")[:_BEST]]
+    middle = points.thinned(_MIDDLE)
+    nearer = refined(model.shape, middle, best, np.sqrt(seen.width_m * max(_WIDE_M, 3.0 * seen.width_m)), 8)
     return refined(model.shape, middle, nearer.T, seen.width_m, 8)
 
 

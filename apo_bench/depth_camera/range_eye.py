@@ -15,9 +15,9 @@ from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import floored
 
-UNSEEN = np.diag(np.repeat([0.1, 1.0], 3) ** 2)
+_UNSEEN = np.diag(np.repeat([0.1, 1.0], 3) ** 2)
 """The covariance that stands beside an operation that was not seen, [m, rad]."""
-UNSEEN.flags.writeable = False
+_UNSEEN.flags.writeable = False
 
 
 @final
@@ -43,7 +43,7 @@ class RangeEye:
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         events = self.events(shown, self.sensed(rng))
         goals = np.array([shown.start[operation.main] for operation in assembly.operations])
-        covariance, seen = np.repeat(UNSEEN[None], len(assembly), axis=0), np.zeros(len(assembly), dtype=np.bool_)
+        covariance, seen = np.repeat(_UNSEEN[None], len(assembly), axis=0), np.zeros(len(assembly), dtype=np.bool_)
         for event in events:
             if event.found is not None and event.operation is not None:
                 k = event.operation

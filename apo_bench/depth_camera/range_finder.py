@@ -25,7 +25,7 @@ class RangeImage(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
+def _two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
     """From the left in front and from the right behind, 45 degrees high: together they see every side of a part.
 
     One view is not enough: of a stick that lies in a tower only its ends can be seen, and only one of them from
@@ -42,7 +42,7 @@ def two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
 class RangeFinder:
     """A range finder and its errors. A level of L mm means a standard deviation of L mm per ray."""
 
-    views: tuple[View, ...] = field(default_factory=two_views)
+    views: tuple[View, ...] = field(default_factory=_two_views)
     bias: float = 0.1
     """Standard deviation, over the level, of an error that all rays of one view and firing have in common: white noise
     averages out over a part, so this is what stays; a tenth, as repeated measurements of a fixed object differ by 0.1

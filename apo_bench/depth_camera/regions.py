@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from apo_bench.geometry.arrays import Array
 
 Mask = NDArray[np.bool_]
-LEAST_M = 0.010
+_LEAST_M = 0.010
 """A difference below is no change. Half of the thinnest part: a part that was nudged sideways by 4 mm changes the
 distance to a side that is seen at 60 degrees by 8 mm, which goes unnoticed."""
-DEVIATIONS = 6.0
+_DEVIATIONS = 6.0
 """So many standard deviations of the smoothed difference are no change either."""
-SMOOTHED = 0.46
+_SMOOTHED = 0.46
 """Standard deviation of the median of three medians of three numbers over that of one."""
-LEAST_PIXELS, LEAST_WIDTH = 40, 5
+_LEAST_PIXELS, _LEAST_WIDTH = 40, 5
 """Regions that are smaller, or hold no square of so many pixels, 14 mm, are edges of something that moved a little."""
 
 
@@ -46,7 +46,7 @@ def regions(before: Array, after: Array, noise_m: float) -> Regions:
     with np.errstate(invalid="ignore"):
         difference = after - before
     change = smoothed(np.where(np.isfinite(difference), difference, 0.0))
-    least = max(LEAST_M, DEVIATIONS * SMOOTHED * np.sqrt(2.0) * noise_m)
+    least = max(_LEAST_M, _DEVIATIONS * _SMOOTHED * np.sqrt(2.0) * noise_m)
     square = np.ones((3, 3), dtype=np.bool_)
     appeared, vanished = (large(binary_opening(sign * change > least, square)) for sign in (-1.0, 1.0))
     return Regions(appeared, vanished, change)
@@ -70,7 +70,7 @@ def large(mask: Mask) -> Mask:
     names, n = label(mask)
     size = np.bincount(names.ravel(), minlength=n + 1)
     thick = np.zeros(n + 1, dtype=np.bool_)
-    thick[names[binary_erosion(mask, np.ones((LEAST_WIDTH, LEAST_WIDTH), dtype=np.bool_))]] = True
-    kept = thick & (size >= LEAST_PIXELS)
+    thick[names[binary_erosion(mask, np.ones((_LEAST_WIDTH, _LEAST_WIDTH), dtype=np.bool_))]] = True
+    kept = thick & (size >= _LEAST_PIXELS)
     kept[0] = False
     return np.asarray(kept[names])

@@ -8,9 +8,9 @@ from apo_bench.depth_camera.distance import Shape
 from apo_bench.depth_camera.symmetry import quarter_turns
 from apo_bench.geometry.arrays import Array
 
-EDGE = 0.01
+_EDGE = 0.01
 """Share of the points beyond either end of their extent: noise makes regions larger than parts."""
-STEPS = 45
+_STEPS = 45
 """Directions between 0 and 90 degrees that are tried for the sides of the smallest rectangle."""
 
 
@@ -54,14 +54,14 @@ def extent(shape: Shape, R: Array) -> tuple[Array, Array]:
 
 
 def _extent(points: Array) -> tuple[Array, Array]:
-    low, high = np.quantile(points, (EDGE, 1.0 - EDGE), axis=0)
+    low, high = np.quantile(points, (_EDGE, 1.0 - _EDGE), axis=0)
     return low, high
 
 
 def _sides(flat: Array) -> float:
     """The turn, 0 to 90 degrees, of the smallest rectangle around points (n, 2), [rad]."""
-    turns = np.arange(STEPS) * np.pi / 2 / STEPS
+    turns = np.arange(_STEPS) * np.pi / 2 / _STEPS
     ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     across = np.stack([-np.sin(turns), np.cos(turns)], axis=1)
-    sizes = [np.ptp(np.quantile(flat @ w.T, (EDGE, 1.0 - EDGE), axis=0), axis=0) for w in (ways, across)]
+    sizes = [np.ptp(np.quantile(flat @ w.T, (_EDGE, 1.0 - _EDGE), axis=0), axis=0) for w in (ways, across)]
     return float(turns[np.argmin(sizes[0] * sizes[1])])

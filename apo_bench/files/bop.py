@@ -19,13 +19,13 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
 
-COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
-WANTED = "needed are, in this order, " + ",".join(COLUMNS)
-LONGEST_LINE, MOST_ROWS = 4096, 1_000_000
+_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
+_WANTED = "needed are, in this order, " + ",".join(_COLUMNS)
+_LONGEST_LINE, MOST_ROWS = 4096, 1_000_000
 LARGEST_ID, LARGEST_MM = 2**31 - 1, 1e6
-NOT_A_ROTATION = 0.02
+_NOT_A_ROTATION = 0.02
 """R R^t may be so far from the identity: published truth is rounded, that of LM-O by 0.0096."""
-METRES = 20.0
+_METRES = 20.0
 """Parts whose median distance to the camera is less than this, in mm, were surely given in metres."""
 
 
@@ -80,13 +80,13 @@ def checked(rows: Located) -> Located:
         InputError: One is no rotation, the unit is not mm, or a row stands twice.
     """
     square = np.abs(rows.R @ np.swapaxes(rows.R, 1, 2) - np.eye(3)).max(axis=(1, 2))
-    wrong = (square > NOT_A_ROTATION) | (np.linalg.det(rows.R) < 0.0)
+    wrong = (square > _NOT_A_ROTATION) | (np.linalg.det(rows.R) < 0.0)
     if wrong.any():
         k = int(np.argmax(wrong))
-        fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > NOT_A_ROTATION else "it mirrors"
+        fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > _NOT_A_ROTATION else "it mirrors"
         raise InputError(f"{rows.said(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
     distance = np.linalg.norm(rows.t_mm, axis=1)
-    if np.median(distance) < METRES:
+    if np.median(distance) < _METRES:
         raise InputError(
             f"{rows.said(0)}, t: millimetres are needed, and the median distance to the camera is "
             f"{np.median(distance):.3g}; if these are metres, multiply by 1000."
@@ -113,9 +113,9 @@ def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
     line = 0
     try:
         with opened(path, "CSV file") as stream:
-            for line, raw in enumerate(iter(lambda: stream.readline(LONGEST_LINE + 1), b""), start=1):
-                if len(raw) > LONGEST_LINE:
-                    raise InputError(f"{path}, line {line}: a line of at most {LONGEST_LINE} characters is needed.")
+            for line, raw in enumerate(iter(lambda: stream.readline(_LONGEST_LINE + 1), b""), start=1):
+                if len(raw) > _LONGEST_LINE:
+                    raise InputError(f"{path}, line {line}: a line of at most {_LONGEST_LINE} characters is needed.")
                 text = raw.decode("utf-8-sig" if line == 1 else "utf-8").strip()
                 if line == 1:
                     _check_header(text, f"{path}, line 1")
@@ -124,26 +124,26 @@ def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a CSV file.") from error
     if not line:
-        raise InputError(f"{path}: the file is empty; {WANTED} in its first line.")
+        raise InputError(f"{path}: the file is empty; {_WANTED} in its first line.")
 
 
 def _check_header(text: str, place: str) -> None:
     found = tuple(cell.strip() for cell in text.split(","))
-    if found == COLUMNS:
+    if found == _COLUMNS:
         return
     check_separator(place, found)
-    for column in COLUMNS:
+    for column in _COLUMNS:
         if column not in found:
-            raise InputError(f"{place}: the column '{column}' is missing; {WANTED}.")
-    raise InputError(f"{place}: the columns are {text[:80]}; {WANTED}.")
+            raise InputError(f"{place}: the column '{column}' is missing; {_WANTED}.")
+    raise InputError(f"{place}: the columns are {text[:80]}; {_WANTED}.")
 
 
 def _row(text: str, place: str) -> tuple[int, int, int, list[float]]:
     """Scene, image, object and the twelve numbers of R and t."""
     cells = text.split(",")
-    if len(cells) != len(COLUMNS):
-        raise InputError(f"{place}: {len(COLUMNS)} cells are needed, one for each column, {len(cells)} were given.")
-    scene, image, part = (_id(cell.strip(), place, name) for cell, name in zip(cells, COLUMNS[:3], strict=False))
+    if len(cells) != len(_COLUMNS):
+        raise InputError(f"{place}: {len(_COLUMNS)} cells are needed, one for each column, {len(cells)} were given.")
+    scene, image, part = (_id(cell.strip(), place, name) for cell, name in zip(cells, _COLUMNS[:3], strict=False))
     _numbers(cells[3], 1, f"{place}, score")
     pose = _numbers(cells[4], 9, f"{place}, R") + _numbers(cells[5], 3, f"{place}, t")
     _numbers(cells[6], 1, f"{place}, time")

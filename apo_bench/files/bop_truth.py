@@ -49,7 +49,7 @@ def read_truth(path: str | Path, estimates: Located, scene: int | None = None) -
     kept = asked if path.suffix.lower() == ".json" else np.ones(len(asked), dtype=np.bool_)
     if scene is not None:
         kept &= truth.where[:, 0] == scene
-    truth = only(truth, kept)
+    truth = _only(truth, kept)
     behind = truth.t_mm[:, 2] <= 0.0
     if behind.any():
         k = int(np.argmax(behind))
@@ -57,7 +57,7 @@ def read_truth(path: str | Path, estimates: Located, scene: int | None = None) -
     return truth
 
 
-def only(rows: Located, kept: Any) -> Located:
+def _only(rows: Located, kept: Any) -> Located:
     """The rows of a mask."""
     place = rows.place[kept] if isinstance(rows.place, np.ndarray) else tuple(np.array(rows.place)[kept].tolist())
     return Located(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], place)

@@ -29,19 +29,19 @@ from apo_bench.io.strict_csv import Columns, Row, read_csv
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
-POSITION, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+_POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
-COLUMNS: Columns = {
+_COLUMNS: Columns = {
     **{name: (name, 1.0) for name in ("operation", "part")},
-    **{f"{name}_{unit}": (name, size) for name in POSITION for unit, size in _LENGTHS.items()},
-    **{name: (name, 1.0) for name in QUATERNION},
+    **{f"{name}_{unit}": (name, size) for name in _POSITION for unit, size in _LENGTHS.items()},
+    **{name: (name, 1.0) for name in _QUATERNION},
     **{f"deviation_{unit}": ("deviation", size) for unit, size in _LENGTHS.items()},
     **{f"deviation_{unit}": ("turn deviation", size) for unit, size in _ANGLES.items()},
     "seen": ("seen", 1.0),
     **{f"play_{unit}": ("play", size) for unit, size in _LENGTHS.items()},
 }
 """What a column stands for, and its unit in m or rad."""
-REQUIRED = ("operation", "part", *POSITION, *QUATERNION)
+_REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)
 _FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
 
 
@@ -60,7 +60,7 @@ def read_table(
         InputError: Anything in the file that is not as described, naming line and column.
     """
     assembly, rows = scenario.assembly, dict[int, Row]()
-    for row in read_csv(path, COLUMNS, REQUIRED):
+    for row in read_csv(path, _COLUMNS, _REQUIRED):
         k = _operation(row, assembly)
         if k in rows:
             row.fail("operation", f"every operation stands once, this one is in line {rows[k].line} already")
@@ -93,7 +93,7 @@ def table(assembly: Assembly, goals: Array) -> str:
     """Goals (n, 4, 4) as such a table, in mm, numbers to the last digit."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["operation", "part", *(f"{name}_mm" for name in POSITION), *QUATERNION])
+    writer.writerow(["operation", "part", *(f"{name}_mm" for name in _POSITION), *_QUATERNION])
     for k, (operation, T) in enumerate(zip(assembly.operations, goals, strict=True)):
         packed = pose.pack(T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]
         writer.writerow([k + 1, operation.main, *map(repr, packed.tolist())])
@@ -112,15 +112,15 @@ def _operation(row: Row, assembly: Assembly) -> int:
 
 
 def _pose(row: Row) -> Array:
-    position = [row.number(name, FARTHEST_M) for name in POSITION]
-    x, *others = (row.cells[name] for name in POSITION)
+    position = [row.number(name, FARTHEST_M) for name in _POSITION]
+    x, *others = (row.cells[name] for name in _POSITION)
     for other in others:
         if other[2] != x[2]:
             raise InputError(
                 f"{row.file}: the columns '{x[0]}' and '{other[0]}' are of different units; "
                 "give all three positions in mm, or all in m."
             )
-    q = np.array([row.number(name, 2.0) for name in QUATERNION])
+    q = np.array([row.number(name, 2.0) for name in _QUATERNION])
     if abs(np.linalg.norm(q) - 1.0) > 1e-3:
         raise InputError(
             f"{row.file}, line {row.line}, columns qw to qz: a quaternion of length 1 (within 0.001) is needed, "

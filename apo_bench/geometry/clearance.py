@@ -11,9 +11,9 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.overlap import SLIVER_M2
 from apo_bench.geometry.solid import Box, Face, Solid
 
-IN_PLANE_M = 1e-9
+_IN_PLANE_M = 1e-9
 """A face and a side of a box this near to each other lie in one plane."""
-THINNEST_M = 5e-5
+_THINNEST_M = 5e-5
 """Half of what a box is thick at least, [m]; what is thinner, MuJoCo takes for nothing."""
 
 
@@ -73,9 +73,9 @@ def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float)
     carries = [[_carries_fit(solid, box, sides, axis, sign) for sign in (-1, 1)] for axis in range(3)]
     recede = clearance_m * np.array(carries, dtype=np.float64)
     half = box.half - recede.sum(axis=1) / 2
-    if (half < THINNEST_M).any():
+    if (half < _THINNEST_M).any():
         raise InputError(
-            f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * THINNEST_M:g} mm of box '{box.name}' "
+            f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * _THINNEST_M:g} mm of box '{box.name}' "
             f"of part '{solid.name}'; give less."
         )
     return Box(box.name, box.center + (recede[:, 0] - recede[:, 1]) / 2, half)
@@ -84,7 +84,7 @@ def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float)
 def _carries_fit(solid: Solid, box: Box, sides: Sequence[_Side], axis: int, sign: int) -> bool:
     """Whether a side of the box carries a fit face, or a piece of one; it must then carry no other."""
     height = box.center[axis] + sign * box.half[axis]
-    near = [s for s in sides if (s.axis, s.sign) == (axis, sign) and abs(s.height - height) < IN_PLANE_M]
+    near = [s for s in sides if (s.axis, s.sign) == (axis, sign) and abs(s.height - height) < _IN_PLANE_M]
     if not any(side.fit for side in near):
         return False
     on = [side for side in near if side.shape.intersection(_rectangle(box, axis)).area > SLIVER_M2]

@@ -10,9 +10,9 @@ from apo_bench.geometry.solid import Solid
 
 TOUCH_M = 1e-6
 """Deeper than this a solid is in another one, and no longer beside it."""
-STEP_M = 5e-4
+_STEP_M = 5e-4
 """Places along a fall are so far apart: two boxes that together are thinner could pass each other unseen."""
-MOST_PLACES, AT_ONCE = 10_000, 100_000
+_MOST_PLACES, _AT_ONCE = 10_000, 100_000
 """At most so many places, the farther apart; so many pairs of boxes are looked at together, which bounds the memory."""
 
 
@@ -21,8 +21,8 @@ def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     if not _above(a, T_a, b, T_b):
         return np.inf
     low, high = _span(a, T_a, b, T_b)
-    for step in (STEP_M, TOUCH_M):
-        ways = np.linspace(low, high, min(int((high - low) / step) + 2, MOST_PLACES))
+    for step in (_STEP_M, TOUCH_M):
+        ways = np.linspace(low, high, min(int((high - low) / step) + 2, _MOST_PLACES))
         met = _first_met(a, T_a, ways, b, T_b)
         if met is None:
             return np.inf
@@ -32,7 +32,7 @@ def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int | None:
     """The first of the places at which `a` is in `b`."""
-    count = max(1, AT_ONCE // (len(a.boxes) * len(b.boxes)))
+    count = max(1, _AT_ONCE // (len(a.boxes) * len(b.boxes)))
     for begin in range(0, len(ways), count):
         met = np.flatnonzero(lowered(a, T_a, ways[begin : begin + count], b, T_b) > TOUCH_M)
         if len(met):

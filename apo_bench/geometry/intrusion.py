@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.solid import Box, Solid
 
-TOUCHING_M = 1e-6
+_TOUCHING_M = 1e-6
 """Balls around solids are apart if this far from each other, whatever was rounded."""
 
 
@@ -21,7 +21,7 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """
     (middle_a, reach_a), (middle_b, reach_b) = _ball(a.boxes), _ball(b.boxes)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
-    if between @ between > (reach_a + reach_b + TOUCHING_M) ** 2:
+    if between @ between > (reach_a + reach_b + _TOUCHING_M) ** 2:
         return 0.0
     return max(0.0, float(depths(a.boxes, T_a[:3, :3], T_a[None, :3, 3], b.boxes, T_b)[0]))
 

@@ -14,7 +14,7 @@ from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.polygon import straightened
 from apo_bench.geometry.solid import Face
 
-EDGE_ON = 1e-6
+_EDGE_ON = 1e-6
 """Cosine between the normals below which a face is seen edge-on and covers nothing."""
 SLIVER_M2 = 1e-12
 """Pieces smaller than this, (0.001 mm)^2, are rounding, not overlap."""
@@ -63,7 +63,7 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
         The overlap; nothing, if the faces only touch along an edge or `face` is seen edge-on.
     """
     T_on_face = pose.inverse(T_on) @ T_face
-    if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < EDGE_ON:
+    if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
         return NOTHING
     frame = _plane_frame(on)
     lower = _polygon(on, pose.inverse(frame))

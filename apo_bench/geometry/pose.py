@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array
 
-IDENTITY = np.eye(4)
-IDENTITY.flags.writeable = False
-ROUNDING = 1e-9
+_IDENTITY = np.eye(4)
+_IDENTITY.flags.writeable = False
+_ROUNDING = 1e-9
 """A component of a quaternion that is nearer to zero has no sign."""
 
 
@@ -96,7 +96,7 @@ def pack(T: ArrayLike) -> Array:
 
     T = np.asarray(T, dtype=np.float64)
     q = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    first = np.argmax(np.abs(q) > ROUNDING, axis=1)
+    first = np.argmax(np.abs(q) > _ROUNDING, axis=1)
     q = q * np.where(q[np.arange(len(q)), first] < 0.0, -1.0, 1.0)[:, None] + 0.0
     return np.concatenate([T[..., :3, 3], q.reshape(*T.shape[:-2], 4)], axis=-1)
 

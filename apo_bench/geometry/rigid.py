@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-TOLERANCE = 1e-6
+_TOLERANCE = 1e-6
 """How far R R^t may be from the identity."""
 FARTHEST_M = 1e4
 """Nothing is farther from the origin: beyond it, rounding is no longer small."""
@@ -17,6 +17,6 @@ def rigid(T: ArrayLike) -> NDArray[np.bool_]:
     finite = np.isfinite(T).all(axis=(1, 2))
     T = np.where(finite[:, None, None], T, 0.0)
     R = T[:, :3, :3]
-    square = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2)) < TOLERANCE
-    last_row = np.abs(T[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) < TOLERANCE
+    square = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2)) < _TOLERANCE
+    last_row = np.abs(T[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) < _TOLERANCE
     return np.asarray(finite & square & last_row & (np.linalg.det(R) > 0.0))

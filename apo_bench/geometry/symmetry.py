@@ -12,7 +12,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.pose import apply
 from apo_bench.geometry.solid import Solid
 
-SAME_M = 1e-6
+_SAME_M = 1e-6
 """Corners of boxes that are nearer than this have the same coordinate."""
 
 
@@ -86,13 +86,13 @@ def _keeps_fit(solid: Solid, g: Array) -> bool:
 def _same_corners(a: Array, b: Array) -> bool:
     """Whether two outlines, (n, 3) and (m, 3), have the same corners, wherever they begin."""
     far = np.linalg.norm(a[:, None] - b[None], axis=-1)
-    return bool(len(a) == len(b) and (far.min(axis=0) < SAME_M).all() and (far.min(axis=1) < SAME_M).all())
+    return bool(len(a) == len(b) and (far.min(axis=0) < _SAME_M).all() and (far.min(axis=1) < _SAME_M).all())
 
 
 def _cuts(values: Array) -> Array:
     """Sorted, with one of those that are the same."""
     ordered = np.sort(values)
-    return ordered[np.append(True, np.diff(ordered) > SAME_M)]
+    return ordered[np.append(True, np.diff(ordered) > _SAME_M)]
 
 
 def _filled(boxes: list[tuple[Array, Array]], middles: list[Array]) -> NDArray[np.bool_]:

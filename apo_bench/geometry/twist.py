@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array
 
-TERMS, SHORT = 24, 9
+_TERMS, _SHORT = 24, 9
 """Of the series in the square of the angle: up to two whole turns, and up to one radian, the rest is rounding."""
 
 
@@ -39,8 +39,8 @@ def _series() -> Array:
 
     With x = -q: X^4 = x X^2, and odd powers of ad are ad^(2k+1) = k x^(k-1) ad^3 - (k-1) x^k ad, even ones alike.
     """
-    C = np.zeros((TERMS, 6))
-    for k in range(TERMS):
+    C = np.zeros((_TERMS, 6))
+    for k in range(_TERMS):
         sign, even, odd = (-1.0) ** k, 1.0 / factorial(2 * k + 2), 1.0 / factorial(2 * k + 3)
         C[k, :2] = sign * even, sign * odd
         C[k, 2:4] = (k - 1) * sign * even, -(k - 1) * sign * odd
@@ -67,7 +67,7 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     xi = np.asarray(twist, dtype=np.float64)
     lead = xi.shape[:-1]
     q = (xi[..., 3:] * xi[..., 3:]) @ _SUM
-    series = SERIES[: SHORT if (q < 1.0).all() else TERMS]
+    series = SERIES[: _SHORT if (q < 1.0).all() else _TERMS]
     f = ((q[..., None] ** np.arange(len(series))) @ series)[..., None, None]
     B, C, a, b, c, d = (f[..., i, :, :] for i in range(6))
     X = (xi @ _TO_MATRIX).reshape(*lead, 4, 4)

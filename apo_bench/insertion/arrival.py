@@ -18,13 +18,13 @@ from apo_bench.insertion.screw import Screw, screw_state
 from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space, snapped
 from apo_bench.insertion.swept import Posed, exit_after, free
 
-ROOM_M = 0.02
+_ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
-TRAVEL_M = 0.03
+_TRAVEL_M = 0.03
 """How far before its goal the line begins at least."""
-CLEAR_M = 0.3
+_CLEAR_M = 0.3
 """A part comes from above to where its way in begins: so much above that place must be free."""
-SAME = 1e-9
+_SAME = 1e-9
 ANY = Preference()
 
 
@@ -70,9 +70,9 @@ class Arrival:
         """Directions of the part's place, each (k, 3): settled by position, by feeling, by walls."""
         cone = classify(_normals(self.touched))
         walls = cone.rows[~cone.detachable]
-        position = readable(null_space(cone.rows), self.T)
+        position = _readable(null_space(cone.rows), self.T)
         felt = np.array([macro.direction for macro in self.macros if macro.guarded]).reshape(-1, 3)
-        across = readable(null_space(null_space(walls)) if len(walls) else np.zeros((0, 3)), self.T)
+        across = _readable(null_space(null_space(walls)) if len(walls) else np.zeros((0, 3)), self.T)
         return position, felt, across
 
 
@@ -103,7 +103,7 @@ def arrive(
     def clear(way: Array, length_m: float) -> bool:
         begin = [Posed(posed.boxes, _shifted(posed.T, length_m * way)) for posed in moving]
         others = list(resting.values())
-        return free(moving, way, length_m, others) and free(begin, UP, CLEAR_M, others)
+        return free(moving, way, length_m, others) and free(begin, UP, _CLEAR_M, others)
 
     def reach(exit_m: float) -> float:
         return _length(exit_m) if stated.travel_m is None else stated.travel_m
@@ -134,7 +134,7 @@ def turning(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
     return screw_state(*corners(assembly, found.touched, poses))
 
 
-def readable(basis: Array, T: Array) -> Array:
+def _readable(basis: Array, T: Array) -> Array:
     """Another basis of the span of (m, 3): axes of the part at T as far as they lie in it, then what is left."""
     found: list[Array] = []
     for axis in (*T[:3, :3].T, *basis):
@@ -171,7 +171,7 @@ def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Arr
 
 def _length(exit_m: float) -> float:
     """How long the line of attach is for a part that is free after a way, in whole millimetres, [m]."""
-    return max(TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + ROOM_M) - 1e-3)))
+    return max(_TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3)))
 
 
 def _normals(touched: Sequence[Touching], angle_rad: float = ANGLE_RAD) -> Array:
@@ -180,7 +180,7 @@ def _normals(touched: Sequence[Touching], angle_rad: float = ANGLE_RAD) -> Array
 
 def _own(direction: Array, T: Array) -> Array:
     """A direction in the frame of the part; exact where it is vertical."""
-    if np.linalg.norm(direction + UP) < SAME:
+    if np.linalg.norm(direction + UP) < _SAME:
         return np.asarray(T[:3, :3].T @ -UP)
     return np.asarray(np.round(T[:3, :3].T @ direction, 12) + 0.0)
 

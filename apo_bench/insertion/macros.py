@@ -25,9 +25,9 @@ Name = Literal[
     "move-to-bottom",
     "depart",
 ]
-INSERTIONS: tuple[Name, ...] = ("insert-into", "insert-between", "insert-into-slot")
+_INSERTIONS: tuple[Name, ...] = ("insert-into", "insert-between", "insert-into-slot")
 UP = np.array([0.0, 0.0, 1.0])
-SMALL = 1e-9
+_SMALL = 1e-9
 
 
 @final
@@ -50,7 +50,7 @@ class Macro:
 
     @property
     def inserts(self) -> bool:
-        return self.name in INSERTIONS
+        return self.name in _INSERTIONS
 
     @property
     def guarded(self) -> bool:
@@ -69,7 +69,7 @@ class Way(NamedTuple):
     """Whether nothing else is in the way."""
 
 
-Out = Callable[[Array, tuple[int, ...]], Way]
+_Out = Callable[[Array, tuple[int, ...]], Way]
 """Chooses how a part leaves between walls: the directions in which all stay closed, (m, 3), and the walls by number."""
 
 
@@ -85,7 +85,7 @@ class Chain(NamedTuple):
     """Whether no straight motion leads there."""
 
 
-def chain(normals: Array, out: Out, slack: float = ANGLE_RAD) -> Chain:
+def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
     """The macros that make contacts with these normals.
 
     Args:
@@ -117,7 +117,7 @@ def departs(found: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     for macro in reversed(found.macros):
         d, length = -macro.direction, macro.length_m
         last = back[-1] if back else None
-        if last is not None and last.direction @ d > 1.0 - SMALL:
+        if last is not None and last.direction @ d > 1.0 - _SMALL:
             length = max((x for x in (last.length_m, length) if x is not None), default=None)
             back[-1] = Macro("depart", d, (*last.makes, *macro.makes), macro.keeps, length)
         else:

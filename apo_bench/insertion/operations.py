@@ -66,7 +66,7 @@ def understand(
             if was is None
             else Preference(understood[was].after.line.direction, understood[was].after.line.travel_m)
         )
-        before = arrive(assembly, operation.moves, lost_at(assembly, k), stages[k], back, angle_rad)
+        before = arrive(assembly, operation.moves, _lost_at(assembly, k), stages[k], back, angle_rad)
         after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
         understood.append(Understood(k, operation.main, operation.carries, before, after))
         put[operation.main] = k
@@ -80,6 +80,6 @@ def _held_by(assembly: Assembly, was: int | None, moved: tuple[str, ...]) -> int
     return was
 
 
-def lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:
+def _lost_at(assembly: Assembly, k: int) -> tuple[Contact, ...]:
     """The contacts that operation k breaks: undoing it makes them again."""
     return tuple(contact for contact, made, lost in assembly.relations() if lost == k and made < k)

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.states import State, classify
 
-LENGTH_M = 0.04
+_LENGTH_M = 0.04
 """Turns are counted by how far they move a point at this distance, so that rows have one unit."""
 
 
@@ -30,14 +30,14 @@ def screw_state(points: Array, normals: Array) -> Screw:
         points: Corners of the contacts, (k, 3), [m], any frame.
         normals: From what rests into the free side of what moves, (k, 3), one for each point.
     """
-    everything = classify(screw_rows(points, normals)).state
+    everything = classify(_screw_rows(points, normals)).state
     translation = classify(np.unique(normals, axis=0)).state
     m = everything.maintaining - translation.maintaining
     c = everything.constraining - translation.constraining
     return Screw(everything, translation, State(m, 3 - m - c, c))
 
 
-def screw_rows(points: Array, normals: Array) -> Array:
+def _screw_rows(points: Array, normals: Array) -> Array:
     """One row (p x n / L, n) per point, (k, 6): how fast a twist (L w, v) about the middle opens it."""
     arms = points - points.mean(axis=0) if len(points) else points
-    return np.hstack([np.cross(arms, normals) / LENGTH_M, normals])
+    return np.hstack([np.cross(arms, normals) / _LENGTH_M, normals])

@@ -18,9 +18,9 @@ from apo_bench.geometry.arrays import Array, frozen
 
 ANGLE_RAD = 1e-3
 """Directions nearer than this to each other, or to being opposite, are the same where poses are exact."""
-RANK = 1e-4
+_RANK = 1e-4
 """Singular values below this part of the largest are zero."""
-FASTEST = 1e3
+_FASTEST = 1e3
 """Bound of the components of a motion that opens contacts at unit speed: a narrower cone counts as flat."""
 LETTERS = {
     (3, 0, 0): "S",
@@ -102,7 +102,7 @@ def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
         np.concatenate([np.zeros(n), -np.ones(k)]),
         A_ub=np.hstack([-N, np.eye(k)]),
         b_ub=np.zeros(k),
-        bounds=[(-FASTEST, FASTEST)] * n + [(0.0, 1.0)] * k,
+        bounds=[(-_FASTEST, _FASTEST)] * n + [(0.0, 1.0)] * k,
         method="highs",
     )
     opens = found.x[n:] > 0.5
@@ -115,7 +115,7 @@ def rank(rows: Array) -> int:
     if not len(rows):
         return 0
     sizes = np.linalg.svd(rows, compute_uv=False)
-    return int((sizes > RANK * sizes[0]).sum())
+    return int((sizes > _RANK * sizes[0]).sum())
 
 
 def null_space(rows: Array) -> Array:

@@ -11,8 +11,8 @@ from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Solid, extent
 from apo_bench.insertion.arrival import Arrival
 
-SLOW_M = 0.003
-STRAIGHT = 1e-9
+_SLOW_M = 0.003
+_STRAIGHT = 1e-9
 WALL_MARGIN_M = 0.002
 OVER_M = 0.02
 """Room between what is carried and what it is carried over."""
@@ -26,22 +26,22 @@ def slides(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[Array, ...
             first = found.touched[macro.makes[0]]
             (rests,) = (of for of in first.contact if of.part == first.rests)
             side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
-            if first.normal @ macro.direction > -1.0 + STRAIGHT:
+            if first.normal @ macro.direction > -1.0 + _STRAIGHT:
                 side = poses[found.main][:3, :3] @ found.own(macro.direction)
             if abs(side[2]) < 0.5:
                 sides.append(side)
     return tuple(sides)
 
 
-def walls(found: Arrival) -> tuple[Contact, ...]:
+def _walls(found: Arrival) -> tuple[Contact, ...]:
     """The contacts between which the part is inserted."""
     return tuple(contact for macro in found.macros if macro.inserts for contact in found.contacts(macro))
 
 
 def slow_before(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> float:
     """How far before the goal a motion from above turns slow: where an insertion begins, or just above the floor."""
-    depth = SLOW_M
-    for m, e in walls(found):
+    depth = _SLOW_M
+    for m, e in _walls(found):
         corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
         if len(corners):
             depth = max(depth, float(np.ptp(corners @ way)) + WALL_MARGIN_M)

@@ -15,7 +15,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box
 
-SLACK_M = 5e-5
+_SLACK_M = 5e-5
 """Boxes are less than this deep in each other where they touch."""
 
 
@@ -27,7 +27,7 @@ class Posed(NamedTuple):
     """(4, 4), world, [m]."""
 
 
-def meetings(moving: Posed, way: Array, resting: Posed, slack_m: float = SLACK_M) -> Array:
+def meetings(moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M) -> Array:
     """Where along a line the boxes of two parts overlap by more than a slack, (k, 2), [m]: from and until.
 
     Args:
@@ -56,12 +56,12 @@ def free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence
 
 def exit_after(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
     """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap."""
-    found = [meetings(m, way, r, -SLACK_M) for m in moving for r in resting]
+    found = [meetings(m, way, r, -_SLACK_M) for m in moving for r in resting]
     spans = np.concatenate(found) if found else np.zeros((0, 2))
     at = 0.0
     while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):
         at = float(on[:, 1].max())
-    return max(0.0, at - SLACK_M)
+    return max(0.0, at - _SLACK_M)
 
 
 def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:

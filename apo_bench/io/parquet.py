@@ -10,12 +10,12 @@ from typing import Any
 from apo_bench.io.csv_file import OBEYED
 from apo_bench.io.writing import to_write
 
-WORDS = (
+_WORDS = (
     *("scenario", "noise", "relations", "method", "reference", "grasp", "fidelity", "eye", "arm", "failures"),
     *("host", "worker", "command"),
 )
 """Columns of words, also where they look like numbers."""
-GUARDED = f"^'('*[{re.escape(OBEYED)}])"
+_GUARDED = f"^'('*[{re.escape(OBEYED)}])"
 # Files are opened here: names that are no UTF-8 are refused by the library.
 
 
@@ -24,12 +24,12 @@ def parquet_beside(table: Path) -> Path:
     import pyarrow as pa
     from pyarrow import compute, csv, parquet
 
-    how = csv.ConvertOptions(column_types=dict.fromkeys(WORDS, pa.string()))
+    how = csv.ConvertOptions(column_types=dict.fromkeys(_WORDS, pa.string()))
     with table.open("rb") as file:
         made = csv.read_csv(file, convert_options=how, parse_options=csv.ParseOptions(newlines_in_values=True))
     for i, field in enumerate(made.schema):
         if pa.types.is_string(field.type):
-            text = compute.replace_substring_regex(made.column(i), pattern=GUARDED, replacement=r"\1")
+            text = compute.replace_substring_regex(made.column(i), pattern=_GUARDED, replacement=r"\1")
             made = made.set_column(i, field.name, text)
         if pa.types.is_null(field.type):
             made = made.set_column(i, field.name, made.column(i).cast(pa.float64()))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 
-OBEYED = "\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
-CONTROL = re.compile(f"[{OBEYED}]")
+_OBEYED = "\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+CONTROL = re.compile(f"[{_OBEYED}]")
 """What a terminal obeys instead of showing it, and what turns the direction of text."""
-UNSHOWN = re.compile(f"[{OBEYED}\ud800-\udfff]")
+UNSHOWN = re.compile(f"[{_OBEYED}\ud800-\udfff]")
 """The same, and halves of letters, which names of files that are not UTF-8 hold."""
 
-LONGEST = 1500
+_LONGEST = 1500
 
 
 def clean(text: str) -> str:
@@ -20,4 +20,4 @@ def clean(text: str) -> str:
 
 def brief(text: str) -> str:
     """Without the middle of what is too long to be read."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"

@@ -10,7 +10,7 @@ from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
-ROUNDS = 100
+_ROUNDS = 100
 """What goes on starting others while it is being ended is looked for so many times."""
 
 
@@ -27,7 +27,7 @@ def descendants(pid: int) -> list[int]:
 def end_descendants(pid: int, spared: Collection[int] = ()) -> None:
     """Kill them all, but for the spared; whoever lost its parent and was not taken in by `pid` is not found."""
     ended = {*spared}
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         found = [one for one in descendants(pid) if one not in ended]
         if not found:
             return

@@ -11,8 +11,8 @@ from typing import BinaryIO
 
 from apo_bench.errors import InputError
 
-LARGEST_BYTES = 1_000_000
-LONGEST_LINE = 1 << 20
+_LARGEST_BYTES = 1_000_000
+_LONGEST_LINE = 1 << 20
 """Bytes; ten times the longest line that a sweep writes."""
 _FLAGS = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
 _KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
@@ -42,7 +42,7 @@ def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
 
 
-def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> bytes:
+def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES) -> bytes:
     """What stands in a file.
 
     Raises:
@@ -55,7 +55,7 @@ def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> bytes
     return found
 
 
-def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
+def read_text(path: str | Path, kind: str, limit: int = _LARGEST_BYTES) -> str:
     """The text of a file, without a byte order mark.
 
     Raises:
@@ -72,11 +72,11 @@ def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
     """
     with opened(path, kind) as file:
         number = 0
-        while line := file.readline(LONGEST_LINE + 1):
+        while line := file.readline(_LONGEST_LINE + 1):
             number += 1
-            if len(line) > LONGEST_LINE:
+            if len(line) > _LONGEST_LINE:
                 raise InputError(
-                    f"{path}, line {number}: at most {LONGEST_LINE:,} bytes are allowed in a line; remove it."
+                    f"{path}, line {number}: at most {_LONGEST_LINE:,} bytes are allowed in a line; remove it."
                 )
             if line.endswith(b"\n"):
                 yield number, line

@@ -20,7 +20,7 @@ from apo_bench.io.reading import read_text
 
 DEEPEST = 32
 """Levels of nesting; no file of ours has more than 6."""
-LARGEST_INTEGER = 10**308
+_LARGEST_INTEGER = 10**308
 """Larger ones are no floating-point numbers."""
 
 
@@ -157,7 +157,7 @@ def check_plain(document: Any, file: str) -> None:
                 below += [(f"{key}, {name[:60]}" if key else name[:60], entry) for name, entry in value.items()]
             elif isinstance(value, list):
                 below += [(key, entry) for entry in value]
-            elif isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER:
+            elif isinstance(value, int) and not -_LARGEST_INTEGER <= value <= _LARGEST_INTEGER:
                 raise InputError(f"{place(key)}: whole numbers go to 1e308, a larger one was given.")
             elif not isinstance(value, str | int | float | bool | None):
                 raise InputError(

@@ -11,7 +11,7 @@ from apo_bench.io.reading import decoded, read_bytes
 from apo_bench.io.strict_json import DEEPEST, Node, check_plain
 
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
-LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST}}}")
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST}}}")
 """More names with dots between them than any key has; the time to read such keys grows with their square."""
 
 
@@ -30,7 +30,7 @@ def read_toml(path: str | Path, kind: str) -> Node:
 def parse_toml(raw: bytes, file: str) -> Node:
     """The document in a text; `file` is its name in messages."""
     text = decoded(raw, file, "TOML file")
-    if found := LONG_KEY.search(text):
+    if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
         raise InputError(f"{file}, line {line}: at most {DEEPEST} names with dots between them are allowed.")
     try:

@@ -18,7 +18,7 @@ HALF = re.compile("[\ud800-\udfff]")
 HALF_BUT_OF_FILES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 """The same but for those that stand for bytes in names of files that are not UTF-8."""
 WHOLE_LETTERS = "text without half letters (a lone \\ud800 to \\udfff) is needed"
-LONGEST_KEY = 60
+_LONGEST_KEY = 60
 
 
 def is_whole(text: bytes) -> bool:
@@ -41,7 +41,7 @@ def read_whole(text: bytes, where: str, half: re.Pattern[str]) -> Any:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         members = dict(pairs)
         if len(members) < len(pairs):
-            twice = clean(Counter(key for key, _ in pairs).most_common(1)[0][0])[:LONGEST_KEY]
+            twice = clean(Counter(key for key, _ in pairs).most_common(1)[0][0])[:_LONGEST_KEY]
             raise InputError(f"{where}: the key '{twice}' stands twice in one object; keep one of the two.")
         return members
 
@@ -67,7 +67,7 @@ def half_letter(said: Any, half: re.Pattern[str], field: str = "") -> str | None
         inside = [(f"{field}[{i}]", entry) for i, entry in enumerate(said)]
     if isinstance(said, dict):
         for name, entry in said.items():
-            place = f"{field}.{clean(name)[:LONGEST_KEY]}".lstrip(".")
+            place = f"{field}.{clean(name)[:_LONGEST_KEY]}".lstrip(".")
             inside += [(place, name), (place, entry)]
     found = (half_letter(entry, half, place) for place, entry in inside)
     return next((place for place in found if place is not None), None)

@@ -10,7 +10,7 @@ from typing import IO, Any
 
 from apo_bench.errors import InputError
 
-KINDS = (
+_KINDS = (
     (stat.S_ISLNK, "a symbolic link"),
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISREG, "a file"),
@@ -68,7 +68,7 @@ def _mode(path: Path) -> int | None:
 
 
 def _kind(mode: int) -> str:
-    return next((name for found, name in KINDS if found(mode)), "something else")
+    return next((name for found, name in _KINDS if found(mode)), "something else")
 
 
 def _flag(name: str) -> int:

@@ -13,7 +13,7 @@ from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.records.thresholds import Thresholds
 
 Moment = Literal["made", "end"]
-Share = Callable[[Overlap, Overlap], float]
+_Share = Callable[[Overlap, Overlap], float]
 """How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
 
 
@@ -52,7 +52,7 @@ class ContactJudge(NamedTuple):
     clearance_mm: float
 
     def verdict(
-        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Overlap, share: Share
+        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Overlap, share: _Share
     ) -> ContactVerdict:
         """Measure one contact.
 

@@ -18,7 +18,7 @@ from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overla
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
 
-SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
+_SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
 
 
 def finished(
@@ -113,4 +113,4 @@ def _displacements(
 
 def _corners(solid: Solid) -> Array:
     """Of every box, (8 k, 3), in the frame of the solid, [m]."""
-    return np.concatenate([box.center + SIGNS * box.half for box in solid.boxes])
+    return np.concatenate([box.center + _SIGNS * box.half for box in solid.boxes])

@@ -17,9 +17,9 @@ from apo_bench.records.short_names import RESIDUALS
 from apo_bench.resources import folder
 from apo_bench.scenario.keys import read_pose
 
-SCHEMA = "apo-bench/noise/1"
-FARTHEST_MM = 1e5
-HUGE = 1e300
+_SCHEMA = "apo-bench/noise/1"
+_FARTHEST_MM = 1e5
+_HUGE = 1e300
 """Degrees of freedom beyond are infinitely many."""
 
 
@@ -58,8 +58,8 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
 def read_noise(path: str | Path) -> tuple[Measured, Camera]:
     """What a noise file states, and the camera it names, else the default one."""
     root = read_toml(path, "noise file")
-    if isinstance(root.value, dict) and root.value.get("schema", SCHEMA) != SCHEMA:
-        root.child(root.value["schema"], "schema").fail(f'"{SCHEMA}" is needed')
+    if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) != _SCHEMA:
+        root.child(root.value["schema"], "schema").fail(f'"{_SCHEMA}" is needed')
     required = ("schema", "source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
     top = root.fields(required, ("camera",))
     shift, turn = _split(top["shift"], "mm", 1000.0), _split(top["turn"], "deg", 180.0)
@@ -69,7 +69,7 @@ def read_noise(path: str | Path) -> tuple[Measured, Camera]:
         turn_deg=turn,
         missed=_number(top["missed_rate"], 0.0, 1.0),
         outliers=_number(top["outlier_rate"], 0.0, 1.0),
-        farthest_mm=_number(top["outlier_farthest_mm"], shift.limit, FARTHEST_MM),
+        farthest_mm=_number(top["outlier_farthest_mm"], shift.limit, _FARTHEST_MM),
     )
     return measured, Camera(read_pose(top["camera"])) if "camera" in top else Camera()
 
@@ -79,7 +79,7 @@ def noise_text(measured: Measured, notes: tuple[str, ...] = ()) -> str:
     source = measured.source.replace("\\", "\\\\").replace('"', '\\"')
     head = (
         [f"# {note}" for note in notes],
-        [f'schema = "{SCHEMA}"', f'source = "{source}"'],
+        [f'schema = "{_SCHEMA}"', f'source = "{source}"'],
         [f"missed_rate = {measured.missed:.5g}  # of the parts that are there"],
         [f"outlier_rate = {measured.outliers:.5g}  # of the parts that are found"],
         [f"outlier_farthest_mm = {measured.farthest_mm:.5g}"],
@@ -113,4 +113,4 @@ def _number(node: Node, low: float, high: float) -> float:
     x = node.value
     if isinstance(x, bool) or not isinstance(x, int | float) or not low <= x <= high:
         node.fail(f"a number from {low:g}{' on, or inf,' if high == math.inf else f' to {high:g}'} is needed")
-    return float(x) if x < HUGE else math.inf
+    return float(x) if x < _HUGE else math.inf

@@ -32,11 +32,11 @@ from apo_bench.records.short_names import RELATIONS
 Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
 
-OPPOSED_RAD = math.radians(10.0)
+_OPPOSED_RAD = math.radians(10.0)
 """Faces look at each other if one normal is this near to the opposite of the other."""
 TOUCHING_M, NEAR_M = 0.5e-3, 15e-3
 """Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
-COVERED_M2 = 25e-6
+_COVERED_M2 = 25e-6
 """Faces that cover less of each other do not meet, (5 mm)^2."""
 
 
@@ -180,12 +180,12 @@ def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
                         apart = _apart(a, poses[part], b, poses[other])
                         if apart is not None and contact not in assembly.operations[k].contacts:
                             area = overlap(a, poses[part], b, poses[other]).area
-                            yield _Pair(k, contact, apart, area > COVERED_M2)
+                            yield _Pair(k, contact, apart, area > _COVERED_M2)
 
 
 def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
     """How far face a stands in front of face b, [m]; None if they do not look at each other, or touch."""
-    if not opposed(a, T_a, b, T_b, OPPOSED_RAD):
+    if not opposed(a, T_a, b, T_b, _OPPOSED_RAD):
         return None
     apart = height(a, T_a, b, T_b)
     return apart if apart > TOUCHING_M else None

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""
-LONGEST_NAME = 64
-LARGEST_M = 10.0
-THINNEST_M = 0.0005
+_LONGEST_NAME = 64
+_LARGEST_M = 10.0
+_THINNEST_M = 0.0005
 """Half of the least thickness of a box."""
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -53,10 +53,10 @@ class Name(NamedTuple):
     """A name."""
 
     def allows(self, text: str) -> bool:
-        return len(text) <= LONGEST_NAME and NAME.fullmatch(text) is not None
+        return len(text) <= _LONGEST_NAME and NAME.fullmatch(text) is not None
 
     def said(self) -> str:
-        return f"a name is a letter, then letters, digits and underscores, {LONGEST_NAME} in all at most"
+        return f"a name is a letter, then letters, digits and underscores, {_LONGEST_NAME} in all at most"
 
 
 class Allowed(NamedTuple):
@@ -67,34 +67,34 @@ class Allowed(NamedTuple):
     attributes: Mapping[str, Numbers | Words | Name]
 
 
-NAMED = Name()
-POINT = Numbers(((-LARGEST_M, LARGEST_M),) * 3, 3, " m")
-HALF_SIZES = Numbers(((THINNEST_M, LARGEST_M),) * 3, 3, " m")
-COLOR = Numbers((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
+_NAMED = Name()
+_POINT = Numbers(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
+_HALF_SIZES = Numbers(((_THINNEST_M, _LARGEST_M),) * 3, 3, " m")
+_COLOR = Numbers((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
 """What cannot be seen, a range finder of MuJoCo would not see."""
-SURFACE: Mapping[str, Numbers | Words | Name] = {
+_SURFACE: Mapping[str, Numbers | Words | Name] = {
     "type": Words(("box",)),
     "density": Numbers(((1.0, 25_000.0),), 1, " kg/m^3"),
     "friction": Numbers(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1),
-    "rgba": COLOR,
+    "rgba": _COLOR,
 }
-DOT: Mapping[str, Numbers | Words | Name] = {
+_DOT: Mapping[str, Numbers | Words | Name] = {
     "size": Numbers(((1e-4, 0.1),) * 3, 1, " m"),
     "group": Words(tuple("012345")),
-    "rgba": COLOR,
+    "rgba": _COLOR,
 }
 MOST_BOXES, MOST_SITES, MOST_CLASSES = 100, 600, 20
-DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
+_DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
 ALLOWED: Mapping[str, Allowed] = {
-    "mujoco": Allowed({"default": 1, "worldbody": 1}, {"model": NAMED}),
-    "mujoco/default": Allowed(DEFAULTS, {"class": Words(("main",))}),
-    "default/default": Allowed(DEFAULTS, {"class": NAMED}),
-    "default/geom": Allowed({}, SURFACE),
-    "default/site": Allowed({}, DOT),
+    "mujoco": Allowed({"default": 1, "worldbody": 1}, {"model": _NAMED}),
+    "mujoco/default": Allowed(_DEFAULTS, {"class": Words(("main",))}),
+    "default/default": Allowed(_DEFAULTS, {"class": _NAMED}),
+    "default/geom": Allowed({}, _SURFACE),
+    "default/site": Allowed({}, _DOT),
     "mujoco/worldbody": Allowed({"body": 1}, {}),
-    "worldbody/body": Allowed({"geom": MOST_BOXES, "site": MOST_SITES}, {"name": NAMED}),
-    "body/geom": Allowed({}, {"name": NAMED, "class": NAMED, "pos": POINT, "size": HALF_SIZES, **SURFACE}),
-    "body/site": Allowed({}, {"name": NAMED, "class": NAMED, "pos": POINT, **DOT}),
+    "worldbody/body": Allowed({"geom": MOST_BOXES, "site": MOST_SITES}, {"name": _NAMED}),
+    "body/geom": Allowed({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, "size": _HALF_SIZES, **_SURFACE}),
+    "body/site": Allowed({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, **_DOT}),
 }
 """Element, behind the one that it stands in -> what it may have."""
 REMEDIES: Mapping[str, str] = {

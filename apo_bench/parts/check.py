@@ -10,7 +10,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.overlap import area
 from apo_bench.geometry.solid import Solid
 
-APART_M = 1e-8
+_APART_M = 1e-8
 """So far may surfaces of the two be from each other; planes of boxes are one within a tenth of it."""
 
 
@@ -24,7 +24,7 @@ def check_solid(solid: Solid, file: str) -> None:
         raise InputError(
             f"{file}: the boxes make no closed solid; move apart, or into each other, what nearly touches."
         )
-    room = APART_M * float(mesh.area)
+    room = _APART_M * float(mesh.area)
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
     enclosed = sum(area(face) * float(face.normal @ face.outline[0]) for face in solid.faces.values()) / 3.0
     for name, volume in (("of its cells", solid.volume), ("that its faces enclose", enclosed)):

@@ -17,7 +17,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.polygon import straightened
 from apo_bench.geometry.solid import Box
 
-SAME_PLANE_M = 1e-9
+_SAME_PLANE_M = 1e-9
 """Sides of boxes this near to each other lie in one plane."""
 SIDES = ("px", "nx", "py", "ny", "pz", "nz")
 """Outward direction of a face, in the order of faces in a solid; also the stem of automatic names."""
@@ -96,7 +96,7 @@ def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
 def _planes(boxes: Sequence[Box], axis: int) -> Array:
     """The coordinates of all sides along an axis, ascending, each once."""
     sides = np.sort([box.center[axis] + sign * box.half[axis] for box in boxes for sign in (-1, 1)])
-    return np.round(sides[np.diff(sides, prepend=-np.inf) > SAME_PLANE_M], 12)
+    return np.round(sides[np.diff(sides, prepend=-np.inf) > _SAME_PLANE_M], 12)
 
 
 def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_]:

@@ -13,10 +13,10 @@ from apo_bench.parts.faces import SIDES, Surface, unite
 from apo_bench.parts.mjcf import Mark, PartFile, read_part
 from apo_bench.resources import folder
 
-ON_FACE_M = 1e-6
+_ON_FACE_M = 1e-6
 """A site lies on a face if it is this near to its plane and this far from its edges."""
 MOST_FACES = 1000
-LIGHTEST_KG, HEAVIEST_KG = 1e-4, 1e6
+_LIGHTEST_KG, _HEAVIEST_KG = 1e-4, 1e6
 
 
 def part_names() -> tuple[str, ...]:
@@ -56,9 +56,9 @@ def load_part(given: str | Path) -> Solid:
     if len(union.surfaces) > MOST_FACES:
         raise InputError(f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.")
     mass = file.density * union.volume
-    if not LIGHTEST_KG <= mass <= HEAVIEST_KG:
+    if not _LIGHTEST_KG <= mass <= _HEAVIEST_KG:
         raise InputError(
-            f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
+            f"{file.path}: the part weighs {mass:.3g} kg; from {_LIGHTEST_KG:g} to {_HEAVIEST_KG:g} kg are allowed, "
             "so change its size or its density."
         )
     marks = _matched(file, union.surfaces)
@@ -88,12 +88,12 @@ def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
 
     where = ", ".join(f"{1e3 * x:g}" for x in mark.point)
     for k, surface in enumerate(surfaces):
-        if abs(mark.point[surface.axis] - surface.height) > ON_FACE_M:
+        if abs(mark.point[surface.axis] - surface.height) > _ON_FACE_M:
             continue
         point = Point(surface.flat(mark.point[None])[0])
-        if surface.shape.distance(point) > ON_FACE_M:
+        if surface.shape.distance(point) > _ON_FACE_M:
             continue
-        if surface.shape.boundary.distance(point) <= ON_FACE_M:
+        if surface.shape.boundary.distance(point) <= _ON_FACE_M:
             raise InputError(
                 f"{file.path}: site '{mark.name}' at ({where}) mm lies on an edge between faces; move it into one face."
             )

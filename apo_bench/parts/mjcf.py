@@ -16,8 +16,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box
 from apo_bench.parts.tree import read_tree
 
-FIT_CLASS = "fit"
-DENSITY = 1000.0
+_FIT_CLASS = "fit"
+_DENSITY = 1000.0
 """[kg/m^3], where none is stated."""
 
 
@@ -64,7 +64,7 @@ def read_part(path: Path) -> PartFile:
         raise InputError(f"{path}: body '{body.get('name', '')}' has no geom; give it at least one named box.")
     _check_names(path, "geom", [box.name for box, _ in geoms])
     _check_names(path, "site", [mark.name for mark in marks])
-    densities = sorted({float(said.get("density", DENSITY)) for _, said in geoms})
+    densities = sorted({float(said.get("density", _DENSITY)) for _, said in geoms})
     if len(densities) > 1:
         raise InputError(
             f"{path}: the geoms have densities from {densities[0]:g} to {densities[-1]:g} kg/m^3; a part has one."
@@ -78,11 +78,11 @@ def _check_names(path: Path, kind: str, names: list[str]) -> None:
         raise InputError(f"{path}: two {kind}s are called '{name}'; give each its own name.")
 
 
-Defaults = Mapping[str, Mapping[str, Mapping[str, str]]]
+_Defaults = Mapping[str, Mapping[str, Mapping[str, str]]]
 """Class -> tag -> attribute -> value, nested classes resolved; the outermost class is `main`."""
 
 
-def _defaults(path: Path, root: Element) -> Defaults:
+def _defaults(path: Path, root: Element) -> _Defaults:
     found: dict[str, Mapping[str, Mapping[str, str]]] = {}
     for name, said in _classes(path, root.find("default"), "main", {}):
         if name in found:
@@ -107,7 +107,7 @@ def _classes(
             yield from _classes(path, child, child.attrib["class"], said)
 
 
-def _resolved(path: Path, element: Element, defaults: Defaults) -> Mapping[str, str]:
+def _resolved(path: Path, element: Element, defaults: _Defaults) -> Mapping[str, str]:
     """The attributes of an element with those of its default class."""
     name = element.get("class", "main")
     if name not in defaults:
@@ -126,7 +126,7 @@ def _mark(path: Path, element: Element, said: Mapping[str, str]) -> Mark:
     name = element.attrib["name"]
     if name.startswith("auto_"):
         raise InputError(f"{path}: site '{name}' begins with auto_, which is kept for faces without a name; rename it.")
-    return Mark(name, _numbers(said.get("pos", "0 0 0")), element.get("class") == FIT_CLASS)
+    return Mark(name, _numbers(said.get("pos", "0 0 0")), element.get("class") == _FIT_CLASS)
 
 
 def _numbers(text: str) -> Array:

@@ -12,7 +12,7 @@ from apo_bench.errors import InputError
 from apo_bench.io.reading import read_text
 from apo_bench.parts.allowed import ALLOWED, MOST_CLASSES, REMEDIES, Allowed
 
-DEEPEST = 8
+_DEEPEST = 8
 """Levels of nesting; classes stand in classes, all else at most four levels deep."""
 
 
@@ -76,8 +76,8 @@ class _Reader:
         if had[tag] > around.inside[tag]:
             self._refuse(f"<{outer}> has more than {around.inside[tag]} <{tag}>, which is the most it may have", tag)
         self._classes += tag == "default"
-        if self._classes > MOST_CLASSES or len(self._open) == DEEPEST:
-            self._refuse(f"at most {MOST_CLASSES} <default>, {DEEPEST - 1} of them in each other, are allowed")
+        if self._classes > MOST_CLASSES or len(self._open) == _DEEPEST:
+            self._refuse(f"at most {MOST_CLASSES} <default>, {_DEEPEST - 1} of them in each other, are allowed")
         return ALLOWED[f"{outer}/{tag}"]
 
     def _end(self, tag: str) -> None:

@@ -28,13 +28,13 @@ from apo_bench.prediction.resting import is_support, residual, settled
 from apo_bench.prediction.stability import unstable
 from apo_bench.records.thresholds import Thresholds
 
-Code = Literal["ok", "residual", "interference", "unstable_goal"]
-ACROSS = 0.5
+_Code = Literal["ok", "residual", "interference", "unstable_goal"]
+_ACROSS = 0.5
 """A face whose normal makes a smaller cosine with the way in is a wall beside it."""
-SPACING_M = 0.02
-"""The way in is looked at this densely, and at `MOST` places at most."""
-MOST = 8
-WHY = {
+_SPACING_M = 0.02
+"""The way in is looked at this densely, and at `_MOST` places at most."""
+_MOST = 8
+_WHY = {
     "residual": "its contacts are planned {:.2f} mm off, {:g} mm are allowed",
     "interference": "it would be {:.2f} mm deep in another part, {:g} mm are allowed",
 }
@@ -48,14 +48,14 @@ class Prediction:
     fails: bool
     operation: int | None
     """The operation that will fail, counted from 0."""
-    code: Code
+    code: _Code
     sentence: str
     size_mm: float | None
     """`residual`: the |e| that is too large; `interference`: the depth; `ok`: the largest |e| of a fit contact; None
     for an unstable goal."""
 
 
-class Doing(NamedTuple):
+class _Doing(NamedTuple):
     """One operation about to be done, alone."""
 
     operation: int
@@ -67,10 +67,10 @@ class Doing(NamedTuple):
     """Every part where it will have come to rest."""
 
 
-class Measure(NamedTuple):
+class _Measure(NamedTuple):
     """How far something is off, and how far it may be."""
 
-    code: Code
+    code: _Code
     size_mm: float
     allowed_mm: float
 
@@ -93,25 +93,25 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
     physical, worst = _physical(plan.assembly, clearance_mm), 0.0
     for doing in doings:
         how = attach[doing.operation] if attach else None
-        fit = Measure("residual", _fit_mm(doing, how), clearance_mm + thresholds.fit_margin_mm)
-        side = Measure("residual", _side_mm(doing), thresholds.support_mm)
-        depth = Measure("interference", _depth_mm(doing, how, physical), thresholds.pushed_mm)
+        fit = _Measure("residual", _fit_mm(doing, how), clearance_mm + thresholds.fit_margin_mm)
+        side = _Measure("residual", _side_mm(doing), thresholds.support_mm)
+        depth = _Measure("interference", _depth_mm(doing, how, physical), thresholds.pushed_mm)
         for code, size_mm, allowed_mm in (fit, side, depth):
             if size_mm > allowed_mm:
-                return _fails(doing, code, size_mm, WHY[code].format(size_mm, allowed_mm))
+                return _fails(doing, code, size_mm, _WHY[code].format(size_mm, allowed_mm))
         worst = max(worst, fit.size_mm)
     return Prediction(False, None, "ok", "every operation should fit", worst)
 
 
-def _fails(doing: Doing, code: Code, size_mm: float | None, why: str) -> Prediction:
+def _fails(doing: _Doing, code: _Code, size_mm: float | None, why: str) -> Prediction:
     sentence = f"operation {doing.operation + 1} ({_operation(doing).main}) will fail: {why}"
     return Prediction(True, doing.operation, code, sentence, size_mm)
 
 
-def _doings(plan: Plan) -> Iterator[Doing]:
+def _doings(plan: Plan) -> Iterator[_Doing]:
     """What the schedule does, in order; undoing only changes where the parts are."""
     for (k, alone, before, planned), (_, _, _, rests) in zip(_walk(plan, False), _walk(plan, True), strict=True):
-        yield Doing(k, alone, before, planned, rests)
+        yield _Doing(k, alone, before, planned, rests)
 
 
 def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Poses]]:
@@ -129,17 +129,17 @@ def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Po
         yield k, alone, before, now
 
 
-def _fit_mm(doing: Doing, how: Attach | None) -> float:
+def _fit_mm(doing: _Doing, how: Attach | None) -> float:
     """Largest |e| of the fit contacts that the operation makes across its way in, nominal faces as planned."""
     found = [0.0]
     for contact in filter(doing.alone.is_fit, _operation(doing).contacts):
         e, n = residual(doing.alone, contact, doing.planned)
-        if how is None or abs(n @ _way(doing, how)) < ACROSS:
+        if how is None or abs(n @ _way(doing, how)) < _ACROSS:
             found.append(1e3 * float(np.abs(e).max()))
     return max(found)
 
 
-def _side_mm(doing: Doing) -> float:
+def _side_mm(doing: _Doing) -> float:
     """Largest |e| of the sides that the operation slides onto others, once its part rests."""
     found = [0.0]
     for contact in _operation(doing).contacts:
@@ -148,7 +148,7 @@ def _side_mm(doing: Doing) -> float:
     return max(found)
 
 
-def _depth_mm(doing: Doing, how: Attach | None, physical: dict[str, Solid]) -> float:
+def _depth_mm(doing: _Doing, how: Attach | None, physical: dict[str, Solid]) -> float:
     """How deep a part that moves comes into one that rests and that it should not touch."""
     moves, at, back = _operation(doing).moves, doing.planned, _way_back(doing, how)
     touching = {frozenset((m.part, e.part)) for m, e in _operation(doing).contacts}
@@ -171,23 +171,23 @@ def _shifted(T: Array, d: Array) -> Array:
     return out
 
 
-def _way_back(doing: Doing, how: Attach | None) -> Array:
+def _way_back(doing: _Doing, how: Attach | None) -> Array:
     """From the goal back along the way in, (k, 3), world, [m]."""
     if how is None:
         return np.zeros((1, 3))
-    k = min(MOST, 1 + int(np.ceil(how.travel_m / SPACING_M)))
+    k = min(_MOST, 1 + int(np.ceil(how.travel_m / _SPACING_M)))
     return -np.outer(np.linspace(0.0, how.travel_m, k), _way(doing, how))
 
 
-def _way(doing: Doing, how: Attach) -> Array:
+def _way(doing: _Doing, how: Attach) -> Array:
     return np.asarray(_goal(doing)[:3, :3] @ how.direction)
 
 
-def _goal(doing: Doing) -> Array:
+def _goal(doing: _Doing) -> Array:
     return doing.planned[_operation(doing).main]
 
 
-def _operation(doing: Doing) -> Operation:
+def _operation(doing: _Doing) -> Operation:
     return doing.alone.operations[0]
 
 

@@ -16,7 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 
-LEVEL = 0.5
+_LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""
 
 
@@ -53,7 +53,7 @@ def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array,
 def is_support(assembly: Assembly, contact: Contact, poses: Poses) -> bool:
     """Whether weight closes the contact."""
     e = contact.environment
-    return bool(abs((poses[e.part][:3, :3] @ assembly.face(e).normal)[2]) > LEVEL)
+    return bool(abs((poses[e.part][:3, :3] @ assembly.face(e).normal)[2]) > _LEVEL)
 
 
 def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:

@@ -11,9 +11,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 
-LEVEL = float(np.cos(np.radians(30.0)))
+_LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
-BALANCED = 1e-7
+_BALANCED = 1e-7
 """What is left of the weight, and of its moments over 10 mm, where forces balance it."""
 
 
@@ -46,7 +46,7 @@ def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Arr
     points, signs, level = [np.zeros((0, 3))], [np.zeros(0)], False
     for m, e in operation.contacts:
         up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
-        if abs(up) >= LEVEL:
+        if abs(up) >= _LEVEL:
             level = True
             corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
             points.append(corners)
@@ -69,4 +69,4 @@ def _balanced(points: Array, signs: Array, centroid: Array) -> bool:
         return False
     arms = (points - centroid)[:, :2] / 0.01
     balance = np.vstack([signs, signs * arms[:, 0], signs * arms[:, 1]])
-    return bool(nnls(balance, np.array([1.0, 0.0, 0.0]))[1] < BALANCED)
+    return bool(nnls(balance, np.array([1.0, 0.0, 0.0]))[1] < _BALANCED)

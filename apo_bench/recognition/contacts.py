@@ -24,7 +24,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.belief import Belief, Standing, believed
 from apo_bench.recognition.thresholds import NOISE, Allowed, Rules, allowed, reality, slack
 
-BEGINNINGS = 12
+_BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""
 
 
@@ -142,7 +142,7 @@ class _Around:
     def likeliest(self, belief: Belief) -> _Found:
         """The contacts that go together: of all beginnings, the set with the least score."""
         best = self._followed(belief, None)
-        for first in best.left[:BEGINNINGS]:
+        for first in best.left[:_BEGINNINGS]:
             other = self._followed(belief, first)
             if other.score < best.score:
                 best = other

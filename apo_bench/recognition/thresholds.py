@@ -13,7 +13,7 @@ from apo_bench.assembly.facing import Facing
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-SOFT_M, SOFT_RAD = 0.1e-3, math.radians(0.1)
+_SOFT_M, _SOFT_RAD = 0.1e-3, math.radians(0.1)
 """Standard deviation of a contact that is there: parts sink in a little, and the filter is linear."""
 
 
@@ -72,9 +72,9 @@ def allowed(rules: Rules, covariance: Array, slack: Allowed) -> Allowed:
     """
     if rules.fixed:
         return Allowed(rules.gap_m, rules.angle_rad)
-    gap = _two_sided(rules.miss) * math.sqrt(covariance[0, 0] + SOFT_M**2)
+    gap = _two_sided(rules.miss) * math.sqrt(covariance[0, 0] + _SOFT_M**2)
     worst = float(np.linalg.eigvalsh(covariance[1:, 1:])[-1])
-    angle = math.sqrt(-2.0 * math.log(rules.miss) * (max(worst, 0.0) + SOFT_RAD**2))
+    angle = math.sqrt(-2.0 * math.log(rules.miss) * (max(worst, 0.0) + _SOFT_RAD**2))
     return Allowed(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
 
 
@@ -86,7 +86,7 @@ def slack(pair: Facing, play_m: float) -> Allowed:
 def reality(pair: Facing, play_m: float) -> Array:
     """(3, 3), covariance of gap and tilts of a contact that is there: uniform within its play, and a little soft."""
     tilts = [play_m / max(half, play_m, 1e-9) for half in pair.half_m]
-    soft = (SOFT_M, SOFT_RAD, SOFT_RAD)
+    soft = (_SOFT_M, _SOFT_RAD, _SOFT_RAD)
     return np.diag([x * x / 3.0 + y * y for x, y in zip((play_m, *tilts), soft, strict=True)])
 
 

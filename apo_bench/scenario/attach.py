@@ -14,7 +14,7 @@ from apo_bench.insertion.operations import understand
 from apo_bench.scenario.nominal import waiting
 from apo_bench.scenario.scenario import Scenario
 
-THROUGH = 1e-3
+_THROUGH = 1e-3
 """Cosine to the normal of a face above which a direction leads through it."""
 
 
@@ -38,7 +38,7 @@ def _check(after: Arrival, asked: Preference, key: str, main: str) -> None:
     if asked.direction is not None:
         way = after.T[:3, :3] @ asked.direction
         through = max(after.touched, key=lambda each: float(each.normal @ way), default=None)
-        if through is not None and through.normal @ way > THROUGH:
+        if through is not None and through.normal @ way > _THROUGH:
             face = next(of for of in through.contact if of.part == through.rests)
             raise InputError(
                 f"{key}, along: '{main}' would come through '{face}', which it shall touch; "

@@ -21,11 +21,11 @@ from apo_bench.scenario.order import check_order
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
 
-GAP_M = 1e-6
+_GAP_M = 1e-6
 """Faces that are said to touch are nearer than this."""
-ANGLE_DEG = 0.01
+_ANGLE_DEG = 0.01
 """Normals of faces that are said to touch are opposite within this."""
-INTRUSION_M = 1e-6
+_INTRUSION_M = 1e-6
 """Parts that only touch are less deep in each other."""
 
 
@@ -89,7 +89,7 @@ def _check_turns(scenario: Scenario, file: str, case: Case, stages: tuple[Poses,
     for k, operation in enumerate(scenario.assembly.operations):
         before, after = stages[k][operation.main], stages[k + 1][operation.main]
         tilt = _angle_deg(before[:3, :3].T[:, 2], after[:3, :3].T[:, 2])
-        if tilt > ANGLE_DEG:
+        if tilt > _ANGLE_DEG:
             raise _refuse(
                 file,
                 case,
@@ -118,11 +118,11 @@ def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact:
     T_face, T_on = poses[contact.manipulated.part], poses[contact.environment.part]
     n_face, n_on = T_face[:3, :3] @ face.normal, T_on[:3, :3] @ on.normal
     angle = _angle_deg(n_face, -n_on)
-    if angle > ANGLE_DEG:
+    if angle > _ANGLE_DEG:
         sentence = f"'{contact}': the faces look {180 - angle:.4g} degrees apart"
         raise _refuse(file, case, key, sentence, "180 are needed: turn the part, or name faces that look at each other")
     gap = float(n_on @ (pose.apply(T_face, face.outline).mean(axis=0) - pose.apply(T_on, on.outline[:1])[0]))
-    if abs(gap) > GAP_M:
+    if abs(gap) > _GAP_M:
         sentence = f"'{contact}': the faces are {1e3 * abs(gap):.4g} mm {'apart' if gap > 0 else 'too deep'}"
         remedy = (
             "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet exactly"
@@ -149,7 +149,7 @@ def _check_pair(
 ) -> None:
     a, b = pair
     depth = intrusion(scenario.assembly.solids[a], poses[a], scenario.assembly.solids[b], poses[b])
-    if depth > INTRUSION_M:
+    if depth > _INTRUSION_M:
         sentence = f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other {place}"
         raise _refuse(file, case, key, sentence, "move one of them away")
 

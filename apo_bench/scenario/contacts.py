@@ -20,9 +20,9 @@ from apo_bench.scenario.keys import LARGEST_MM, read_span, refuse, refuse_name
 
 Asked = Mapping[Contact, Gap]
 """What is asked of each contact, in the order of the file."""
-KINDS: tuple[Kind, ...] = get_args(Kind)
-EXAMPLE = '["bottom", "table.top"]'
-TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
+_KINDS: tuple[Kind, ...] = get_args(Kind)
+_EXAMPLE = '["bottom", "table.top"]'
+_TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
 
 
 def read_contacts(
@@ -60,7 +60,7 @@ def _contact(node: Node, main: str, solids: Mapping[str, Solid]) -> tuple[Contac
     keys = node.fields(("faces",), ("kind", "gap_mm")) if isinstance(node.value, dict) else {"faces": node}
     pair = keys["faces"]
     if not isinstance(pair.value, list) or len(pair.value) != 2:
-        pair.fail(f"a pair is needed, such as {EXAMPLE}, or a table, such as {TABLE}")
+        pair.fail(f"a pair is needed, such as {_EXAMPLE}, or a table, such as {_TABLE}")
     above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
     contact = Contact(_face(above, main, solids), _face(below, None, solids))
     fits = any(solids[of.part].faces[of.face].fit for of in contact)
@@ -84,10 +84,10 @@ def _gap(keys: Mapping[str, Node], node: Node, contact: Contact, fits: bool) -> 
 
 
 def _kind(node: Node) -> Kind:
-    for kind in KINDS:
+    for kind in _KINDS:
         if node.value == kind:
             return kind
-    node.fail(f"{', '.join(KINDS[:-1])} or {KINDS[-1]} is needed")
+    node.fail(f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
 
 
 def _check(contact: Contact, node: Node, moves: tuple[str, ...], there: set[str]) -> None:

@@ -22,13 +22,13 @@ from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
 from apo_bench.scenario.scenario import Grasp, Shift
 
-MOST_PARTS, MOST_OPERATIONS, MOST_CONTACTS, MOST_SHIFTS = 50, 100, 50, 20
+_MOST_PARTS, _MOST_OPERATIONS, _MOST_CONTACTS, _MOST_SHIFTS = 50, 100, 50, 20
 """In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
-ARM = "arm"
+_ARM = "arm"
 """What the robot is called in a scene."""
-RAISED = 0.15
+_RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
-LEVEL = 1e-6
+_LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""
 
 
@@ -62,8 +62,8 @@ def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
     """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
     if not isinstance(node.value, dict) or not node.value:
         node.fail("at least one table [parts.NAME] is needed")
-    if len(node.value) > MOST_PARTS:
-        refuse(node, f"at most {MOST_PARTS} parts are allowed, {len(node.value)} were given")
+    if len(node.value) > _MOST_PARTS:
+        refuse(node, f"at most {_MOST_PARTS} parts are allowed, {len(node.value)} were given")
     solids: dict[Path, Solid] = {}
     return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
 
@@ -71,8 +71,8 @@ def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
 def _part(node: Node, name: str, folder: Path, solids: dict[Path, Solid]) -> Part:
     if not NAME.fullmatch(name):
         refuse(node, f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores")
-    if name == ARM:
-        refuse(node, f"a part cannot be called '{ARM}', as the robot is; give it another name")
+    if name == _ARM:
+        refuse(node, f"a part cannot be called '{_ARM}', as the robot is; give it another name")
     keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
     fixed = "fixed" in keys and keys["fixed"].flag()
     follows = "follows_site" in keys and keys["follows_site"].flag()
@@ -110,8 +110,8 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
     nodes = node.items("operation")
     if not nodes:
         refuse(node, "the list is empty; give at least one [[operations]]")
-    if len(nodes) > MOST_OPERATIONS:
-        refuse(node, f"at most {MOST_OPERATIONS} operations are allowed, {len(nodes)} were given")
+    if len(nodes) > _MOST_OPERATIONS:
+        refuse(node, f"at most {_MOST_OPERATIONS} operations are allowed, {len(nodes)} were given")
     poses = {name: part.start for name, part in parts.items()}
     there = {name for name, part in parts.items() if part.fixed}
     entries = []
@@ -122,8 +122,8 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
-    if sum(len(entry.shifts) for entry in entries) > MOST_SHIFTS:
-        refuse(node, f"at most {MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends")
+    if sum(len(entry.shifts) for entry in entries) > _MOST_SHIFTS:
+        refuse(node, f"at most {_MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends")
     return tuple(entries)
 
 
@@ -141,8 +141,8 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
     goal = read_pose(keys["goal"])
     solids = {name: part.solid for name, part in parts.items()}
     contacts = _items(keys["contacts"], "contact")
-    if len(contacts) > MOST_CONTACTS:
-        refuse(keys["contacts"], f"at most {MOST_CONTACTS} contacts are allowed, {len(contacts)} were given")
+    if len(contacts) > _MOST_CONTACTS:
+        refuse(keys["contacts"], f"at most {_MOST_CONTACTS} contacts are allowed, {len(contacts)} were given")
     asked = read_contacts(contacts, main, carries, solids, there)
     if not asked:
         refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
@@ -190,12 +190,12 @@ def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp
         keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
     if "across" in keys:
         across = read_axis(keys["across"])
-        if abs((before[:3, :3] @ across)[2]) > LEVEL:
+        if abs((before[:3, :3] @ across)[2]) > _LEVEL:
             keys["across"].fail(
                 "an axis that is level where the part is picked is needed", "the gripper comes from above"
             )
         return Grasp(point, across)
-    level = [axis for axis in range(3) if abs(before[2, axis]) < LEVEL]
+    level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
     if len(level) < 2:
         refuse(entry, "the part does not stand straight where it is picked; say grasp = { across = [x, y, z] }")
     return Grasp(point, np.eye(3)[min(level, key=lambda axis: (high - low)[axis])])
@@ -205,7 +205,7 @@ def _above_middle(solid: Solid, T: Array) -> Array:
     """Over the middle of the part as it stands, so that fingers which reach below it clear what it stands on."""
     low, high = solid.bounds
     up = T[2, :3]
-    point: Array = (low + high) / 2 + RAISED * (np.abs(up) @ (high - low)) * up
+    point: Array = (low + high) / 2 + _RAISED * (np.abs(up) @ (high - low)) * up
     return np.clip(point, low, high)
 
 

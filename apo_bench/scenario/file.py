@@ -24,8 +24,8 @@ from apo_bench.scenario.entries import Entry, read_operations, read_parts
 from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_span, refuse
 from apo_bench.scenario.scenario import Carelessness, Scenario, Site
 
-SCHEMA = 1
-LARGEST_CLEARANCE_MM = 5.0
+_SCHEMA = 1
+_LARGEST_CLEARANCE_MM = 5.0
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -67,9 +67,9 @@ def _path(given: str | Path) -> Path:
 
 def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
     """The scenario without lines of attach, and what the file states of them."""
-    schema = root.value.get("schema", SCHEMA)
-    if isinstance(schema, bool) or schema != SCHEMA:
-        root.child(schema, "schema").fail(f"schema = {SCHEMA} is needed", "no other format is known to this version")
+    schema = root.value.get("schema", _SCHEMA)
+    if isinstance(schema, bool) or schema != _SCHEMA:
+        root.child(schema, "schema").fail(f"schema = {_SCHEMA} is needed", "no other format is known to this version")
     top = root.fields(
         ("schema", "title", "parts", "operations"),
         ("paper", "human", "success", "clearance_mm", "gap_mm", "site", "careless", "judge"),
@@ -101,8 +101,8 @@ def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]
         careless=_careless(top["careless"], entries) if "careless" in top else None,
         thresholds=thresholds,
         success_means=means,
-        clearance_mm=_number(top["clearance_mm"], LARGEST_CLEARANCE_MM) if "clearance_mm" in top else 0.25,
-        gap_mm=_number(top["gap_mm"], LARGEST_CLEARANCE_MM, above=True) if "gap_mm" in top else 0.1,
+        clearance_mm=_number(top["clearance_mm"], _LARGEST_CLEARANCE_MM) if "clearance_mm" in top else 0.25,
+        gap_mm=_number(top["gap_mm"], _LARGEST_CLEARANCE_MM, above=True) if "gap_mm" in top else 0.1,
         follows_site=frozenset(name for name, part in parts.items() if part.follows_site),
     )
     return scenario, tuple(entry.attach for entry in entries)

@@ -15,7 +15,7 @@ from apo_bench.scenario.scenario import Scenario
 NOTHING_M = 1e-9
 """A part that is displaced by less is where it should be."""
 
-Displaced = dict[str, Array]
+_Displaced = dict[str, Array]
 """Part -> how far it lies from its true place, (3,), world, [m]."""
 
 
@@ -39,7 +39,7 @@ def spread(scenario: Scenario, layout: Layout, offset: Array) -> Spread:
         offset: (3,), [m], in the frame of the main part of the careless operation.
     """
     assembly = scenario.assembly
-    offsets, displaced, left = np.zeros((len(assembly), 3)), Displaced(), ()
+    offsets, displaced, left = np.zeros((len(assembly), 3)), _Displaced(), ()
     if scenario.careless is None or not offset.any():
         return Spread(offsets, left)
     stages = (layout.start, *placed(assembly, layout.start, layout.goals))
@@ -63,7 +63,7 @@ def careless_covariance(scenario: Scenario, careless: float) -> Array:
     return covariance
 
 
-def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: Displaced) -> Array:
+def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
     """How far the faces of displaced parts lead a part astray, (3,), world, [m]."""
     led = np.zeros(3)
     for contact in operation.contacts:
@@ -74,7 +74,7 @@ def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: D
     return led
 
 
-def _displaced(operation: Operation, turn: Array, error: Array, before: Displaced) -> Displaced:
+def _displaced(operation: Operation, turn: Array, error: Array, before: _Displaced) -> _Displaced:
     """What is displaced after an operation that turned its parts and put the main one `error` from its goal."""
     main = before.get(operation.main, np.zeros(3))
     after = {**before, operation.main: error}

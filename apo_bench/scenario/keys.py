@@ -14,7 +14,7 @@ from apo_bench.io.strict_json import Node
 
 LARGEST_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""
-AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0)) for i in range(3)}
+_AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0)) for i in range(3)}
 
 
 def refuse(node: Node, sentence: str) -> NoReturn:
@@ -41,9 +41,9 @@ def read_pose(node: Node) -> Array:
 def read_axis(node: Node) -> Array:
     """`"x"`, `"+x"`, `"-x"` ... or three numbers, as a unit vector (3,)."""
     if isinstance(node.value, str):
-        if node.value not in AXES:
+        if node.value not in _AXES:
             node.fail("an axis is needed: x, y, z with or without a sign, or three numbers")
-        return AXES[node.value] * np.eye(3)["xyz".index(node.value[-1])]
+        return _AXES[node.value] * np.eye(3)["xyz".index(node.value[-1])]
     vector = node.numbers(3)
     length = float(np.linalg.norm(vector / max(1.0, np.abs(vector).max())))
     if length < 1e-9:

@@ -8,7 +8,7 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact, Operation
 from apo_bench.errors import InputError
 
-SAME = 1e-9
+_SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
 
 
@@ -29,7 +29,7 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
                 f"connects it with '{operation.main}', not even through another carried part; leave it out, or let an "
                 "earlier operation make that contact."
             )
-        if np.abs(stages[k + 1][operation.main] - stages[k][operation.main]).max() < SAME:
+        if np.abs(stages[k + 1][operation.main] - stages[k][operation.main]).max() < _SAME:
             raise InputError(
                 f"{file}, operation {k + 1}, goal: '{operation.main}' stands there already; give another goal, or take "
                 "this operation out."

@@ -20,9 +20,9 @@ from apo_bench.geometry.solid import extent
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.explain_text import listed
 
-WIDTH, HEIGHT, LINE_PX = 620, 480, 20
-NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
-MOST_LINES, LETTERS = 6, 86
+_WIDTH, _HEIGHT, _LINE_PX = 620, 480, 20
+_NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
+_MOST_LINES, _LETTERS = 6, 86
 
 
 class Belief(NamedTuple):
@@ -85,20 +85,20 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
     near = dict.fromkeys([*last.moves, *(c.environment.part for c in last.contacts)])
     camera = _camera(scenario, beliefs[0].poses, tuple(part for part in near if part not in scenario.assembly.fixed))
     lines = max(len(_below(b)) for b in beliefs) + 1
-    below, width = LINE_PX * lines + 8, WIDTH * len(beliefs)
-    height = HEIGHT + below + 56
+    below, width = _LINE_PX * lines + 8, _WIDTH * len(beliefs)
+    height = _HEIGHT + below + 56
     figure = Figure(figsize=(width / 100, height / 100))
     what = listed([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"
     figure.text(0.5, 1 - 16 / height, f"{scenario.name}, believed after {'operation' if step == 1 else 'operations'} "
                 f"{what}", ha="center", va="center", fontsize=12)  # fmt: skip
     for i, one in enumerate(beliefs):
-        axes = figure.add_axes((i / len(beliefs), below / height, 1 / len(beliefs), HEIGHT / height))
-        axes.imshow(picture(scene, one.poses, WIDTH, HEIGHT, camera))
+        axes = figure.add_axes((i / len(beliefs), below / height, 1 / len(beliefs), _HEIGHT / height))
+        axes.imshow(picture(scene, one.poses, _WIDTH, _HEIGHT, camera))
         axes.axis("off")
         figure.text((i + 0.5) / len(beliefs), 1 - 42 / height, one.title, ha="center", va="center", fontsize=11)
         for j, line in enumerate(_below(one)):
             figure.text(
-                (i + 0.03) / len(beliefs), (below - LINE_PX * (j + 0.8)) / height, line, va="center", fontsize=9.5
+                (i + 0.03) / len(beliefs), (below - _LINE_PX * (j + 0.8)) / height, line, va="center", fontsize=9.5
             )
     try:
         figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
@@ -108,10 +108,10 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
 
 def _below(one: Belief) -> list[str]:
     """The lines below a panel."""
-    warning = textwrap.wrap(one.warning, LETTERS)
+    warning = textwrap.wrap(one.warning, _LETTERS)
     if not one.open:
         return [f"every contact holds: largest gap {1e3 * one.gap_m:.3f} mm", *warning]
-    shown = [f"contacts that do not hold: {one.open[0]}", *one.open[1 : MOST_LINES - 1]]
+    shown = [f"contacts that do not hold: {one.open[0]}", *one.open[1 : _MOST_LINES - 1]]
     left = len(one.open) - len(shown)
     return [*shown, *([f"and {left} more"] if left else []), *warning]
 
@@ -125,5 +125,5 @@ def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
     at = np.array([poses[part][:3, 3] for part in parts])
     low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
     first = poses[scenario.assembly.operations[0].main]
-    azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + AZIMUTH_DEG
-    return view((low + high) / 2, NEAREST_M + FARTHER * float(np.linalg.norm(high - low)), azimuth, ELEVATION_DEG)
+    azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
+    return view((low + high) / 2, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)

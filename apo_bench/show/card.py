@@ -15,7 +15,7 @@ from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.human_error import NOTHING_M, spread
 from apo_bench.scenario.scenario import Carelessness, Scenario
 
-OPPOSITE = 0.99
+_OPPOSITE = 0.99
 """Normals whose cosine is below minus this look at each other; a face whose normal is as upright is level."""
 
 
@@ -81,9 +81,9 @@ def _way(scenario: Scenario, arc: Arc) -> str:
     poses = placed(scenario.assembly, scenario.start, scenario.goals)[arc.made]
     part = arc.manipulated.part
     N = np.array([scenario.assembly.face(c.manipulated).normal for c in arc.contacts]) @ poses[part][:3, :3].T
-    if (N @ N.T).min() < -OPPOSITE:
+    if (N @ N.T).min() < -_OPPOSITE:
         return "into"
-    return "against" if np.abs(N[:, 2]).max() < 1 - OPPOSITE else "onto"
+    return "against" if np.abs(N[:, 2]).max() < 1 - _OPPOSITE else "onto"
 
 
 def _human(scenario: Scenario) -> Iterator[str]:

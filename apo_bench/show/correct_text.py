@@ -12,10 +12,10 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.show.explain_text import covariance_form, explanation_form, sentences, total
 
-CORRECTION = "apo-bench/correction/1"
-TOO_GOOD = 1e-6
+_CORRECTION = "apo-bench/correction/1"
+_TOO_GOOD = 1e-6
 """A p-value nearer to 1 happens to nobody whose noise is what was stated, ..."""
-TESTED = 3
+_TESTED = 3
 """... if at least so many degrees of freedom are tested."""
 
 
@@ -71,7 +71,7 @@ def correction_form(
 ) -> dict[str, Any]:
     """What `json` can write: mm, degrees, wxyz, operations from 1; poses only of a correction that converged."""
     return {
-        "schema": CORRECTION,
+        "schema": _CORRECTION,
         "scenario": scenario,
         "method": method,
         "status": made.status,
@@ -102,7 +102,7 @@ def _test(test: Consistency, contradictory: bool) -> str:
     said = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
     if test.passes and contradictory:
         return f"{said}, but the contacts contradict each other"
-    if test.passes and test.p_value > 1.0 - TOO_GOOD and test.freedom >= TESTED:
+    if test.passes and test.p_value > 1.0 - _TOO_GOOD and test.freedom >= _TESTED:
         return f"{said}: the stated noise is far larger than what was seen; are the units right?"
     if test.passes:
         return f"{said}: explained by the stated noise"

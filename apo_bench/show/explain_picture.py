@@ -16,15 +16,15 @@ from apo_bench.geometry.solid import Solid, extent
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.explain_text import listed, size, the
 
-WIDTH, HEIGHT = 900, 540
-LINE_PX = 21
-ARROW_M, AWAY_M = 0.038, 0.006
+_WIDTH, _HEIGHT = 900, 540
+_LINE_PX = 21
+_ARROW_M, _AWAY_M = 0.038, 0.006
 """Length of an arrow, and how far from its part it begins."""
-GRAY = (0.45, 0.45, 0.45)
-NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.12, 1.0, 230.0, -33.0
-LOW = 0.3
+_GRAY = (0.45, 0.45, 0.45)
+_NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 230.0, -33.0
+_LOW = 0.3
 """How high on its part a ring lies, from its lower end along the axis."""
-SHADE = 0.8
+_SHADE = 0.8
 """Arrows are that much darker than their part."""
 
 
@@ -49,14 +49,14 @@ def draw_explanation(scenario: Scenario, seen: Observation, found: Explanation, 
 
     drawn, scene = _parts(scenario, found), build_scene(scenario)
     low, high = _bounds(drawn)
-    azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + AZIMUTH_DEG
+    azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + _AZIMUTH_DEG
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
-    camera = view(middle, NEAREST_M + FARTHER * float(np.linalg.norm(high - low)), azimuth, ELEVATION_DEG)
+    camera = view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
     marks = [mark for one in drawn for mark in _marks(one, -_looking(azimuth))]
     poses = {**seen.start, **{part.part: part.pose for part in found.parts}}
-    image = picture(scene, poses, WIDTH, HEIGHT, camera, Marks(marks))
+    image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks(marks))
     fovy = float(scene.shown.model.vis.global_.fovy)
-    names = [(mark, pixels(mark.tips, camera, fovy, WIDTH, HEIGHT)) for mark in marks]
+    names = [(mark, pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)) for mark in marks]
     figure = _captioned(image, scenario, found, drawn)
     for mark, tips in names:
         x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
@@ -70,7 +70,7 @@ def draw_explanation(scenario: Scenario, seen: Observation, found: Explanation, 
 def _parts(scenario: Scenario, found: Explanation) -> list[_Drawn]:
     own = {o.part: o for o in found.operations}
     return [
-        _Drawn(scenario.assembly.solids[part.part], part.pose, scenario.colors.get(part.part, GRAY), own[part.part])
+        _Drawn(scenario.assembly.solids[part.part], part.pose, scenario.colors.get(part.part, _GRAY), own[part.part])
         for part in found.parts
         if part.part in own
     ]
@@ -99,17 +99,17 @@ def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
 
     R, middle = one.pose[:3, :3], one.solid.bounds.mean(axis=0)
     r, g, b = one.color
-    color = (SHADE * r, SHADE * g, SHADE * b)
+    color = (_SHADE * r, _SHADE * g, _SHADE * b)
     axis = R @ direction.axis
     if not direction.turns:
         reach = extent(one.solid.boxes, direction.axis)[1] - direction.axis @ middle
         center = R @ middle + one.pose[:3, 3]
-        return Shift(center, axis, reach + AWAY_M, reach + AWAY_M + ARROW_M, color, str(direction))
+        return Shift(center, axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, color, str(direction))
     low, high = extent(one.solid.boxes, direction.axis)
-    about = direction.point + (LOW * high + (1 - LOW) * low - direction.point @ direction.axis) * direction.axis
+    about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
     across = _across(direction.axis)
     ends = np.array([extent(one.solid.boxes, v) for v in across]) - (across @ about)[:, None]
-    radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * AWAY_M
+    radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
     return Turn(R @ about + one.pose[:3, 3], axis, toward, radius, color, str(direction))
 
 
@@ -122,16 +122,16 @@ def _captioned(image: Any, scenario: Scenario, found: Explanation, drawn: list[_
     """The picture with its title above and a line for each part below."""
     from matplotlib.figure import Figure
 
-    below = LINE_PX * (len(drawn) + 1)
-    height = HEIGHT + below + 30
-    figure = Figure(figsize=(WIDTH / 100, height / 100))
-    axes = figure.add_axes((0.0, below / height, 1.0, HEIGHT / height))
+    below = _LINE_PX * (len(drawn) + 1)
+    height = _HEIGHT + below + 30
+    figure = Figure(figsize=(_WIDTH / 100, height / 100))
+    axes = figure.add_axes((0.0, below / height, 1.0, _HEIGHT / height))
     axes.imshow(image)
     axes.axis("off")
     title = f"{scenario.name}: what no contact fixes ({found.freedom} of {6 * len(found.goals)} directions)"
     figure.text(0.5, 1.0 - 15 / height, title, ha="center", va="center", fontsize=12)
     for i, one in enumerate(drawn):
-        y = (below - LINE_PX * (i + 0.8)) / height
+        y = (below - _LINE_PX * (i + 0.8)) / height
         figure.text(0.02, y, "\u25a0", color=one.color, fontsize=14, va="center")
         figure.text(0.045, y, _line(found, one.operation), va="center", fontsize=10)
     return figure

@@ -14,8 +14,8 @@ from apo_bench.correction.holding import Hold
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-EXPLANATION = "apo-bench/explanation/1"
-TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
+_EXPLANATION = "apo-bench/explanation/1"
+_TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 _OFF_M = 1e-6
 """A turn is said to be about a point only if that is farther from the origin of the part."""
 
@@ -46,7 +46,7 @@ def explanation_tables(found: Explanation) -> list[Any]:
     for name in (*(f"{name} mm" for name in SHIFTS), *(f"{name} deg" for name in TURNS)):
         parts.add_column(name, justify="right")
     for part in found.parts:
-        deviations = [f"{x:.2f}" for x in part.deviations * TO_MM_DEG]
+        deviations = [f"{x:.2f}" for x in part.deviations * _TO_MM_DEG]
         parts.add_row(part.part, spelled(part.odl), f"{part.rank} of 6", *deviations)
     return [operations, parts]
 
@@ -54,7 +54,7 @@ def explanation_tables(found: Explanation) -> list[Any]:
 def explanation_form(scenario: str, found: Explanation) -> dict[str, Any]:
     """What `json` can write: mm, degrees, operations from 1; a spectral gap of null is infinite."""
     return {
-        "schema": EXPLANATION,
+        "schema": _EXPLANATION,
         "scenario": scenario,
         "operations": [_operation_form(found, o) for o in found.operations],
         "parts": [_part_form(part) for part in found.parts],
@@ -83,7 +83,7 @@ def size(free: Free) -> str:
 
 def covariance_form(C: Array) -> list[list[float]]:
     """(6, 6), in mm and degrees."""
-    return (C * np.outer(TO_MM_DEG, TO_MM_DEG)).tolist()
+    return (C * np.outer(_TO_MM_DEG, _TO_MM_DEG)).tolist()
 
 
 def _fixed(o: Determined) -> str:
@@ -134,7 +134,7 @@ def _hold(hold: Hold) -> str:
 
 
 def _deviation(free: Free) -> float:
-    return float(free.deviation * TO_MM_DEG[3 if free.direction.turns else 0])
+    return float(free.deviation * _TO_MM_DEG[3 if free.direction.turns else 0])
 
 
 def _operation_form(found: Explanation, o: Determined) -> dict[str, Any]:
@@ -152,7 +152,7 @@ def _operation_form(found: Explanation, o: Determined) -> dict[str, Any]:
 
 def _part_form(part: Standing) -> dict[str, Any]:
     packed = pose.pack(part.pose)
-    deviations = part.deviations * TO_MM_DEG
+    deviations = part.deviations * _TO_MM_DEG
     return {
         "part": part.part,
         "placed": part.placed + 1,
@@ -172,10 +172,10 @@ def _free_forms(free: Sequence[Free], T: Array) -> Iterator[dict[str, Any]]:
     """Twists per mm of a shift and per degree of a turn; axes in the frame of the part and in the world."""
     for one in free:
         d = one.direction
-        unit = TO_MM_DEG[3 if d.turns else 0]
+        unit = _TO_MM_DEG[3 if d.turns else 0]
         form: dict[str, Any] = {
             "name": str(d),
-            "twist_mm_deg": (d.twist * TO_MM_DEG / unit).tolist(),
+            "twist_mm_deg": (d.twist * _TO_MM_DEG / unit).tolist(),
             "axis": d.axis.tolist(),
             "axis_world": (T[:3, :3] @ d.axis).tolist(),
         }

@@ -18,11 +18,11 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.show.eye_one import Seen
 from apo_bench.simulation.sensor.watch import Watched
 
-TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
-APPEARED, VANISHED, OUTLINE = "#1b7837", "#b2182b", "#d95f02"
-AROUND = 20
+_TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
+_APPEARED, _VANISHED, _OUTLINE = "#1b7837", "#b2182b", "#d95f02"
+_AROUND = 20
 """Pixels around what changed."""
-LARGEST_MM, RESIDUAL_MM = 60.0, 5.0
+_LARGEST_MM, _RESIDUAL_MM = 60.0, 5.0
 
 
 def draw_eye(seen: Seen, out: Path, view: int = 0) -> None:
@@ -33,8 +33,8 @@ def draw_eye(seen: Seen, out: Path, view: int = 0) -> None:
     events, assembly = seen.events, seen.shown.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     FigureCanvasAgg(figure)
-    rows = figure.subplots(max(1, len(events)), len(TITLES), squeeze=False)
-    for axes, title in zip(rows[0], TITLES, strict=True):
+    rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
+    for axes, title in zip(rows[0], _TITLES, strict=True):
         axes.set_title(title, fontsize=11)
     for axes in rows.ravel():
         axes.set_xticks([])
@@ -64,26 +64,26 @@ def _crop(axes: Any, events: Sequence[Event], view: int) -> None:
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
     if np.any(changed):
         v, u = np.nonzero(np.any(changed, axis=0))
-        axes.set_xlim(u.min() - AROUND, u.max() + AROUND)
-        axes.set_ylim(v.max() + AROUND, v.min() - AROUND)
+        axes.set_xlim(u.min() - _AROUND, u.max() + _AROUND)
+        axes.set_ylim(v.max() + _AROUND, v.min() - _AROUND)
 
 
 def _draw_row(row: Any, watched: Watched, images: Sequence[Array], event: Event, view: int) -> None:
     before, after, regions = images[event.first][view], images[event.last][view], event.regions[view]
     row[0].imshow(watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
     row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
-    row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-LARGEST_MM, vmax=LARGEST_MM)
+    row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-_LARGEST_MM, vmax=_LARGEST_MM)
     row[3].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
-    for mask, color in ((regions.appeared, APPEARED), (regions.vanished, VANISHED)):
+    for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
         row[3].imshow(np.where(mask, 1.0, np.nan), cmap=_one_color(color), vmin=0.0, vmax=1.0, alpha=0.8)
     row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
     if event.found is not None and event.shape is not None:
         expected = _expected(watched.finder.views[view], event)
         seen = regions.appeared & (np.abs(after - expected) < 0.02)
         drawn = row[4].imshow(
-            np.where(seen, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-RESIDUAL_MM, vmax=RESIDUAL_MM
+            np.where(seen, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-_RESIDUAL_MM, vmax=_RESIDUAL_MM
         )
-        row[4].contour(np.isfinite(expected), levels=[0.5], colors=OUTLINE, linewidths=1.2)
+        row[4].contour(np.isfinite(expected), levels=[0.5], colors=_OUTLINE, linewidths=1.2)
         bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)
         bar.ax.tick_params(labelsize=7)
         bar.set_label("measured - model [mm]", fontsize=7)

@@ -10,14 +10,14 @@ from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose
 from apo_bench.show.eye_one import Seen
 
-FORM = "apo-bench/eye/1"
+_FORM = "apo-bench/eye/1"
 
 
 def eye_form(seen: Seen, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
     """Everything that `apo-bench eye` says, operations from 1; the error is that of the eye, not the human's."""
     of = {event.operation: event for event in seen.events if event.operation is not None}
     return {
-        "schema": FORM,
+        "schema": _FORM,
         "scenario": seen.name,
         "level_mm": level_mm,
         "seed": seed,

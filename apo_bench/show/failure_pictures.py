@@ -28,9 +28,9 @@ from apo_bench.records.salt import Salt
 from apo_bench.records.settings import TrialSettings
 from apo_bench.report.failures import FailurePicture, Row
 
-WIDTH, HEIGHT, QUALITY = 640, 480, 82
-NEAREST_M, FARTHER, AZIMUTH_DEG, ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
-SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
+_WIDTH, _HEIGHT, _QUALITY = 640, 480, 82
+_NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
+_SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
 """A trial that was run again is the same if these are."""
 
 
@@ -82,11 +82,11 @@ def _made(
         image = _again(row, spec, scene, content)
         if image is not None:
             return FailurePicture(row, _jpeg(image), "how the replay ended, run again for this picture")
-    whole = whole_row(folder, row)
+    whole = _whole_row(folder, row)
     poses = _poses(whole.get("reached"))
     if not poses:
         raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
-    image = picture(scene, poses, WIDTH, HEIGHT, _camera(scene, row, poses))
+    image = picture(scene, poses, _WIDTH, _HEIGHT, _camera(scene, row, poses))
     secret = row.get("salt") is not None and salt is None
     why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
     return FailurePicture(row, _jpeg(image), f"where the parts ended, as the row says; {why}, so it was not run again")
@@ -112,7 +112,7 @@ def spec_of(row: Row, files: Files) -> TrialSettings:
     )
 
 
-def whole_row(folder: Path, row: Row) -> dict[str, Any]:
+def _whole_row(folder: Path, row: Row) -> dict[str, Any]:
     """The row as it stands in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
     wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["spec_hash"]).encode())
     path = folder / "trials.jsonl"
@@ -151,12 +151,12 @@ def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
         last[:] = [np.array(data.qpos)]
 
     done = run_trial(spec, scene, content=content, watch=keep)
-    if not last or any(done.get(name) != row.get(name) for name in SAME):
+    if not last or any(done.get(name) != row.get(name) for name in _SAME):
         return None
     poses = _poses(done["reached"]) or {}
     camera = _camera(scene, row, poses)
     fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
-    return picture_with_arm(scene, fixed, last[0], WIDTH, HEIGHT, camera)
+    return picture_with_arm(scene, fixed, last[0], _WIDTH, _HEIGHT, camera)
 
 
 def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:
@@ -176,18 +176,18 @@ def _camera(scene: Any, row: Row, poses: Poses) -> Any:
     near = {part for o in asked for part in (*o.moves, *(c.environment.part for c in o.contacts))}
     parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
     if not parts:
-        return view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, AZIMUTH_DEG, ELEVATION_DEG)
+        return view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)
     boxes = {part: assembly.solids[part].boxes for part in parts}
     ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
     at = np.array([poses[part][:3, 3] for part in parts])
     low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
-    far = NEAREST_M + FARTHER * float(np.linalg.norm(high - low))
-    return view((low + high) / 2, min(far, 1.2), AZIMUTH_DEG, ELEVATION_DEG)
+    far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
+    return view((low + high) / 2, min(far, 1.2), _AZIMUTH_DEG, _ELEVATION_DEG)
 
 
 def _jpeg(image: Any) -> bytes:
     import imageio.v3 as imageio
 
     file = io.BytesIO()
-    imageio.imwrite(file, image, extension=".jpg", quality=QUALITY)
+    imageio.imwrite(file, image, extension=".jpg", quality=_QUALITY)
     return file.getvalue()

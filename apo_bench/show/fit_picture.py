@@ -12,8 +12,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.fitted import Measured
 from apo_bench.observation.models.residuals import Residuals
 
-SEEN, FITTED = "#9fb8d1", "#a6341b"
-BINS, SHOWN = 40, 0.995
+_SEEN, _FITTED = "#9fb8d1", "#a6341b"
+_BINS, _SHOWN = 40, 0.995
 """Bins of a histogram, and up to which quantile it is drawn."""
 
 
@@ -46,11 +46,11 @@ def draw_fit(residuals: Residuals, measured: Measured, path: Path) -> None:
 
 
 def _histogram(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
-    top = min(limit, max(float(np.quantile(sizes, SHOWN)) * 1.05, 1e-3 * limit))
-    edges = np.linspace(0.0, top, BINS + 1)
-    axis.hist(sizes, edges, weights=np.full(len(sizes), BINS / (top * len(sizes))), color=SEEN, label="seen")
+    top = min(limit, max(float(np.quantile(sizes, _SHOWN)) * 1.05, 1e-3 * limit))
+    edges = np.linspace(0.0, top, _BINS + 1)
+    axis.hist(sizes, edges, weights=np.full(len(sizes), _BINS / (top * len(sizes))), color=_SEEN, label="seen")
     fine = np.linspace(0.0, top, 401)
-    axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=FITTED, label="fitted")
+    axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=_FITTED, label="fitted")
     axis.set_xlim(0.0, top)
     axis.spines[["top", "right"]].set_visible(False)
 
@@ -60,7 +60,7 @@ def _quantiles(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: fl
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
     chance = np.maximum.accumulate(cdf(grid))
     rank = (np.arange(len(sizes)) + 0.5) / len(sizes)
-    axis.plot([0.0, limit], [0.0, limit], color=FITTED, linewidth=1.0)
+    axis.plot([0.0, limit], [0.0, limit], color=_FITTED, linewidth=1.0)
     axis.plot(np.interp(rank, chance, grid), np.sort(sizes), ".", color="#33557a", markersize=3)
     axis.set_xlim(0.0, limit)
     axis.set_ylim(0.0, limit)

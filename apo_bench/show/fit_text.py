@@ -13,15 +13,15 @@ from apo_bench.observation.models.fitted import Measured
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.tails import Split
 
-SCHEMA = "apo-bench/noise-fit/1"
+_SCHEMA = "apo-bench/noise-fit/1"
 
 
 def fit_form(residuals: Residuals, measured: Measured, figures: Sequence[Figures]) -> dict[str, Any]:
     """Everything that was counted and fitted: mm and degrees; degrees of freedom are null for a Gaussian."""
     inlier = residuals.inlier
-    mean, error = bias(residuals)
+    mean, error = _bias(residuals)
     return {
-        "schema": SCHEMA,
+        "schema": _SCHEMA,
         "source": measured.source,
         "parts": len(residuals.where),
         "images": len(np.unique(residuals.where[:, :2], axis=0)),
@@ -35,12 +35,12 @@ def fit_form(residuals: Residuals, measured: Measured, figures: Sequence[Figures
         "turned": int(inlier.sum() - residuals.upright.sum()),
         "bias_mm": mean.tolist(),
         "bias_standard_error_mm": error.tolist(),
-        "along_over_across": ratio(residuals),
+        "along_over_across": _ratio(residuals),
         "percentiles": list(PERCENTILES),
-        "inlier_across_mm": percentiles(residuals.across_mm[inlier]),
-        "inlier_along_mm": percentiles(residuals.along_mm[inlier]),
-        "inlier_turn_deg": percentiles(residuals.angle_deg[inlier]),
-        "inlier_turn_by_trace_deg": percentiles(residuals.trace_deg[inlier]),
+        "inlier_across_mm": _percentiles(residuals.across_mm[inlier]),
+        "inlier_along_mm": _percentiles(residuals.along_mm[inlier]),
+        "inlier_turn_deg": _percentiles(residuals.angle_deg[inlier]),
+        "inlier_turn_by_trace_deg": _percentiles(residuals.trace_deg[inlier]),
         "fit": {
             f.name: {
                 "unit": f.unit,
@@ -58,9 +58,9 @@ def fit_form(residuals: Residuals, measured: Measured, figures: Sequence[Figures
 def fit_lines(residuals: Residuals, measured: Measured, figures: Sequence[Figures]) -> list[str]:
     """The same in words."""
     n, found, inlier = len(residuals.where), int(residuals.found.sum()), int(residuals.inlier.sum())
-    turned, (mean, error) = inlier - int(residuals.upright.sum()), bias(residuals)
-    turns = percentiles(residuals.angle_deg[residuals.inlier])[:2]
-    by_trace = percentiles(residuals.trace_deg[residuals.inlier])[:2]
+    turned, (mean, error) = inlier - int(residuals.upright.sum()), _bias(residuals)
+    turns = _percentiles(residuals.angle_deg[residuals.inlier])[:2]
+    by_trace = _percentiles(residuals.trace_deg[residuals.inlier])[:2]
     images = len(np.unique(residuals.where[:, :2], axis=0))
     facts = [
         ("source", measured.source),
@@ -83,7 +83,7 @@ def fit_lines(residuals: Residuals, measured: Measured, figures: Sequence[Figure
             ", ".join(f"{a} {m:.2f} ± {e:.2f}" for a, m, e in zip(("x", "y", "along"), mean, error, strict=True))
             + " mm, counted into the size of errors",
         ),
-        ("along:across", f"{ratio(residuals):.2f}, medians of inliers"),
+        ("along:across", f"{_ratio(residuals):.2f}, medians of inliers"),
         (
             "angle",
             f"p25 {turns[0]:.2f}, p50 {turns[1]:.2f} deg of all inliers; "
@@ -105,19 +105,19 @@ def fit_lines(residuals: Residuals, measured: Measured, figures: Sequence[Figure
     return lines
 
 
-def bias(residuals: Residuals) -> tuple[Array, Array]:
+def _bias(residuals: Residuals) -> tuple[Array, Array]:
     """Mean and its standard error of the shifts of inliers, (3,) each, mm in the frame of the ray."""
     shift = residuals.shift_mm[residuals.inlier]
     return shift.mean(axis=0), shift.std(axis=0) / np.sqrt(len(shift))
 
 
-def ratio(residuals: Residuals) -> float:
+def _ratio(residuals: Residuals) -> float:
     """Median error along the ray over that across, of inliers."""
     across = float(np.median(residuals.across_mm[residuals.inlier]))
     return float(np.median(residuals.along_mm[residuals.inlier])) / max(across, 1e-9)
 
 
-def percentiles(values: Array) -> list[float]:
+def _percentiles(values: Array) -> list[float]:
     return [float(x) for x in np.percentile(values, PERCENTILES)]
 
 

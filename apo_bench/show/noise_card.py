@@ -21,11 +21,11 @@ from apo_bench.observation.observing import observe
 from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"
-DRAWS = 1000
+_DRAWS = 1000
 """Observations of that scenario, three operations each, behind a histogram."""
 COLUMNS = ("across the ray", "along the ray", "tilt", "about the ray")
 UNITS = ("mm", "mm", "deg", "deg")
-BINS, WIDTH = 17, 14
+_BINS, _WIDTH = 17, 14
 """Bins of a histogram in text, the outermost with all that is beyond, and the length of its longest bar."""
 
 
@@ -63,7 +63,7 @@ def _model(given: Any) -> Any:
     return measured or resolve(given, NOISES, "noise model")
 
 
-def draw(given: Any, level: Level, draws: int = DRAWS) -> Drawn:
+def draw(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     """Errors of many observations of the nominal example 5.1; operations that were not seen have none."""
     noise, shown, camera, rng = make_noise(given, level), demonstrated(), Camera(), np.random.default_rng(0)
     errors, variances, missed = [], [], 0
@@ -96,7 +96,7 @@ def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
     drawn = drawn or draw(given, level)
     if not len(drawn.errors):
         return f"{described(given)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
-    bars = "\n".join(f"    {line}".rstrip() for line in histogram(drawn))
+    bars = "\n".join(f"    {line}".rstrip() for line in _histogram(drawn))
     return f"{described(given)}\n{measured(given, drawn, level)}:\n\n{bars}\n"
 
 
@@ -129,28 +129,28 @@ def measured(given: Any, drawn: Drawn, level: Level) -> str:
     return f"Errors {where}, {n}{missed}"
 
 
-def histogram(drawn: Drawn) -> list[str]:
+def _histogram(drawn: Drawn) -> list[str]:
     """Bars over bins of half a stated standard deviation, and below them the deviations found and stated."""
     unit = drawn.errors / np.where(drawn.stated > 0.0, drawn.stated, 1.0)
-    edges = 0.5 * (np.arange(BINS - 1) - (BINS - 2) / 2)
-    counts = np.array([np.bincount(np.digitize(column, edges), minlength=BINS) for column in unit.T])
+    edges = 0.5 * (np.arange(_BINS - 1) - (_BINS - 2) / 2)
+    counts = np.array([np.bincount(np.digitize(column, edges), minlength=_BINS) for column in unit.T])
     longest = max(1, int(counts.max()))
-    lines = ["stated".rjust(12) + "".join(f"  {name:{WIDTH}}" for name in COLUMNS)]
-    for i in range(BINS):
-        low, high = (edges[i - 1] if i else None), (edges[i] if i < BINS - 1 else None)
+    lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name in COLUMNS)]
+    for i in range(_BINS):
+        low, high = (edges[i - 1] if i else None), (edges[i] if i < _BINS - 1 else None)
         if low is None:
             where = f"< {high:.2f}"
         elif high is None:
             where = f"> {low:.2f}"
         else:
             where = f"{(low + high) / 2:.1f}"
-        bars = ("#" * int(np.ceil(WIDTH * count / longest)) for count in counts[:, i])
-        lines.append(where.rjust(12) + "".join(f"  {bar:{WIDTH}}" for bar in bars))
+        bars = ("#" * int(np.ceil(_WIDTH * count / longest)) for count in counts[:, i])
+        lines.append(where.rjust(12) + "".join(f"  {bar:{_WIDTH}}" for bar in bars))
     for word, values in (
         ("deviation", np.sqrt(np.mean(drawn.errors**2, axis=0)) if len(drawn.errors) else np.zeros(4)),
         ("stated", drawn.stated),
     ):
         lines.append(
-            word.rjust(12) + "".join(f"  {f'{v:.3g} {u}':{WIDTH}}" for v, u in zip(values, UNITS, strict=True))
+            word.rjust(12) + "".join(f"  {f'{v:.3g} {u}':{_WIDTH}}" for v, u in zip(values, UNITS, strict=True))
         )
     return lines

@@ -10,10 +10,10 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.show.noise_card import COLUMNS, UNITS, Drawn
 
-SIZE_INCH, BINS = (9.0, 2.3), 49
-REACH = 6.0
+_SIZE_INCH, _BINS = (9.0, 2.3), 49
+_REACH = 6.0
 """Half width of a panel in stated standard deviations; what is beyond is counted in the outermost bins."""
-COLOR = "#4477aa"
+_COLOR = "#4477aa"
 
 
 def draw_histogram(drawn: Drawn, path: Path) -> None:
@@ -21,7 +21,7 @@ def draw_histogram(drawn: Drawn, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SIZE_INCH, layout="constrained")
+    figure = Figure(figsize=_SIZE_INCH, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, len(COLUMNS))
     for i, (axis, name, unit) in enumerate(zip(axes, COLUMNS, UNITS, strict=True)):
@@ -33,9 +33,9 @@ def draw_histogram(drawn: Drawn, path: Path) -> None:
 
 def _panel(axis: Any, errors: Array, stated: float) -> None:
     sigma = stated or 1.0
-    edges = np.linspace(-REACH * sigma, REACH * sigma, BINS + 1)
+    edges = np.linspace(-_REACH * sigma, _REACH * sigma, _BINS + 1)
     inside = np.clip(errors, edges[0], edges[-1])
-    axis.hist(inside, edges, density=True, color=COLOR, alpha=0.75)
+    axis.hist(inside, edges, density=True, color=_COLOR, alpha=0.75)
     x = np.linspace(edges[0], edges[-1], 241)
     normal = np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
     axis.plot(x, normal, color="black", linewidth=1.0)

@@ -20,13 +20,13 @@ from apo_bench.scenario.nominal import waiting
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.plan_lines import Line
 
-MACROS = "apo-bench/macros/1"
-HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
+_MACROS = "apo-bench/macros/1"
+_HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
 
 
 def plan_text(lines: Sequence[Line]) -> list[str]:
     """A table of text, then what is wrong with single operations."""
-    table = [HEADS, *(_cells(line) for line in lines)]
+    table = [_HEADS, *(_cells(line) for line in lines)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     rows = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
     wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.trouble}" for line in lines if line.trouble]
@@ -70,7 +70,7 @@ def plan_form(lines: Sequence[Line], scenario: Scenario, notes: Sequence[str] = 
                 "grasp": {"at_mm": (1e3 * line.grasp.point).tolist(), "across": line.grasp.across.tolist()},
             }
         )
-    return {"schema": MACROS, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
+    return {"schema": _MACROS, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
 
 
 def direction(v: Array) -> str:

@@ -10,7 +10,7 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.recognition.contacts import Evidence, Recognised
 from apo_bench.trial.recognised import counted
 
-SCHEMA = "apo-bench/recognised/1"
+_SCHEMA = "apo-bench/recognised/1"
 
 
 def evidence_table(found: Recognised, right: Assembly) -> Any:
@@ -56,7 +56,7 @@ def recognition_form(name: str, kind: str, seen: Observation, found: Recognised,
     """Everything, in mm and degrees; operations from 1."""
     there = {(relation.made, relation.contact) for relation in seen.assembly.relations()}
     return {
-        "schema": SCHEMA,
+        "schema": _SCHEMA,
         "scenario": name,
         "relations": kind,
         "deviation_assumed": assumed,

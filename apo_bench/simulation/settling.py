@@ -30,15 +30,15 @@ LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned by `python benchmarks/tune.py`."""
 CLEARANCE_M = 0.25e-3
 """Play per side of fit faces where none is stated, since parts without any cannot be put together."""
-DENSITY, FRICTION = 600.0, 0.8
+_DENSITY, _FRICTION = 600.0, 0.8
 """[kg/m^3] and coefficient of sliding, of wood, as in the part files."""
-SOFT_S, LONGEST_S, REST_S = 0.3, 1.5, 0.05
+SOFT_S, _LONGEST_S, _REST_S = 0.3, 1.5, 0.05
 """How long parts move as in syrup; when an operation ends at the latest; how long rest must last."""
-SYRUP = 200.0
+_SYRUP = 200.0
 """Damping while parts move as in syrup, [1/s]: a part falls at 5 cm/s."""
-SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
+_SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
 """Speed below which a part rests, [m/s, rad/s]."""
-SLOW.flags.writeable = False
+_SLOW.flags.writeable = False
 
 
 def settle(seen: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
@@ -78,11 +78,11 @@ def _rest(scene: World, data: mujoco.MjData) -> None:
     dof = np.array(list(scene.dof.values()))[:, None] + np.arange(6)
     mujoco.mj_forward(model, data)
     inertia = np.array([[model.body_mass[b]] * 3 + [*model.body_inertia[b]] for b in map(scene.body.get, scene.free)])
-    while data.time - began < LONGEST_S and quiet < REST_S and not unstable(data):
+    while data.time - began < _LONGEST_S and quiet < _REST_S and not unstable(data):
         soft = data.time - began < SOFT_S
-        model.dof_damping[dof] = SYRUP * inertia if soft else 0.0
+        model.dof_damping[dof] = _SYRUP * inertia if soft else 0.0
         mujoco.mj_step(model, data)
-        still = not soft and bool((np.abs(data.qvel[dof]) < SLOW).all())
+        still = not soft and bool((np.abs(data.qvel[dof]) < _SLOW).all())
         quiet = quiet + model.opt.timestep if still else 0.0
 
 
@@ -102,8 +102,8 @@ def _xml(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float,
     option = {"timestep": s.timestep_s, "impratio": s.impratio, "tolerance": s.tolerance, "iterations": s.iterations}
     kinds = {"integrator": "implicitfast", "cone": "elliptic", "solver": "Newton"}
     ElementTree.SubElement(root, "option", {key: str(value) for key, value in option.items()} | kinds)
-    geom = {"solref": s.solref, "solimp": s.solimp, "friction": (FRICTION, 0.005, 0.0001)}
-    plain = {"type": "box", "density": str(DENSITY), "condim": str(s.condim)}
+    geom = {"solref": s.solref, "solimp": s.solimp, "friction": (_FRICTION, 0.005, 0.0001)}
+    plain = {"type": "box", "density": str(_DENSITY), "condim": str(s.condim)}
     default = ElementTree.SubElement(root, "default")
     ElementTree.SubElement(default, "geom", plain | {key: _spelled(value) for key, value in geom.items()})
     room = ElementTree.SubElement(root, "worldbody")

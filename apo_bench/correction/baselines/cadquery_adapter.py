@@ -29,9 +29,9 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.records import outcomes
 
-MM = 1e3
+_MM = 1e3
 """CadQuery counts in mm."""
-PATCH_MM = 1.0
+_PATCH_MM = 1.0
 """Side of the square that stands for a face; only its centre and its normal count."""
 
 
@@ -92,7 +92,7 @@ def _solved(cq: Any, seen: Observation, poses: Poses, standing: list[Relation], 
     mated = {end.part: None for relation in standing for end in relation.contact}
     assembly = cq.Assembly(name="assembly")
     for part in mated:
-        boxes = [_box(cq, box.center * MM, box.half * MM) for box in seen.assembly.solids[part].boxes]
+        boxes = [_box(cq, box.center * _MM, box.half * _MM) for box in seen.assembly.solids[part].boxes]
         assembly.add(cq.Compound.makeCompound(boxes), name=part, loc=_location(cq, poses[part]))
         if part not in moved:
             assembly.constrain(part, "Fixed")
@@ -113,19 +113,19 @@ def _box(cq: Any, center: Array, half: Array) -> Any:
 def _patch(cq: Any, seen: Observation, of: PartFace) -> Any:
     """A square at the middle of the corners of a face, looking the same way, in the frame of the part."""
     face = seen.assembly.face(of)
-    center, n = face.outline.mean(axis=0) * MM, face.normal
-    return cq.Face.makePlane(PATCH_MM, PATCH_MM, cq.Vector(*center), cq.Vector(*n))
+    center, n = face.outline.mean(axis=0) * _MM, face.normal
+    return cq.Face.makePlane(_PATCH_MM, _PATCH_MM, cq.Vector(*center), cq.Vector(*n))
 
 
 def _location(cq: Any, T: Array) -> Any:
-    return cq.Location(cq.Plane(tuple(T[:3, 3] * MM), tuple(T[:3, 0]), tuple(T[:3, 2])))
+    return cq.Location(cq.Plane(tuple(T[:3, 3] * _MM), tuple(T[:3, 0]), tuple(T[:3, 2])))
 
 
 def _pose(location: Any) -> Array:
     """Row by row, since angles and names of turns would lose digits; the rotation made orthogonal again."""
     moved, T = location.wrapped.Transformation(), np.eye(4)
     T[:3] = [[moved.Value(i, j) for j in range(1, 5)] for i in range(1, 4)]
-    T[:3, 3] /= MM
+    T[:3, 3] /= _MM
     U, _, Vt = np.linalg.svd(T[:3, :3])
     T[:3, :3] = U @ Vt
     return T

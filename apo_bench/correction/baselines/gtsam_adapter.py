@@ -26,10 +26,10 @@ from apo_bench.geometry.arrays import Array
 
 CONTACT_M = 1e-6
 """Stated standard deviation of a contact, as tuned for `least-squares`, which has the same cost."""
-TOLERANCE, TURNS = 1e-12, 100
-TURN_FIRST = np.array([3, 4, 5, 0, 1, 2])
+_TOLERANCE, TURNS = 1e-12, 100
+_TURN_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """(x, y, z, rx, ry, rz) -> GTSAM's order; its own inverse."""
-TURN_FIRST.flags.writeable = False
+_TURN_FIRST.flags.writeable = False
 
 
 def gtsam(seen: Observation, *, contact_m: float = CONTACT_M) -> Correction:
@@ -69,7 +69,7 @@ def _solved(gtsam: Any, seen: Observation, contact_m: float) -> Array:
     system, n = equations(seen.assembly, seen.start, seen.goals), len(seen.goals)
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     for k, (T, covariance) in enumerate(zip(seen.goals, seen.covariance, strict=True)):
-        noise = gtsam.noiseModel.Gaussian.Covariance(np.asfortranarray(covariance[np.ix_(TURN_FIRST, TURN_FIRST)]))
+        noise = gtsam.noiseModel.Gaussian.Covariance(np.asfortranarray(covariance[np.ix_(_TURN_FIRST, _TURN_FIRST)]))
         graph.add(gtsam.PriorFactorPose3(k, gtsam.Pose3(T), noise))
         values.insert(k, gtsam.Pose3(T))
     for c in range(len(system.letters)):
@@ -80,8 +80,8 @@ def _solved(gtsam: Any, seen: Observation, contact_m: float) -> Array:
             graph.add(gtsam.CustomFactor(noise, keys, _error(one, seen.goals)))
     settings = gtsam.LevenbergMarquardtParams()
     settings.setLinearSolverType("MULTIFRONTAL_QR")
-    settings.setRelativeErrorTol(TOLERANCE)
-    settings.setAbsoluteErrorTol(TOLERANCE)
+    settings.setRelativeErrorTol(_TOLERANCE)
+    settings.setAbsoluteErrorTol(_TOLERANCE)
     settings.setMaxIterations(TURNS)
     found = gtsam.LevenbergMarquardtOptimizer(graph, values, settings).optimize()
     return np.array([found.atPose3(k).matrix() for k in range(n)])
@@ -98,7 +98,7 @@ def _error(one: Equations, goals: Array) -> Callable[[Any, Any, Any], Array]:
             return one.residual(now)
         e, J = one.linearised(now)
         for i, k in enumerate(keys):
-            jacobians[i] = np.asfortranarray(J[:, 6 * k + TURN_FIRST])
+            jacobians[i] = np.asfortranarray(J[:, 6 * k + _TURN_FIRST])
         return e
 
     return error

@@ -19,7 +19,7 @@ from apo_bench.geometry.arrays import Array
 
 CONTACT_M = 1e-6
 """Stated standard deviation of a contact, tuned by `python benchmarks/tune.py`."""
-TOLERANCE = 1e-12
+_TOLERANCE = 1e-12
 EVALUATIONS = 300
 
 
@@ -51,6 +51,6 @@ def _solved(seen: Observation, contact_m: float) -> Array:
         _, J = system.linearised(space.goals(z))
         return np.concatenate([space.pulled(z, J) / contact_m, prior])
 
-    settings = {"xtol": TOLERANCE, "ftol": TOLERANCE, "gtol": TOLERANCE, "max_nfev": EVALUATIONS}
+    settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}
     found = minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings)
     return space.goals(found.x)

@@ -30,7 +30,7 @@ CONTACT_M = 1e-4
 STEPS = 600
 LENGTH = 0.2
 """Step of Adam at the beginning, in standard deviations, tuned likewise."""
-MEAN, SQUARE, TINY = 0.9, 0.999, 1e-8
+_MEAN, _SQUARE, _TINY = 0.9, 0.999, 1e-8
 """Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
 
 
@@ -83,7 +83,7 @@ def _descended(seen: Observation, contact_m: float, length: float) -> Array:
     m, v = np.zeros_like(z), np.zeros_like(z)
     for t in range(1, STEPS + 1):
         _, g = down(z)
-        m, v = MEAN * m + (1 - MEAN) * g, SQUARE * v + (1 - SQUARE) * g**2
+        m, v = _MEAN * m + (1 - _MEAN) * g, _SQUARE * v + (1 - _SQUARE) * g**2
         step = length * np.cos(0.5 * np.pi * t / STEPS)
-        z = z - step * (m / (1 - MEAN**t)) / (np.sqrt(v / (1 - SQUARE**t)) + TINY)
+        z = z - step * (m / (1 - _MEAN**t)) / (np.sqrt(v / (1 - _SQUARE**t)) + _TINY)
     return down.space.goals(z)

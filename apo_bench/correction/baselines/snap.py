@@ -16,7 +16,7 @@ from apo_bench.correction.solvers.newton import CUT_OFF, REST_M
 from apo_bench.correction.solvers.whitened import Whitened, whitened
 from apo_bench.geometry.arrays import Array
 
-TURNS = 30
+_TURNS = 30
 
 
 def snap(seen: Observation) -> Correction:
@@ -48,7 +48,7 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
     """
     one = Whitened(space.seen[k : k + 1], space.factor[k : k + 1])
     now, z = np.array(goals), np.zeros(6)
-    for _ in range(TURNS):
+    for _ in range(_TURNS):
         e, J = own.linearised(now)
         if not e.size:
             break

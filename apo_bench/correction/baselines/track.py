@@ -22,7 +22,7 @@ from apo_bench.correction.ending import refused, sentence, status
 from apo_bench.correction.solvers.newton import Solution, solve
 from apo_bench.geometry.arrays import Array
 
-Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
+_Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
 """Candidates, most recent first -> the sets of motion parameters to try, in order."""
 
 
@@ -55,7 +55,7 @@ class Followed:
     trace: tuple[Iterate, ...] = ()
 
 
-def follow(seen: Observation, sets: Sets) -> Correction:
+def follow(seen: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
     if not seen.seen.all():
         return refused(seen)
@@ -78,7 +78,7 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
     return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
 
 
-def _next(seen: Observation, goals: Array, sets: Sets) -> Followed:
+def _next(seen: Observation, goals: Array, sets: _Sets) -> Followed:
     """The last of these goals has just been observed; the others are in force."""
     n = len(goals) - 1
     system = equations(seen.assembly.first(n + 1), seen.start, goals)

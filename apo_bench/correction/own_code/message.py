@@ -19,15 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 HEAD = struct.Struct("!II")
-TYPES = ("float64", "bool")
-LARGEST_JSON, LARGEST_NUMBERS = 1 << 24, 1 << 26
+_TYPES = ("float64", "bool")
+_LARGEST_JSON, _LARGEST_NUMBERS = 1 << 24, 1 << 26
 """Bytes; beyond, nothing is read."""
-CHUNK = 1 << 20
+_CHUNK = 1 << 20
 
 Form = dict[str, Any]
 Arrays = Mapping[str, NDArray]
 Message = tuple[Form, Arrays]
-Wait = Callable[[], None]
+_Wait = Callable[[], None]
 """Returns when there is something to read; raises if there never will be."""
 
 
@@ -54,7 +54,7 @@ def send(to: socket.socket, form: Form, arrays: Arrays, deadline: float = math.i
         left = left[to.send(left) :]
 
 
-def receive(of: socket.socket, wait: Wait = lambda: None) -> Message:
+def receive(of: socket.socket, wait: _Wait = lambda: None) -> Message:
     """Read one message.
 
     Args:
@@ -66,7 +66,7 @@ def receive(of: socket.socket, wait: Wait = lambda: None) -> Message:
     """
     of.settimeout(None)
     size, length = HEAD.unpack(_read(of, HEAD.size, wait))
-    if size > LARGEST_JSON or length > LARGEST_NUMBERS:
+    if size > _LARGEST_JSON or length > _LARGEST_NUMBERS:
         raise Garbled("the message is too large")
     text, numbers = _read(of, size, wait), _read(of, length, wait)
     try:
@@ -79,10 +79,10 @@ def receive(of: socket.socket, wait: Wait = lambda: None) -> Message:
 def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
     found, at = {}, 0
     for name, (kind, shape) in stated.items():
-        if kind not in TYPES or not all(type(size) is int and size >= 0 for size in shape):
+        if kind not in _TYPES or not all(type(size) is int and size >= 0 for size in shape):
             raise Garbled("an array of another type")
         count = math.prod(shape)
-        if count > LARGEST_NUMBERS:
+        if count > _LARGEST_NUMBERS:
             raise Garbled("an array that is too large")
         found[name] = np.frombuffer(numbers, np.dtype(kind), count, at).reshape(shape)
         at += found[name].nbytes
@@ -91,11 +91,11 @@ def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
     return found
 
 
-def _read(of: socket.socket, size: int, wait: Wait) -> bytes:
+def _read(of: socket.socket, size: int, wait: _Wait) -> bytes:
     read = bytearray()
     while len(read) < size:
         wait()
-        piece = of.recv(min(size - len(read), CHUNK))
+        piece = of.recv(min(size - len(read), _CHUNK))
         if not piece:
             raise EOFError("the other side is gone")
         read += piece

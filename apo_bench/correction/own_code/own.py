@@ -20,8 +20,8 @@ from apo_bench.records.method import is_own
 
 LEAST_STARTING_S = 30.0
 """What importing a module may take at least: a new interpreter, and libraries that are large."""
-LONGEST_S = 1e6
-LONGEST_SENTENCE = 2000
+_LONGEST_S = 1e6
+_LONGEST_SENTENCE = 2000
 
 
 @final
@@ -45,14 +45,14 @@ class OwnCorrectors:
         limit_s: Wall time that a correction may take; importing its module may take the same, or 30 s if that is
                 more.
         """
-        if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_S):
+        if not (math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_S):
             raise InputError(
-                f"a limit of {limit_s:g} s per correction was given; a number above 0 and up to {LONGEST_S:g} is "
+                f"a limit of {limit_s:g} s per correction was given; a number above 0 and up to {_LONGEST_S:g} is "
                 "allowed."
             )
         self._limit_s = limit_s
         self._servers: dict[str, Server] = {}
-        self._found: dict[str, OwnCorrector] = {}
+        self._found: dict[str, _OwnCorrector] = {}
         self.files: set[str] = set()
         """Of the modules that were imported, as they say themselves."""
 
@@ -68,7 +68,7 @@ class OwnCorrectors:
             module = method.partition(":")[0]
             if module not in self._servers:
                 self._servers[module] = Server(module, max(self._limit_s, LEAST_STARTING_S))
-            found = OwnCorrector(method, self._servers[module], self._limit_s)
+            found = _OwnCorrector(method, self._servers[module], self._limit_s)
             self.files.update(found.check())
             self._found[method] = found
         return self._found[method]
@@ -111,7 +111,7 @@ def check_correctors(methods: Iterable[str], limit_s: float = CORRECTOR_LIMIT_S)
 
 
 @final
-class OwnCorrector:
+class _OwnCorrector:
     """Stands for a function in another process: `Observation -> Correction`."""
 
     def __init__(self, name: str, server: Server, limit_s: float) -> None:
@@ -170,4 +170,4 @@ def _how(error: BaseException) -> str:
 
 def _line(said: Any) -> str:
     """One line that can be printed, whatever came."""
-    return "".join(c if c.isprintable() else " " for c in str(said)[:LONGEST_SENTENCE])
+    return "".join(c if c.isprintable() else " " for c in str(said)[:_LONGEST_SENTENCE])

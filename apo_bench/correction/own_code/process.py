@@ -18,9 +18,9 @@ from apo_bench.correction.own_code.server import NOTICE
 from apo_bench.errors import InputError
 from apo_bench.io.processes import descendants, end_descendants
 
-NOTICE_S = 2.0
+_NOTICE_S = 2.0
 """How long a fork may be gone before that is said."""
-START = (
+_START = (
     "import sys; fd, module, fork, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
     "from apo_bench.correction.own_code.server import main; main(int(fd), module, fork == 'True')"
 )
@@ -105,7 +105,7 @@ class Server:
         where = None if _is_open(2) else subprocess.DEVNULL
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", START, str(theirs.fileno()), self._module, str(can_fork()), *sys.path],
+                [sys.executable, "-P", "-c", _START, str(theirs.fileno()), self._module, str(can_fork()), *sys.path],
                 stdin=subprocess.DEVNULL,
                 stdout=2 if where is None else where,
                 stderr=where,
@@ -146,7 +146,7 @@ class Server:
 
     def _exit_code(self) -> int | None:
         """Of the fork that is gone; None if the process of the module is gone too, or does not say."""
-        deadline, control = time.monotonic() + NOTICE_S, self._control
+        deadline, control = time.monotonic() + _NOTICE_S, self._control
         assert control is not None
         try:
             while self._code is None and connection.wait([control], max(0.0, deadline - time.monotonic())):

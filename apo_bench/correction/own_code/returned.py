@@ -17,7 +17,7 @@ from apo_bench.geometry.rigid import FARTHEST_M, rigid
 from apo_bench.io.plain_text import UNSHOWN
 
 RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
-SAME = 1e-9
+_SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
 
 
@@ -122,7 +122,7 @@ def _check_schedule(found: Correction, name: str) -> None:
     check_near(found.targets, name, "a target for step")
     ends = {step.operation: i for i, step in enumerate(found.schedule) if not step.undo}
     for k, i in ends.items():
-        if np.abs(found.targets[i] - found.goals[k]).max() > SAME:
+        if np.abs(found.targets[i] - found.goals[k]).max() > _SAME:
             raise InputError(
                 f"the corrector '{name}' returned a last target for operation {k + 1} that is not its goal; "
                 "return goals that are the targets in force at the end."

@@ -26,16 +26,16 @@ from apo_bench.io.processes import end_descendants, flush
 
 NOTICE = struct.Struct("!Ii")
 """To the process that asks: how many requests there were, and the exit code of the one that ended; first 0, 0."""
-TURN_S = 0.02
-DEATH_SIGNAL, SUBREAPER = 1, 36
+_TURN_S = 0.02
+_DEATH_SIGNAL, _SUBREAPER = 1, 36
 """Of `prctl`, on Linux."""
-LARGEST_FILE = 1 << 30
+_LARGEST_FILE = 1 << 30
 """Bytes; also of a file that standard error goes to, so that endless output does not fill the disk."""
-LIKELIEST = "1000"
+_LIKELIEST = "1000"
 """Where memory runs out, this goes first."""
-USUAL = "scipy.special"
+_USUAL = "scipy.special"
 """What the solvers of the package import when they are first used: better once than in every fork."""
-IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
+_IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
 """For the process that asks, which ends this one."""
 
 
@@ -47,27 +47,27 @@ def main(control: int, module: str, fork: bool) -> None:
         module: To be imported first; what that raises is said in answer to requests.
         fork: Whether every request has a fork; else it does one request.
     """
-    for name in IGNORED:
+    for name in _IGNORED:
         signal.signal(getattr(signal, name), signal.SIG_IGN)
-    _prctl(SUBREAPER, 1)
+    _prctl(_SUBREAPER, 1)
     with suppress(OSError), open("/proc/self/oom_score_adj", "w") as file:
-        file.write(LIKELIEST)
-    for what, most in ((resource.RLIMIT_FSIZE, LARGEST_FILE), (resource.RLIMIT_CORE, 0)):
+        file.write(_LIKELIEST)
+    for what, most in ((resource.RLIMIT_FSIZE, _LARGEST_FILE), (resource.RLIMIT_CORE, 0)):
         with suppress(OSError, ValueError):
             resource.setrlimit(what, (most, most))
-    import_module(USUAL)
-    _prctl(DEATH_SIGNAL, signal.SIGKILL)
+    import_module(_USUAL)
+    _prctl(_DEATH_SIGNAL, signal.SIGKILL)
     with suppress(BaseException):
         import_module(module)
     flush()
-    _prctl(DEATH_SIGNAL, 0)
+    _prctl(_DEATH_SIGNAL, 0)
     with socket.socket(fileno=control) as asking:
         _serve(asking, fork)
     end_descendants(os.getpid())
     os.killpg(0, signal.SIGKILL)
 
 
-def answer(request: socket.socket) -> None:
+def _answer(request: socket.socket) -> None:
     """Read one request, do it, say what came of it."""
     form, arrays = receive(request)
     own = os.getpid()
@@ -83,7 +83,7 @@ def _serve(asking: socket.socket, fork: bool) -> None:
     with suppress(OSError):
         asking.send(NOTICE.pack(0, 0))
         while True:
-            ready, _, _ = select.select([asking], [], [], TURN_S if child else None)
+            ready, _, _ = select.select([asking], [], [], _TURN_S if child else None)
             for pid, status in _ended():
                 if pid == child:
                     asking.send(NOTICE.pack(number, os.waitstatus_to_exitcode(status)))
@@ -97,7 +97,7 @@ def _serve(asking: socket.socket, fork: bool) -> None:
             child = os.fork() if fork else 0
             if child == 0:
                 if fork:
-                    _prctl(DEATH_SIGNAL, signal.SIGKILL)
+                    _prctl(_DEATH_SIGNAL, signal.SIGKILL)
                     asking.close()
                 _do(given[0])
             os.close(given[0])
@@ -106,7 +106,7 @@ def _serve(asking: socket.socket, fork: bool) -> None:
 def _do(given: int) -> None:
     """Do a request and end."""
     with suppress(BaseException), socket.socket(fileno=given) as request:
-        answer(request)
+        _answer(request)
         os._exit(0)
     os._exit(1)
 

@@ -22,7 +22,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import SERIES
 
-SAFE = ("reassoc", "contract", "nsz")
+_SAFE = ("reassoc", "contract", "nsz")
 """Liberties that the compiler may take: sums in another order, but numbers that are not finite stay what they are."""
 HELPERS = (
     loops.worse,
@@ -40,7 +40,7 @@ HELPERS = (
     loops.hat,
     loops.scattered,
 )
-RULE = (
+_RULE = (
     manifold.TURNS,
     manifold.STEP,
     manifold.SURE,
@@ -75,7 +75,7 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
         _own(L[None] if L.ndim == 3 else np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)),
         np.zeros(0) if soft_m is None else _own(soft_m),
         _own(SERIES),
-        RULE,
+        _RULE,
         out,
         rest,
         finite,
@@ -122,13 +122,13 @@ def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
             "pip install 'apo_bench[fast]', or use the corrector 'contact'."
         ) from error
     for function in HELPERS:
-        register_jitable(fastmath=set(SAFE))(function)
+        register_jitable(fastmath=set(_SAFE))(function)
 
     def compiled(function: Any) -> Any:
         try:
-            return njit(cache=True, fastmath=set(SAFE), error_model="numpy")(function)
+            return njit(cache=True, fastmath=set(_SAFE), error_model="numpy")(function)
         except RuntimeError:  # nowhere to keep it: it is compiled anew in every process
-            return njit(fastmath=set(SAFE), error_model="numpy")(function)
+            return njit(fastmath=set(_SAFE), error_model="numpy")(function)
 
     return compiled(loops.solve), compiled(loops.summarised)
 

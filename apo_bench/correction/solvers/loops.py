@@ -21,30 +21,30 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Words = tuple[Index, Index, Index]
+_Array = NDArray[np.float64]
+_Index = NDArray[np.intp]
+_Words = tuple[_Index, _Index, _Index]
 """Letters, columns and inverse (0 or 1) of `Compact`, each (c, w)."""
-Rule = tuple[int, float, float, float, float, float, float, float]
+_Rule = tuple[int, float, float, float, float, float, float, float]
 """TURNS, STEP, SURE, DAMPING, FALL, FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
-SHORT = 9
+_SHORT = 9
 """Terms of the series of exp that are enough below one radian."""
 
 
 def solve(
-    start: Array,
-    words: Words,
-    plane: Array,
-    points: Array,
-    seen: Array,
-    L: Array,
-    soft_m: Array,
-    series: Array,
-    rule: Rule,
-    out: tuple[Array, Array, Array, Array, Array],
+    start: _Array,
+    words: _Words,
+    plane: _Array,
+    points: _Array,
+    seen: _Array,
+    L: _Array,
+    soft_m: _Array,
+    series: _Array,
+    rule: _Rule,
+    out: tuple[_Array, _Array, _Array, _Array, _Array],
     rest: NDArray[np.bool_],
     finite: NDArray[np.bool_],
-    trace: Array,
+    trace: _Array,
 ) -> int:
     """One observation after the other; returns the turns of the one that took longest.
 
@@ -120,17 +120,17 @@ def solve(
 
 
 def summarised(
-    contact: Index,
-    vertex: Array,
-    plane: Array,
-    letters: Index,
+    contact: _Index,
+    vertex: _Array,
+    plane: _Array,
+    letters: _Index,
     p: int,
     n: int,
     rounding: float,
     smallest: float,
-    columns: Index,
-    planes: Array,
-    points: Array,
+    columns: _Index,
+    planes: _Array,
+    points: _Array,
 ) -> None:
     """What `compact.compact` makes of equations: columns (c, w), planes (c, 4), points (c, 3, 4), zeros before."""
     c, w = letters.shape
@@ -173,7 +173,7 @@ def worse(a: float, b: float) -> float:
     return b if b > a or math.isnan(b) else a
 
 
-def ordered(words: Words, padding: int, n: int) -> tuple[Index, Index, Index, Index, Index]:
+def ordered(words: _Words, padding: int, n: int) -> tuple[_Index, _Index, _Index, _Index, _Index]:
     """What the words say about where numbers stand.
 
     Returns:
@@ -206,7 +206,7 @@ def ordered(words: Words, padding: int, n: int) -> tuple[Index, Index, Index, In
     return width, slot, first, begin, users
 
 
-def both(T: Array, out: Array) -> None:
+def both(T: _Array, out: _Array) -> None:
     """A pose and its inverse, out (2, 4, 4), upper three rows."""
     for i in range(3):
         t = 0.0
@@ -217,16 +217,16 @@ def both(T: Array, out: Array) -> None:
 
 
 def linearise(
-    words: Words,
-    width: Index,
-    slot: Index,
-    factors: Array,
-    plane: Array,
-    points: Array,
-    B: Array,
-    e: Array,
-    blocks: Array,
-    behind: Array,
+    words: _Words,
+    width: _Index,
+    slot: _Index,
+    factors: _Array,
+    plane: _Array,
+    points: _Array,
+    B: _Array,
+    e: _Array,
+    blocks: _Array,
+    behind: _Array,
 ) -> None:
     """e, (3 c,), and its derivative, blocks (c, w, 3, 6), as `Compact.blocks`; `behind`, (w + 1, 3, 4), is scratch."""
     letters, columns, inverse = words
@@ -255,7 +255,7 @@ def linearise(
                 added(blocks[i, slot[i, j]], a0, a1, a2, behind[j + 1], B[k])
 
 
-def added(block: Array, a0: float, a1: float, a2: float, points: Array, B: Array) -> None:
+def added(block: _Array, a0: float, a1: float, a2: float, points: _Array, B: _Array) -> None:
     """block (3, 6) += (a h, p x a) B of the points (p, h), (3, 4)."""
     for r in range(3):
         x, y, z, h = points[r, 0], points[r, 1], points[r, 2], points[r, 3]
@@ -267,7 +267,7 @@ def added(block: Array, a0: float, a1: float, a2: float, points: Array, B: Array
                 block[r, q] += h * (a0 * B[0, q] + a1 * B[1, q] + a2 * B[2, q])
 
 
-def gram(blocks: Array, first: Index, begin: Index, users: Index, A: Array) -> None:
+def gram(blocks: _Array, first: _Index, begin: _Index, users: _Index, A: _Array) -> None:
     """J J^t, its lower triangle inside the envelope."""
     for i in range(len(first)):
         A[3 * i : 3 * i + 3, 3 * first[i] : 3 * i + 3] = 0.0
@@ -282,7 +282,7 @@ def gram(blocks: Array, first: Index, begin: Index, users: Index, A: Array) -> N
                         A[3 * i + r, 3 * j + s] += t + P[r, 3] * Q[s, 3] + P[r, 4] * Q[s, 4] + P[r, 5] * Q[s, 5]
 
 
-def towards(blocks: Array, columns: Index, slot: Index, z: Array, e: Array, y: Array) -> None:
+def towards(blocks: _Array, columns: _Index, slot: _Index, z: _Array, e: _Array, y: _Array) -> None:
     """y = J z - e."""
     for i in range(len(e)):
         y[i] = -e[i]
@@ -294,7 +294,7 @@ def towards(blocks: Array, columns: Index, slot: Index, z: Array, e: Array, y: A
                         y[3 * i + r] += blocks[i, j, r, q] * z[6 * columns[i, j] + q]
 
 
-def factored(A: Array, first: Index, mu: float) -> None:
+def factored(A: _Array, first: _Index, mu: float) -> None:
     """A becomes its Cholesky factor, one over each pivot's root on the diagonal; by blocks of 3 x 3, a .. i by rows."""
     for row in range(len(first)):
         r = 3 * row
@@ -324,7 +324,7 @@ def factored(A: Array, first: Index, mu: float) -> None:
             A[r, s], A[r + 1, s], A[r + 1, s + 1], A[r + 2, s], A[r + 2, s + 1], A[r + 2, s + 2] = a, d, e, g, h, i
 
 
-def substituted(A: Array, first: Index, y: Array) -> None:
+def substituted(A: _Array, first: _Index, y: _Array) -> None:
     """y becomes the solution of the factored equations."""
     for r in range(len(A)):
         t = y[r]
@@ -337,7 +337,7 @@ def substituted(A: Array, first: Index, y: Array) -> None:
             y[q] -= A[r, q] * y[r]
 
 
-def back(blocks: Array, columns: Index, slot: Index, y: Array, z: Array, step: Array) -> None:
+def back(blocks: _Array, columns: _Index, slot: _Index, y: _Array, z: _Array, step: _Array) -> None:
     """step = J^t y - z."""
     for i in range(len(step)):
         step[i] = -z[i]
@@ -349,7 +349,7 @@ def back(blocks: Array, columns: Index, slot: Index, y: Array, z: Array, step: A
                         step[6 * columns[i, j] + q] += blocks[i, j, r, q] * y[3 * i + r]
 
 
-def shortened(L: Array, step: Array, largest_turn: float, smallest: float) -> float:
+def shortened(L: _Array, step: _Array, largest_turn: float, smallest: float) -> float:
     """The share of the step at which no goal turns further than `largest_turn`."""
     largest = 0.0
     for k in range(len(L)):
@@ -363,7 +363,7 @@ def shortened(L: Array, step: Array, largest_turn: float, smallest: float) -> fl
     return min(1.0, largest_turn / max(math.sqrt(largest), smallest))
 
 
-def moved(seen: Array, L: Array, z: Array, series: Array, T: Array, B: Array) -> None:
+def moved(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Array) -> None:
     """T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z."""
     xi = np.zeros(6)
     for i in range(6):
@@ -372,7 +372,7 @@ def moved(seen: Array, L: Array, z: Array, series: Array, T: Array, B: Array) ->
     v, w = xi[:3], xi[3:]
     square, s = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
     f = np.zeros(6)
-    for i in range((SHORT if square < 1.0 else len(series)) - 1, -1, -1):
+    for i in range((_SHORT if square < 1.0 else len(series)) - 1, -1, -1):
         for j in range(6):
             f[j] = f[j] * square + series[i, j]
     W, V = hat(w), hat(v)
@@ -397,7 +397,7 @@ def moved(seen: Array, L: Array, z: Array, series: Array, T: Array, B: Array) ->
             B[i + 3, q] = P[i, 0] * L[3, q] + P[i, 1] * L[4, q] + P[i, 2] * L[5, q]
 
 
-def hat(a: Array) -> Array:
+def hat(a: _Array) -> _Array:
     """hat(a) b = a x b."""
     out = np.zeros((3, 3))
     out[0, 1], out[0, 2], out[1, 2] = -a[2], a[1], -a[0]
@@ -405,7 +405,7 @@ def hat(a: Array) -> Array:
     return out
 
 
-def scattered(blocks: Array, columns: Index, slot: Index, Jt: Array) -> None:
+def scattered(blocks: _Array, columns: _Index, slot: _Index, Jt: _Array) -> None:
     """The transposed Jacobian, (6 n, 3 c)."""
     Jt[:] = 0.0
     for i in range(len(columns)):

@@ -27,7 +27,7 @@ LENGTH_M = 0.04
 """Way of a point per radian, at which a rotation weighs as much as a translation."""
 CUT_OFF = 0.02
 """Singular values below this part of the largest one count as zero (w_l+1 .. w_n of Eq. 15)."""
-TURNS = 30
+_TURNS = 30
 REST_M = 1e-9
 """Scaled step below which the solver has come to rest."""
 
@@ -55,7 +55,7 @@ def solve(
     *,
     cut_off: float = CUT_OFF,
     length_m: float = LENGTH_M,
-    turns: int = TURNS,
+    turns: int = _TURNS,
 ) -> Solution:
     """Change the free goals, as little as the contacts ask for, until the equations hold or nothing moves any more.
 
@@ -82,7 +82,7 @@ def descend(
     *,
     cut_off: float = CUT_OFF,
     length_m: float = LENGTH_M,
-    turns: int = TURNS,
+    turns: int = _TURNS,
     at_most: int | None = None,
 ) -> Solution:
     """One descent: at each turn T <- T dT(dq), q <- 0, with the rank that the cut-off finds, or `at_most` if less."""

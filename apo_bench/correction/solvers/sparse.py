@@ -22,14 +22,14 @@ WIDE = 240
 """Rows of a band above which it is no longer worth it."""
 CROWDED = 2_000_000
 """Pairs of contacts that meet, above which they are not listed."""
-RAISED = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
+_RAISED = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
 """What is added in turn to the diagonal, in parts of its mean, while rounding keeps it from being positive definite."""
 FEW = 100
 """Contacts that one operation may meet, on average, if J J^t is to be formed for the rank."""
-EIGENVALUE = 2e-15
+_EIGENVALUE = 2e-15
 """Eigenvalues of J J^t below this part of the largest one are rounding, at a solution."""
 
-Solver = Callable[[Array, Array, Array], Array]
+_Solver = Callable[[Array, Array, Array], Array]
 """(diagonal to add (3 c,), blocks (i, 6, 3), right side (3 c,)) -> z (6 n,)."""
 
 
@@ -74,7 +74,7 @@ def incidence(system: Compact) -> Incidence:
     return Incidence(contact, letter, system.columns[contact, letter], len(system), system.n)
 
 
-def solver(where: Incidence) -> Solver:
+def solver(where: Incidence) -> _Solver:
     """The way to solve for z that suits the graph; what depends on the graph alone is done once."""
     pairs = _pairs(where)
     if pairs is not None:
@@ -94,7 +94,7 @@ def rank(Jt: Any) -> int:
     if not Jt.nnz:
         return 0
     unknowns, m = Jt.shape
-    lowest = EIGENVALUE * _largest(Jt)
+    lowest = _EIGENVALUE * _largest(Jt)
     meets = abs(Jt).sign().sum(axis=1) / 3.0
     if (meets**2).sum() <= FEW * meets.sum():
         K, sign = (Jt.T @ Jt - lowest * eye_array(m)).tocsc(), 1.0
@@ -139,7 +139,7 @@ def _near(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp]) -
     return place
 
 
-def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp], place: NDArray[np.intp]) -> Solver:
+def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp], place: NDArray[np.intp]) -> _Solver:
     """Cholesky in a band; `first` stands below or on the diagonal of `second`."""
     from scipy.linalg import solveh_banded
 
@@ -160,7 +160,7 @@ def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp],
         ordered = np.empty(m)
         ordered[placed] = right
         size = float(band[0].mean())
-        for more in RAISED:
+        for more in _RAISED:
             band[0] += more * size
             try:
                 y = solveh_banded(band, ordered, lower=True, check_finite=False)
@@ -172,7 +172,7 @@ def _banded(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp],
     return solve
 
 
-def _together(where: Incidence) -> Solver:
+def _together(where: Incidence) -> _Solver:
     from scipy.sparse import block_array, diags_array, eye_array
     from scipy.sparse.linalg import splu
 

@@ -23,18 +23,18 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
 
-BLIND = 1e-7
+_BLIND = 1e-7
 """Part of the largest row below which a wall does not depend on the free directions."""
-EXACT = 1e-10
+_EXACT = 1e-10
 """How far the program may overstep a wall, in standard deviations."""
-TURNS = 200
-SETTLED = 60
+_TURNS = 200
+_SETTLED = 60
 """The turn as which the equations are damped: they hold already."""
-SLOWEST, GROWS = 1.0 / 64.0, 1.05
+_SLOWEST, _GROWS = 1.0 / 64.0, 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
-TOUCH_M = 1e-9
+_TOUCH_M = 1e-9
 """A vertex nearer to its wall touches it."""
-HARD, SOFT = 0, 8
+_HARD, _SOFT = 0, 8
 """What DAQP calls a wall, and one that may be overstepped."""
 
 
@@ -101,10 +101,10 @@ def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest
         )
     known, before, trace, pace = rank(start.Jt), np.inf, list(start.trace), 1.0
     z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
-    for _ in range(TURNS):
+    for _ in range(_TURNS):
         e, blocks = system.blocks(T, B)
         Jt = system.gathered(blocks)
-        shortest = z + project(e[None], Jt[None], z[None], None, SETTLED)[0][0]
+        shortest = z + project(e[None], Jt[None], z[None], None, _SETTLED)[0][0]
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = walls.system.linearised(T)
         J_wall = (J_wall.reshape(len(walls), -1, 1, 6) @ B).reshape(len(walls), -1)
@@ -115,7 +115,7 @@ def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest
         trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))
         over = bool(settles(np.array(length), np.array(before)))
         rest = over and room
-        pace = paced(pace, step, last)
+        pace = _paced(pace, step, last)
         last = step if rest else shortened(step[None], L[None])[0]
         z = z + (step if rest else pace * last)
         D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
@@ -132,12 +132,12 @@ def touching(Jt: Array, walls: Walls, found: Nearest) -> int:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
     """
     e, J = walls.system.linearised(found.goals)
-    at = (e <= walls.low + TOUCH_M) | (e >= walls.high - TOUCH_M)
+    at = (e <= walls.low + _TOUCH_M) | (e >= walls.high - _TOUCH_M)
     J = (J[at].reshape(int(at.sum()), len(found.B), 1, 6) @ found.B).reshape(int(at.sum()), len(found.z))
     return rank(np.concatenate([Jt, J.T], axis=1)) - rank(Jt) if at.any() else 0
 
 
-def paced(pace: float, step: Array, last: Array) -> float:
+def _paced(pace: float, step: Array, last: Array) -> float:
     """The part of a step to make: all of it, but less where walls in turn make steps go to and fro.
 
     If making the part p of the step before left r of it, making p / (1 - r) would have left nothing (secant rule).
@@ -145,8 +145,8 @@ def paced(pace: float, step: Array, last: Array) -> float:
     size = float(last @ last)
     if size == 0.0:
         return 1.0
-    wanted = pace / max(1.0 - float(step @ last) / size, 1.0 / GROWS)
-    return min(max(wanted, SLOWEST), 1.0)
+    wanted = pace / max(1.0 - float(step @ last) / size, 1.0 / _GROWS)
+    return min(max(wanted, _SLOWEST), 1.0)
 
 
 def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, bool]:
@@ -159,14 +159,14 @@ def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, boo
 
     A = J @ free
     size = np.sqrt((A * A).sum(axis=1))
-    seeing = size > BLIND * np.sqrt((J * J).sum(axis=1))
+    seeing = size > _BLIND * np.sqrt((J * J).sum(axis=1))
     A, low, high = A[seeing] / size[seeing, None], low[seeing] / size[seeing], high[seeing] / size[seeing]
     k = A.shape[1]
     if not len(A) or not k:
         return np.zeros(k), True
     problem = np.eye(k), np.zeros(k), np.ascontiguousarray(A), high, low
-    u, _, flag, _ = daqp.solve(*problem, np.full(len(A), HARD, dtype=np.intc), primal_tol=EXACT)
+    u, _, flag, _ = daqp.solve(*problem, np.full(len(A), _HARD, dtype=np.intc), primal_tol=_EXACT)
     if flag > 0:
         return np.asarray(u), True
-    u, _, _, _ = daqp.solve(*problem, np.full(len(A), SOFT, dtype=np.intc), primal_tol=EXACT)
+    u, _, _, _ = daqp.solve(*problem, np.full(len(A), _SOFT, dtype=np.intc), primal_tol=_EXACT)
     return np.asarray(u), False

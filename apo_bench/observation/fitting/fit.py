@@ -13,7 +13,7 @@ from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Measure
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.tails import Split, log_density_across, log_density_along, of_numbers
 
-FEWEST = 30
+_FEWEST = 30
 """Four numbers are not fitted to fewer errors."""
 PERCENTILES = (25, 50, 75, 90, 95)
 
@@ -40,10 +40,10 @@ def fit(residuals: Residuals, source: str) -> Measured:
     """
     found, inlier, upright = residuals.found, residuals.inlier, residuals.upright
     for kept, limit in ((inlier, f"{INLIER_MM:g} mm"), (upright, f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg")):
-        if kept.sum() < FEWEST:
+        if kept.sum() < _FEWEST:
             raise InputError(
-                f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {FEWEST} are needed "
-                "for a fit, so give more images, or the truth of the same ones."
+                f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {_FEWEST} are "
+                "needed for a fit, so give more images, or the truth of the same ones."
             )
     far = residuals.off_mm[found & ~inlier]
     return Measured(

@@ -15,7 +15,7 @@ from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import seen_at
 from apo_bench.observation.models.level import Level
 
-ELEVATION_DEG, AZIMUTH_DEG = 40.0, 25.0
+_ELEVATION_DEG, _AZIMUTH_DEG = 40.0, 25.0
 """Where the camera stands: so high above the table, and so far from the x axis of the world."""
 ALONG, ACROSS = 3.0, 0.5
 """Standard deviation of a position over the level, along the line of sight and across it."""
@@ -47,7 +47,7 @@ class Anisotropic:
         ),
         frame="of the world, in which the line of sight s is fixed",
         parameters=(
-            f"s = down from {ELEVATION_DEG:g} deg above the table, {AZIMUTH_DEG:g} deg from the x axis",
+            f"s = down from {_ELEVATION_DEG:g} deg above the table, {_AZIMUTH_DEG:g} deg from the x axis",
             f"{ALONG:g} and {ACROSS:g}: position over the level, along s and across it",
             f"{OUT_OF_IMAGE:.3g} and {IN_IMAGE:g}: turn over the level, about axes across s and about s",
         ),
@@ -70,7 +70,7 @@ class Anisotropic:
 
 def line_of_sight() -> Array:
     """The direction in which the camera looks, world frame, (3,), of length 1: obliquely down."""
-    up, round_z = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
+    up, round_z = np.radians(_ELEVATION_DEG), np.radians(_AZIMUTH_DEG)
     return -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
 
 

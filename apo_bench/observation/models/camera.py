@@ -21,11 +21,11 @@ MIDDLE_M = np.array([0.12, 0.0, 0.03])
 MIDDLE_M.flags.writeable = False
 DISTANCE_M, ELEVATION_DEG, AZIMUTH_DEG = 0.9, 40.0, 25.0
 """How far from there it stands, how high above the table, and how far from the x axis of the world."""
-BEHIND = 1e-9
+_BEHIND = 1e-9
 """A ray whose cosine with the optical axis is this near to -1 has no shortest turn."""
 
 
-def default_pose() -> Array:
+def _default_pose() -> Array:
     """T_world_camera of the default camera, (4, 4): obliquely from above, its x axis level."""
     up, round_z = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
     z = -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
@@ -41,7 +41,7 @@ def default_pose() -> Array:
 class Camera:
     """Where a camera stands in the world."""
 
-    T_world_camera: Array = field(default_factory=default_pose)
+    T_world_camera: Array = field(default_factory=_default_pose)
     """(4, 4), axes of OpenCV, [m]."""
 
     def __post_init__(self) -> None:
@@ -65,7 +65,7 @@ class Camera:
         ray = self.rays(goals) @ R
         K = pose.hat(np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1))
         cosine = ray[:, 2, None, None]
-        behind = cosine < BEHIND - 1.0
+        behind = cosine < _BEHIND - 1.0
         shortest = np.eye(3) + K + K @ K / np.where(behind, 1.0, 1.0 + cosine)
         return np.asarray(R @ np.where(behind, np.diag([1.0, -1.0, -1.0]), shortest))
 

@@ -21,12 +21,12 @@ from apo_bench.observation.models.fitted import UNITS, check_level, reported
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.residuals import Residuals
 
-KINDS = INLIER, TURNED, OUTLIER, MISSED = "inlier", "turned", "outlier", "missed"
-ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
-COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *ERRORS)
+_KINDS = _INLIER, _TURNED, _OUTLIER, _MISSED = "inlier", "turned", "outlier", "missed"
+_ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
+_COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *_ERRORS)
 MOST_ROWS = 8000
 """A file holds no more residuals; of more, every so-many-th is written."""
-LARGEST_MM, LARGEST_DEG = 1e5, 180.01
+_LARGEST_MM, _LARGEST_DEG = 1e5, 180.01
 
 
 @final
@@ -108,42 +108,42 @@ def empirical_noise(path: Path, level: Level) -> Empirical:
 def residuals_text(residuals: Residuals) -> str:
     """A file of residuals: one row for every part that was there, mm and degrees in the frame of its ray."""
     every = -(-len(residuals.where) // MOST_ROWS)
-    lines = [",".join(COLUMNS)]
+    lines = [",".join(_COLUMNS)]
     for k in range(0, len(residuals.where), every):
-        kind = kind_of(residuals, k)
+        kind = _kind_of(residuals, k)
         numbers = np.concatenate([residuals.shift_mm[k], residuals.turn_deg[k]])
-        cells = [""] * 6 if kind == MISSED else [f"{x:.3f}" for x in numbers]
+        cells = [""] * 6 if kind == _MISSED else [f"{x:.3f}" for x in numbers]
         lines.append(",".join([*map(str, residuals.where[k].tolist()), kind, *cells]))
     return "\n".join(lines) + "\n"
 
 
-def kind_of(residuals: Residuals, k: int) -> str:
+def _kind_of(residuals: Residuals, k: int) -> str:
     """What became of one part."""
     if not residuals.found[k]:
-        return MISSED
+        return _MISSED
     if not residuals.inlier[k]:
-        return OUTLIER
-    return INLIER if residuals.upright[k] else TURNED
+        return _OUTLIER
+    return _INLIER if residuals.upright[k] else _TURNED
 
 
 def read_residuals(path: str | Path) -> Sample:
     """The residuals of a file; see `empirical_noise`."""
-    columns = {name: (name, 1.0) for name in COLUMNS}
-    errors: dict[str, list[list[float]]] = {kind: [] for kind in KINDS}
-    for row in read_csv(path, columns, COLUMNS):
+    columns = {name: (name, 1.0) for name in _COLUMNS}
+    errors: dict[str, list[list[float]]] = {kind: [] for kind in _KINDS}
+    for row in read_csv(path, columns, _COLUMNS):
         kind = row.text("kind")
-        if kind not in KINDS:
-            row.fail("kind", f"{', '.join(KINDS[:-1])} or {KINDS[-1]} is needed")
-        errors[kind].append([] if kind == MISSED else _error(row))
+        if kind not in _KINDS:
+            row.fail("kind", f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
+        errors[kind].append([] if kind == _MISSED else _error(row))
     count = {kind: len(found) for kind, found in errors.items()}
-    found = sum(count.values()) - count[MISSED]
-    if not count[INLIER]:
+    found = sum(count.values()) - count[_MISSED]
+    if not count[_INLIER]:
         raise InputError(f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals.")
     return Sample(
-        inliers=_acting_where_seen(errors[INLIER]),
-        outliers=_acting_where_seen(errors[OUTLIER]),
-        missed=count[MISSED] / (found + count[MISSED]),
-        gross=count[OUTLIER] / found,
+        inliers=_acting_where_seen(errors[_INLIER]),
+        outliers=_acting_where_seen(errors[_OUTLIER]),
+        missed=count[_MISSED] / (found + count[_MISSED]),
+        gross=count[_OUTLIER] / found,
     )
 
 
@@ -153,7 +153,7 @@ def _read_once(path: Path, _changed: int, _size: int) -> Sample:
 
 
 def _error(row: Row) -> list[float]:
-    return [row.number(name, LARGEST_MM if name.endswith("_mm") else LARGEST_DEG) for name in ERRORS]
+    return [row.number(name, _LARGEST_MM if name.endswith("_mm") else _LARGEST_DEG) for name in _ERRORS]
 
 
 def _acting_where_seen(errors: list[list[float]]) -> Array:

@@ -16,7 +16,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import floored
 
-LIMITS = {"deviation_mm": 10000.0, "deviation_deg": 180.0}
+_LIMITS = {"deviation_mm": 10000.0, "deviation_deg": 180.0}
 """What a function declares as attributes, and the largest that is allowed."""
 
 
@@ -31,7 +31,7 @@ class Plain:
     deviation_deg: float
 
     def __post_init__(self) -> None:
-        for field, most in LIMITS.items():
+        for field, most in _LIMITS.items():
             given = getattr(self, field)
             number = isinstance(given, int | float | np.floating | np.integer) and not isinstance(given, bool)
             if not number or not isfinite(given) or not 0.0 <= given <= most:
@@ -57,7 +57,7 @@ def declared(function: Any, name: str) -> Plain:
     Raises:
         InputError: It declares none, or what makes no sense.
     """
-    missing = [field for field in LIMITS if not hasattr(function, field)]
+    missing = [field for field in _LIMITS if not hasattr(function, field)]
     if missing:
         raise InputError(
             f"the noise model '{name}' is a function (goals, rng) that does not say how large its errors are; set "

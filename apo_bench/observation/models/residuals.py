@@ -21,7 +21,7 @@ TURNED_DEG = 30.0
 """An estimate that is turned more than this is of a part that looks alike when turned, or was taken the wrong way
 round; which of the two cannot be told without the symmetries of the models."""
 MOST_PAIRS = 10_000_000
-MOST_IN_ONE_IMAGE = "at most 3000 estimates of one object in one image can be matched; leave out those of low score"
+_MOST_IN_ONE_IMAGE = "at most 3000 estimates of one object in one image can be matched; leave out those of low score"
 
 
 @final
@@ -89,7 +89,7 @@ def compare(estimates: Located, truth: Located, scene: int | None = None) -> Res
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
     R, R_seen = truth.R[found], estimates.R[partner[found]]
-    turn = Rotation.from_matrix(nearest(R_seen) @ np.swapaxes(nearest(R), 1, 2)).as_rotvec(degrees=True)
+    turn = Rotation.from_matrix(_nearest(R_seen) @ np.swapaxes(_nearest(R), 1, 2)).as_rotvec(degrees=True)
     shift, turned = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     shift[found] = np.einsum("nji,nj->ni", F, estimates.t_mm[partner[found]] - truth.t_mm[found])
     turned[found] = np.einsum("nji,nj->ni", F, turn)
@@ -105,7 +105,7 @@ def compare(estimates: Located, truth: Located, scene: int | None = None) -> Res
     )
 
 
-def nearest(R: Array) -> Array:
+def _nearest(R: Array) -> Array:
     """The rotations that are nearest to matrices (n, 3, 3), in the sense of least squares."""
     U, _, Vt = np.linalg.svd(R)
     return np.asarray(U @ Vt)
@@ -118,7 +118,7 @@ def matched(estimates: Located, truth: Located) -> NDArray[np.int64]:
     partner = np.full(len(truth.where), -1, dtype=np.int64)
     for there, seen in _groups(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
-            raise InputError(f"{estimates.said(int(seen[0]))}: {MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
+            raise InputError(f"{estimates.said(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
         off = np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2)
         i, j = linear_sum_assignment(off)
         partner[there[i]] = seen[j]

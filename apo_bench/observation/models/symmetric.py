@@ -17,7 +17,7 @@ from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import seen_at
 from apo_bench.observation.models.level import Level
 
-WORSE, MANY = 3.0, 3.0
+WORSE, _MANY = 3.0, 3.0
 """Factor on the level of a turn about an axis with so many equal places in a whole turn, or more."""
 
 
@@ -45,7 +45,7 @@ class Symmetric:
         ),
         frame="of the part that is seen, about its centre of volume",
         parameters=(
-            f"s = {WORSE:g}: factor on turns about axes with {MANY:g} or more equal places in a whole turn",
+            f"s = {WORSE:g}: factor on turns about axes with {_MANY:g} or more equal places in a whole turn",
             "symmetries: proper rotations, computed from the boxes of each part (stick 8, castle 2, block 24)",
         ),
         states="the covariance of xi about the part's origin, where the standard deviation of a turn about an axis "
@@ -74,7 +74,7 @@ class Symmetric:
 
     def _deviations(self, fold: Array) -> tuple[Array, Array]:
         """Those that are drawn and those that are stated, (6,) each, about the centre of volume, [m, rad]."""
-        turn = np.radians(self.level.deg) * np.where(fold >= MANY, WORSE, 1.0)
+        turn = np.radians(self.level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
         place = np.full(3, self.level.mm * 1e-3)
         return np.append(place, turn), np.append(place, np.minimum(turn, np.pi / fold / np.sqrt(3.0)))
 

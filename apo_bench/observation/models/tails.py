@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array
 
-NODES = 160
-GAUSS = 200.0
+_NODES = 160
+_GAUSS = 200.0
 """Student t with more degrees of freedom counts as Gaussian, infinitely many."""
-_X, _W = np.polynomial.legendre.leggauss(NODES)
+_X, _W = np.polynomial.legendre.leggauss(_NODES)
 
 
 class Tail(NamedTuple):
@@ -32,7 +32,7 @@ class Tail(NamedTuple):
     @property
     def heaviness(self) -> float:
         """1 / degrees of freedom: 0 for a Gaussian."""
-        return 1.0 / self.freedom if self.freedom < GAUSS else 0.0
+        return 1.0 / self.freedom if self.freedom < _GAUSS else 0.0
 
 
 @final
@@ -57,7 +57,7 @@ class Split:
     def inside(self) -> float:
         """The part of the unlimited distribution that is within the limit."""
         x, w = self._nodes
-        return float(w @ below_across(self.across, self._left(x, self.limit)))
+        return float(w @ _below_across(self.across, self._left(x, self.limit)))
 
     @cached_property
     def variances(self) -> tuple[float, float]:
@@ -65,12 +65,12 @@ class Split:
         x, w = self._nodes
         left = self._left(x, self.limit)
         across = float(w @ _square_below(self.across, left)) / self.inside / 2.0
-        return across, float(w @ (x * x * below_across(self.across, left))) / self.inside
+        return across, float(w @ (x * x * _below_across(self.across, left))) / self.inside
 
     def cdf_across(self, r: ArrayLike) -> Array:
         """Of the length of the error across."""
         r, (x, w) = np.asarray(r, dtype=np.float64), self._nodes
-        return below_across(self.across, np.minimum(r[..., None], self._left(x, self.limit))) @ w / self.inside
+        return _below_across(self.across, np.minimum(r[..., None], self._left(x, self.limit))) @ w / self.inside
 
     def cdf_along(self, a: ArrayLike) -> Array:
         """Of the size of the error along."""
@@ -78,7 +78,7 @@ class Split:
         top = np.arcsinh(a / self.along.scale)
         x = self.along.scale * np.sinh(top * _X)
         w = top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x))
-        return np.sum(w * below_across(self.across, self._left(x, self.limit)), axis=-1) / self.inside
+        return np.sum(w * _below_across(self.across, self._left(x, self.limit)), axis=-1) / self.inside
 
     def cdf_length(self, r: ArrayLike) -> Array:
         """Of the length of the whole error."""
@@ -86,7 +86,7 @@ class Split:
         top = np.arcsinh(r / self.along.scale)
         x = self.along.scale * np.sinh(top * _X)
         w = top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x))
-        return np.sum(w * below_across(self.across, self._left(x, r)), axis=-1) / self.inside
+        return np.sum(w * _below_across(self.across, self._left(x, r)), axis=-1) / self.inside
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
         """Errors (n, 3); what falls outside the limit is drawn anew."""
@@ -107,7 +107,7 @@ class Split:
 
 def of_numbers(at: Array, limit: float) -> Split:
     """From four numbers to fit: logarithm of the scale and inverse of the degrees of freedom, across, then along."""
-    tails = [Tail(float(np.exp(s)), float(1.0 / h) if h > 1.0 / GAUSS else float("inf")) for s, h in (at[:2], at[2:])]
+    tails = [Tail(float(np.exp(s)), float(1.0 / h) if h > 1.0 / _GAUSS else float("inf")) for s, h in (at[:2], at[2:])]
     return Split(tails[0], tails[1], limit)
 
 
@@ -130,7 +130,7 @@ def log_density_across(tail: Tail, r: Array) -> Array:
     return np.asarray(-falls - np.log(2.0 * np.pi * tail.scale**2))
 
 
-def below_across(tail: Tail, r: Array) -> Array:
+def _below_across(tail: Tail, r: Array) -> Array:
     """The chance that Student t in two directions is nearer than r."""
     h, u = tail.heaviness, (r / tail.scale) ** 2
     return np.asarray(-np.expm1(-u / 2.0 if h == 0.0 else -0.5 / h * np.log1p(h * u)))

@@ -26,16 +26,16 @@ class Passing(NamedTuple):
 
 Item = Node | Passing
 Chain = tuple[Item, ...]
-Rows = tuple[tuple[Item, ...], ...]
+_Rows = tuple[tuple[Item, ...], ...]
 Links = list[tuple[Item, Item]]
 
-NODE_WIDTH = 1.0
-PASSING_WIDTH = 0.5
-SPACE = 0.35
+_NODE_WIDTH = 1.0
+_PASSING_WIDTH = 0.5
+_SPACE = 0.35
 """Between neighbours, in widths of a node."""
-LOOSE = 0.01
+_LOOSE = 0.01
 """How much an item without neighbours counts."""
-FEW = 3000
+_FEW = 3000
 """So many orders are all tried; of more, those that differ by the place of one item from the best so far."""
 
 
@@ -44,7 +44,7 @@ class Layers(NamedTuple):
 
     ground: Node | None
     """The node below all rows, as wide as the picture: the work table."""
-    rows: Rows
+    rows: _Rows
     """From the lowest to the highest, each from left to right."""
     chains: tuple[Chain, ...]
     """The way of each arc from its manipulated to its environment node, the ground left out."""
@@ -87,7 +87,7 @@ def abscissas(layers: Layers, rounds: int = 60) -> dict[Item, float]:
         for row, offset in zip(layers.rows, offsets, strict=True):
             middle = float(np.mean([x[item] for item in row]))
             wanted = np.array([np.mean([x[other] for other in near[item]] or [middle]) for item in row])
-            weight = np.array([1.0 if near[item] else LOOSE for item in row])
+            weight = np.array([1.0 if near[item] else _LOOSE for item in row])
             x.update(zip(row, _apart(wanted, offset, weight), strict=True))
     left = min((x[item] - width(item) / 2 for item in x), default=0.0)
     return {item: float(at - left) for item, at in x.items()}
@@ -95,7 +95,7 @@ def abscissas(layers: Layers, rounds: int = 60) -> dict[Item, float]:
 
 def width(item: Item) -> float:
     """How much room an item takes, in widths of a node."""
-    return PASSING_WIDTH if isinstance(item, Passing) else NODE_WIDTH
+    return _PASSING_WIDTH if isinstance(item, Passing) else _NODE_WIDTH
 
 
 def _ground(graph: Graph) -> Node | None:
@@ -121,9 +121,9 @@ def _chain(i: int, arc: Arc, heights: dict[Node, int], ground: Node | None) -> C
     return (arc.manipulated, *passing, *end)
 
 
-def _ordered(rows: Rows, links: Links) -> Rows:
+def _ordered(rows: _Rows, links: Links) -> _Rows:
     """The order of least cost; of equal ones the first."""
-    if prod(factorial(len(row)) for row in rows) <= FEW:
+    if prod(factorial(len(row)) for row in rows) <= _FEW:
         return min(product(*(permutations(row) for row in rows)), key=lambda each: _cost(each, links))
     best, least = rows, _cost(rows, links)
     while True:
@@ -133,7 +133,7 @@ def _ordered(rows: Rows, links: Links) -> Rows:
         best, least = found, _cost(found, links)
 
 
-def _neighbours(rows: Rows) -> list[Rows]:
+def _neighbours(rows: _Rows) -> list[_Rows]:
     """Every order in which one item stands elsewhere in its row."""
     out = []
     for j, row in enumerate(rows):
@@ -143,7 +143,7 @@ def _neighbours(rows: Rows) -> list[Rows]:
     return out
 
 
-def _cost(rows: Rows, links: Links) -> tuple[int, float]:
+def _cost(rows: _Rows, links: Links) -> tuple[int, float]:
     """Crossings, then the squared lengths of all links from left to right."""
     place = {item: (j, k - (len(row) - 1) / 2) for j, row in enumerate(rows) for k, item in enumerate(row)}
     ends = [(place[a][0], place[a][1], place[b][1]) for a, b in links]
@@ -157,7 +157,7 @@ def _cost(rows: Rows, links: Links) -> tuple[int, float]:
 
 def _offsets(row: tuple[Item, ...]) -> Array:
     """How far right of the first item each one stands at least."""
-    steps = [(width(a) + width(b)) / 2 + SPACE for a, b in pairwise(row)]
+    steps = [(width(a) + width(b)) / 2 + _SPACE for a, b in pairwise(row)]
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

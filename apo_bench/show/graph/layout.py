@@ -13,15 +13,15 @@ from apo_bench.assembly.graph import Graph, Node
 from apo_bench.geometry.arrays import Array
 from apo_bench.show.graph.layers import Chain, Item, Layers, Passing, abscissas, layered, width
 
-NODE_HEIGHT = 0.5
-GAP = 0.72
+_NODE_HEIGHT = 0.5
+_GAP = 0.72
 """Between rows: room for a label of two lines."""
-LETTER = 0.082
+_LETTER = 0.082
 """A letter of a name."""
-TERM, INVERSE = 0.19, 0.16
+_TERM, _INVERSE = 0.19, 0.16
 """A term of an ODL, and what its exponent adds."""
-LABEL_LETTER, LABEL_LINE = 0.07, 0.135
-ALONG = (0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78)
+_LABEL_LETTER, _LABEL_LINE = 0.07, 0.135
+_ALONG = (0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78)
 """Places of a label on a straight piece of its arrow, the best first."""
 
 
@@ -54,23 +54,23 @@ def arranged(graph: Graph, texts: Sequence[str]) -> Layout:
     unit = max((_room(node) for node in graph.nodes), default=1.0)
     x = {item: unit * at for item, at in abscissas(layers).items()}
     wide = max((at + unit * width(item) / 2 for item, at in x.items()), default=unit)
-    boxes = {item: Rectangle(x[item], _level(j), unit, NODE_HEIGHT) for j, item in _nodes(layers)}
+    boxes = {item: Rectangle(x[item], _level(j), unit, _NODE_HEIGHT) for j, item in _nodes(layers)}
     if layers.ground is not None:
-        boxes[layers.ground] = Rectangle(wide / 2, _level(-1), wide, NODE_HEIGHT)
+        boxes[layers.ground] = Rectangle(wide / 2, _level(-1), wide, _NODE_HEIGHT)
     routes = tuple(_routes(layers, x, unit))
-    height = _level(len(layers.rows) - 1) + NODE_HEIGHT / 2
+    height = _level(len(layers.rows) - 1) + _NODE_HEIGHT / 2
     return Layout(wide, height, boxes, routes, tuple(_labels(routes, texts)))
 
 
 def _room(node: Node) -> float:
     """The width of the box of a node."""
-    odl = sum(TERM + INVERSE * term.inverse for term in node.odl)
-    return max(0.85, LETTER * len(node.part) + 0.2, odl + 0.2)
+    odl = sum(_TERM + _INVERSE * term.inverse for term in node.odl)
+    return max(0.85, _LETTER * len(node.part) + 0.2, odl + 0.2)
 
 
 def _level(row: int) -> float:
     """The middle of a row; the ground is row -1."""
-    return NODE_HEIGHT / 2 + (row + 1) * (NODE_HEIGHT + GAP)
+    return _NODE_HEIGHT / 2 + (row + 1) * (_NODE_HEIGHT + _GAP)
 
 
 def _nodes(layers: Layers) -> Iterator[tuple[int, Node]]:
@@ -83,15 +83,15 @@ def _routes(layers: Layers, x: Mapping[Item, float], unit: float) -> Iterator[Ar
     leave = _ports(layers.chains, x, unit, 0, lambda chain: chain[1] if len(chain) > 1 else chain[0])
     enter = _ports(layers.chains, x, unit, -1, lambda chain: chain[-2])
     for i, chain in enumerate(layers.chains):
-        points = [(leave[i], _level(rows[chain[0]]) - NODE_HEIGHT / 2)]
+        points = [(leave[i], _level(rows[chain[0]]) - _NODE_HEIGHT / 2)]
         for item in chain[1:]:
             middle = _level(rows[item])
             if isinstance(item, Passing):
-                points += [(x[item], middle + NODE_HEIGHT / 2), (x[item], middle - NODE_HEIGHT / 2)]
+                points += [(x[item], middle + _NODE_HEIGHT / 2), (x[item], middle - _NODE_HEIGHT / 2)]
             else:
-                points.append((enter[i], middle + NODE_HEIGHT / 2))
+                points.append((enter[i], middle + _NODE_HEIGHT / 2))
         if len(chain) == 1 or isinstance(chain[-1], Passing):
-            points.append((points[-1][0], NODE_HEIGHT))
+            points.append((points[-1][0], _NODE_HEIGHT))
         yield np.array(points)
 
 
@@ -118,7 +118,7 @@ def _labels(routes: Sequence[Array], texts: Sequence[str]) -> Iterator[Rectangle
     for i, (route, text) in enumerate(zip(routes, texts, strict=True)):
         others = np.concatenate([np.zeros((0, 2)), *dots[:i], *dots[i + 1 :]])
         lines = text.split("\n")
-        size = LABEL_LETTER * max(map(len, lines)) + 0.06, LABEL_LINE * len(lines) + 0.06
+        size = _LABEL_LETTER * max(map(len, lines)) + 0.06, _LABEL_LINE * len(lines) + 0.06
         room = (Rectangle(*point, *size) for point in _candidates(route))
         placed.append(min(room, key=lambda r: (_hidden(r, placed), int(_inside(r, others).sum()))))
         yield placed[-1]
@@ -126,9 +126,9 @@ def _labels(routes: Sequence[Array], texts: Sequence[str]) -> Iterator[Rectangle
 
 def _candidates(route: Array) -> Iterator[tuple[float, float]]:
     """Points on the pieces between rows, those further up first."""
-    for along in ALONG:
+    for along in _ALONG:
         for a, b in pairwise(route):
-            if a[1] - b[1] > NODE_HEIGHT * 1.01:
+            if a[1] - b[1] > _NODE_HEIGHT * 1.01:
                 x, y = a + along * (b - a)
                 yield float(x), float(y)
 

@@ -9,15 +9,15 @@ from typing import Any
 from apo_bench.assembly.graph import Arc, Graph, Node, Residuals
 from apo_bench.show.graph.layout import Layout, arranged
 
-INK, GONE, ALARM = "#222222", "#8A8A8A", "#C8102E"
-GROUND = "#E4E4E4"
-PALE = 0.75
+_INK, _GONE, _ALARM = "#222222", "#8A8A8A", "#C8102E"
+_GROUND = "#E4E4E4"
+_PALE = 0.75
 """How much white is in the colour of a part."""
-MARGIN, HEAD, FOOT = 0.15, 0.32, 0.3
+_MARGIN, _HEAD, _FOOT = 0.15, 0.32, 0.3
 """Inches around the graph, and for the title above it and the words below it."""
-DASHES = (0, (4, 2.5))
+_DASHES = (0, (4, 2.5))
 
-Colors = Mapping[str, tuple[float, float, float]]
+_Colors = Mapping[str, tuple[float, float, float]]
 
 
 def draw_graph(
@@ -27,7 +27,7 @@ def draw_graph(
     title: str,
     residuals: Residuals | None = None,
     gap_m: float = 0.0,
-    colors: Colors | None = None,
+    colors: _Colors | None = None,
 ) -> None:
     """Write the picture as the suffix of `path` says; no display is needed.
 
@@ -43,13 +43,13 @@ def draw_graph(
     texts = [_label(arc, residual, residuals is not None) for arc, residual in zip(graph.arcs, measured, strict=True)]
     layout = arranged(graph, texts)
     words = _words(graph, residuals is not None, gap_m)
-    width = max(layout.width, 0.078 * len(title), 0.06 * len(words)) + 2 * MARGIN
-    height = layout.height + 2 * MARGIN + HEAD + (FOOT if words else 0.0)
+    width = max(layout.width, 0.078 * len(title), 0.06 * len(words)) + 2 * _MARGIN
+    height = layout.height + 2 * _MARGIN + _HEAD + (_FOOT if words else 0.0)
     figure = Figure(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
     axes = _canvas(figure, layout, width, height, bool(words))
-    figure.text(0.5, 1 - (MARGIN + 0.1) / height, title, ha="center", va="center", fontsize=10, color=INK)
-    figure.text(0.5, (MARGIN + 0.02) / height, words, ha="center", va="center", fontsize=7.5, color=GONE)
+    figure.text(0.5, 1 - (_MARGIN + 0.1) / height, title, ha="center", va="center", fontsize=10, color=_INK)
+    figure.text(0.5, (_MARGIN + 0.02) / height, words, ha="center", va="center", fontsize=7.5, color=_GONE)
     for i, (arc, residual) in enumerate(zip(graph.arcs, measured, strict=True)):
         _arrow(axes, layout, i, arc, texts[i], residual is not None and residual > gap_m)
     for node in layout.boxes:
@@ -62,7 +62,7 @@ def _canvas(figure: Any, layout: Layout, width: float, height: float, words: boo
     """Axes over the whole figure, in inches, the graph in the middle."""
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     left = (width - layout.width) / 2
-    below = MARGIN + (FOOT if words else 0.0)
+    below = _MARGIN + (_FOOT if words else 0.0)
     axes.set_xlim(-left, width - left)
     axes.set_ylim(-below, height - below)
     axes.axis("off")
@@ -82,13 +82,13 @@ def _node(axes: Any, layout: Layout, node: Node, stands: bool, color: tuple[floa
             box.height - 2 * shade,
             boxstyle=f"round,pad={shade}",
             facecolor=_pale(color) if stands else "white",
-            edgecolor=INK if stands else GONE,
-            linestyle="-" if stands else DASHES,
+            edgecolor=_INK if stands else _GONE,
+            linestyle="-" if stands else _DASHES,
             linewidth=1.1,
             zorder=3,
         )
     )
-    ink = {"ha": "center", "va": "center", "color": INK if stands else GONE, "zorder": 4}
+    ink = {"ha": "center", "va": "center", "color": _INK if stands else _GONE, "zorder": 4}
     axes.text(box.x, box.y + 0.1, node.part, fontsize=9.5, fontweight="bold", **ink)
     axes.text(box.x, box.y - 0.11, _formula(node), fontsize=9.5, **ink)
 
@@ -97,14 +97,14 @@ def _arrow(axes: Any, layout: Layout, i: int, arc: Arc, text: str, alarming: boo
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.path import Path as Outline
 
-    color = ALARM if alarming else INK if arc.lost is None else GONE
+    color = _ALARM if alarming else _INK if arc.lost is None else _GONE
     axes.add_patch(
         FancyArrowPatch(
             path=Outline(layout.routes[i]),
             arrowstyle="-|>,head_length=5,head_width=2.2",
             color=color,
             linewidth=1.1,
-            linestyle="-" if arc.lost is None else DASHES,
+            linestyle="-" if arc.lost is None else _DASHES,
             joinstyle="round",
             zorder=1,
         )
@@ -136,4 +136,4 @@ def _words(graph: Graph, measured: bool, gap_m: float) -> str:
 
 
 def _pale(color: tuple[float, float, float] | None) -> Any:
-    return GROUND if color is None else tuple(PALE + (1 - PALE) * c for c in color)
+    return _GROUND if color is None else tuple(_PALE + (1 - _PALE) * c for c in color)

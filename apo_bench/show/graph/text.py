@@ -8,7 +8,7 @@ from typing import Any
 from apo_bench.assembly.graph import Arc, Graph, Node, Residuals
 from apo_bench.assembly.topology import spelled
 
-GRAPH = "apo-bench/graph/1"
+_GRAPH = "apo-bench/graph/1"
 
 
 def graph_title(scenario: str, graph: Graph) -> str:
@@ -29,7 +29,7 @@ def graph_form(scenario: str, graph: Graph, residuals: Residuals | None = None) 
     """What `json` can write: operations numbered from 1, residuals in mm (null where unknown)."""
     measured: Residuals = [None] * len(graph.arcs) if residuals is None else residuals
     return {
-        "schema": GRAPH,
+        "schema": _GRAPH,
         "scenario": scenario,
         "step": graph.step,
         "nodes": [{**_node_form(node), "stands": graph.stands(node)} for node in graph.nodes],

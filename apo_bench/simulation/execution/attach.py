@@ -9,17 +9,17 @@ from apo_bench.simulation.execution.transfer import ASIDE_M, UP, Grip, Transfer,
 from apo_bench.simulation.robot.paths import moved, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 
-PLACE, TOUCH, INSERT, SLIDE = 0.06, 0.01, 0.06, 0.005
+_PLACE, _TOUCH, _INSERT, _SLIDE = 0.06, 0.01, 0.06, 0.005
 """Steady speeds [m/s]: down to just above the support, onto it, along an insertion, against a part at the side."""
-PULL, LEAVE = 0.1, 0.03
+_PULL, _LEAVE = 0.1, 0.03
 """Peak speeds [m/s] of a part that is pulled out, and of one that is moved off a side."""
-OVERTRAVEL_M = 0.002
+_OVERTRAVEL_M = 0.002
 """Contact is sought this far beyond the goal."""
-BOTTOM_M = 0.003
+_BOTTOM_M = 0.003
 """From this far before a bottom it is felt for."""
 ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
-BEYOND_M, OFF_M = 0.004, 0.0003
+_BEYOND_M, _OFF_M = 0.004, 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
 
 
@@ -29,22 +29,22 @@ def attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
     Those that lead along the line of attach are one motion, which ends where the last of them does.
     """
     if t.into.level:
-        left, grip = insert(robot, t, grip, second)
+        left, grip = _insert(robot, t, grip, second)
     else:
-        left = come_down(robot, t, grip)
+        left = _come_down(robot, t, grip)
     for macro in t.macros:
         if macro.name == "slide-to-contact" and left <= ARRIVED_M:
             _slide(robot, t, macro.way)
     return left, grip
 
 
-def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
+def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
     """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
     robot.stage = "attach"
     guard, rise, found = Guard(t.into.way, t.insert_n), t.floats, None
     if t.into.left is not None and second is not None:
         there = moved(moved(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
-        left, found = press_in(robot, t, grip, there @ grip.T_part_tip, INSERT, guard, ARRIVED_M)
+        left, found = press_in(robot, t, grip, there @ grip.T_part_tip, _INSERT, guard, ARRIVED_M)
         if left > ARRIVED_M:
             return left + t.into.left, grip
         change(robot, t, grip, second, after(found, moved(there, UP, -rise) @ second.T_part_tip))
@@ -52,36 +52,36 @@ def insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
         robot.follow(smooth(robot.T, moved(robot.T, UP, rise), 0.01))
     goal = after(found, moved(aim(t) @ grip.T_part_tip, UP, rise))
     if any(macro.name == "move-to-bottom" for macro in t.macros):
-        left, found = press_in(robot, t, grip, moved(goal, t.into.way, -BOTTOM_M), INSERT, guard, ARRIVED_M)
+        left, found = press_in(robot, t, grip, moved(goal, t.into.way, -_BOTTOM_M), _INSERT, guard, ARRIVED_M)
         if left == 0.0:
-            robot.follow(steady(robot.T, after(found, moved(goal, t.into.way, OVERTRAVEL_M)), TOUCH), guard)
+            robot.follow(steady(robot.T, after(found, moved(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard)
     else:
-        left, _ = press_in(robot, t, grip, goal, INSERT, guard, ARRIVED_M)
-    lower = moved(robot.T, UP, -rise - OVERTRAVEL_M)
-    robot.follow(steady(robot.T, lower, TOUCH), Guard(-UP, t.place_n))
+        left, _ = press_in(robot, t, grip, goal, _INSERT, guard, ARRIVED_M)
+    lower = moved(robot.T, UP, -rise - _OVERTRAVEL_M)
+    robot.follow(steady(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
     return left, grip
 
 
-def come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
+def _come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
     """From above, slowly where contact may come any moment, until the part stands; nothing of the line is left then."""
     robot.stage = "attach"
     down = Guard(t.into.way, t.place_n)
     goal = aim(t) @ grip.T_part_tip
-    left, found = press_in(robot, t, grip, moved(goal, t.into.way, -t.slow), PLACE, down, 0.0)
+    left, found = press_in(robot, t, grip, moved(goal, t.into.way, -t.slow), _PLACE, down, 0.0)
     if left == 0.0:
-        end = after(found, moved(goal, t.into.way, OVERTRAVEL_M))
-        press_in(robot, t, grip, end, TOUCH, down, OVERTRAVEL_M + t.depth / 2)
+        end = after(found, moved(goal, t.into.way, _OVERTRAVEL_M))
+        press_in(robot, t, grip, end, _TOUCH, down, _OVERTRAVEL_M + t.depth / 2)
     robot.wait(0.05)
     return 0.0
 
 
 def _slide(robot: Robot, t: Transfer, side: Array) -> None:
     """Off the floor by a hair, sideways until it touches, and down again."""
-    robot.follow(smooth(robot.T, moved(robot.T, UP, OFF_M), 0.01))
+    robot.follow(smooth(robot.T, moved(robot.T, UP, _OFF_M), 0.01))
     robot.wait(0.05)
-    robot.follow(steady(robot.T, moved(robot.T, side, ASIDE_M + BEYOND_M), SLIDE), Guard(side, t.slide_n))
-    robot.follow(steady(robot.T, moved(robot.T, UP, -OFF_M - OVERTRAVEL_M), TOUCH), Guard(-UP, t.place_n))
+    robot.follow(steady(robot.T, moved(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
+    robot.follow(steady(robot.T, moved(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
 
 
@@ -90,19 +90,19 @@ def pull_out(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> Grip
     robot.stage = "lift"
     robot.follow(smooth(robot.T, moved(robot.T, UP, t.floats), 0.01))
     if t.out.left is None or second is None:
-        robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.travel), PULL))
+        robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.travel), _PULL))
         return grip
-    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.left), PULL))
+    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.left), _PULL))
     part = moved(t.T_world_start, t.out.way, -t.out.left)
     change(robot, t, grip, second, part @ second.T_part_tip)
     robot.follow(smooth(robot.T, moved(robot.T, UP, t.floats), 0.01))
-    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, t.out.left - t.out.travel), PULL))
+    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
     return second
 
 
 def leave(robot: Robot, t: Transfer) -> None:
     """Off what the part touches at its side, before it is lifted."""
     if t.away:
-        robot.follow(smooth(robot.T, moved(robot.T, UP, OFF_M), 0.01))
+        robot.follow(smooth(robot.T, moved(robot.T, UP, _OFF_M), 0.01))
     for side in t.away:
-        robot.follow(smooth(robot.T, moved(robot.T, side, ASIDE_M), LEAVE))
+        robot.follow(smooth(robot.T, moved(robot.T, side, ASIDE_M), _LEAVE))

@@ -8,9 +8,9 @@ from apo_bench.simulation.execution.transfer import UP, Grip, Transfer, aim
 from apo_bench.simulation.robot.paths import at_height, moved, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-LIFT, CARRY, LOWER = 0.25, 0.35, 0.2
+_LIFT, _CARRY, _LOWER = 0.25, 0.35, 0.2
 """Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
-LOST_LOAD = 0.8
+_LOST_LOAD = 0.8
 """A hand that feels less than this part of the weight of a group has lost some of it."""
 
 
@@ -55,7 +55,7 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.carried:
         robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), LIFT))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT))
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
@@ -63,9 +63,9 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
     if t.into.level:
         before = moved(before, UP, t.floats)
-    robot.go(at_height(before, max(t.safe, before[2, 3])), CARRY)
-    robot.follow(smooth(robot.T, before, LOWER))
+    robot.go(at_height(before, max(t.safe, before[2, 3])), _CARRY)
+    robot.follow(smooth(robot.T, before, _LOWER))
     robot.wait(0.1)
     check_grasp(robot, grip)
-    if t.carried and robot.scene.grasp == "friction" and robot.load() < LOST_LOAD * t.weight_n:
+    if t.carried and robot.scene.grasp == "friction" and robot.load() < _LOST_LOAD * t.weight_n:
         raise Halt("carry", "lost_grasp", " or ".join(t.carried))

@@ -17,14 +17,14 @@ from apo_bench.simulation.robot.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import sleeping, snapshot
 
-SETTLE_S = 0.5
+_SETTLE_S = 0.5
 """At the end, everything is left alone this long."""
-REST_M_S, REST_RAD_S = 5e-5, 1e-3
+_REST_M_S, _REST_RAD_S = 5e-5, 1e-3
 """Slower than this, all parts rest and the next operation may begin; a stick that rocks in its slot takes a while."""
 LOOK_S, PATIENCE_S = 0.04, 1.5
-SHORTEST_STEP_S = 1.0
+_SHORTEST_STEP_S = 1.0
 """Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
-STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
+_STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
 """What has moved so long, [s], rocks: steps are taken in so many parts. Of 19 states that rocked on for ever in whole
 steps quarters end 17, halves 10, and all of these in turn every one."""
 
@@ -51,7 +51,7 @@ def replay(
         most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
     """
     start = plan.start if parts_at is None else parts_at
-    too_long = len(plan.schedule) * SHORTEST_STEP_S > most_s
+    too_long = len(plan.schedule) * _SHORTEST_STEP_S > most_s
     todo = () if too_long else moves(plan, scene, searches)
     refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
     branches = Branches() if branches is None or watch is not None else branches
@@ -149,15 +149,15 @@ def _until_rest(robot: Robot) -> None:
     with sleeping(robot.scene.work, False):
         for i in range(round(PATIENCE_S / LOOK_S)):
             speed = np.abs(robot.data.qvel[moving]).max(axis=0)
-            quiet = quiet + 1 if speed[:3].max() < REST_M_S and speed[3:].max() < REST_RAD_S else 0
+            quiet = quiet + 1 if speed[:3].max() < _REST_M_S and speed[3:].max() < _REST_RAD_S else 0
             if quiet == 2:
                 return
-            robot.wait(LOOK_S, parts=next(parts for since, parts in STEPS if i * LOOK_S >= since))
+            robot.wait(LOOK_S, parts=next(parts for since, parts in _STEPS if i * LOOK_S >= since))
 
 
 def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
     try:
-        robot.wait(SETTLE_S)
+        robot.wait(_SETTLE_S)
         _until_rest(robot)
     except Halt as halt:
         if halt.code == "unstable_simulation":

@@ -7,23 +7,23 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer, hover
 from apo_bench.simulation.robot.paths import at_height, moved, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-FREE, NEAR = 1.4, 0.55
+_FREE, _NEAR = 1.4, 0.55
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
-DEPART_M = 0.09
-OPEN_TO_PICK_M, OPEN_TO_RELEASE_M = 0.012, 0.008
+_DEPART_M = 0.09
+_OPEN_TO_PICK_M, _OPEN_TO_RELEASE_M = 0.012, 0.008
 """How far each finger stands off before it closes, and when it has let go."""
-LOST_M = 0.002
+_LOST_M = 0.002
 """Fingers that close this far beyond the part's surface hold nothing."""
 
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
     above = at_height(at, hover(at))
-    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), NEAR))
-    robot.go(at_height(above, robot.T[2, 3]), FREE, turn_speed=3.0)
+    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
+    robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=3.0)
     robot.handle(t.part)
-    robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
-    robot.follow(smooth(robot.T, at, NEAR))
+    robot.fingers(min(grip.half_width + _OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
+    robot.follow(smooth(robot.T, at, _NEAR))
     robot.wait(0.05)
     robot.hold(t.part, *t.carried)
     if robot.scene.grasp == "weld":
@@ -37,15 +37,15 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "release"
     if robot.scene.grasp == "weld":
         robot.weld(t.part, False)
-    robot.fingers(min(grip.half_width + OPEN_TO_RELEASE_M, robot.arm.opening_m), 0.25)
+    robot.fingers(min(grip.half_width + _OPEN_TO_RELEASE_M, robot.arm.opening_m), 0.25)
     robot.hold()
 
 
 def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
-    robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], DEPART_M), NEAR))
+    robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
     robot.handle(None)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), FREE))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
 
 
 def change(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
@@ -67,5 +67,5 @@ def centre(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 
 def check_grasp(robot: Robot, grip: Grip) -> None:
-    if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - LOST_M:
+    if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - _LOST_M:
         raise Halt(robot.stage, "lost_grasp")

@@ -16,17 +16,17 @@ from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.scene.scene import Scene
 
-STAND_OFF_M = 0.012
+_STAND_OFF_M = 0.012
 """How far each finger stands off the part before it closes or after it has let go."""
-MARGINS_M = (0.004, 0.003, 0.002)
+_MARGINS_M = (0.004, 0.003, 0.002)
 """Room around the gripper, as much as there is."""
-GRID_M = 0.003
+_GRID_M = 0.003
 """Candidates along a part, and looks along a stroke, are this far apart."""
-END_M = 0.018
+_END_M = 0.018
 """No grasp is nearer to the end of a long part: the pads still lie on it."""
-MOST_LEFT_M = 0.1
+_MOST_LEFT_M = 0.1
 """A grip is changed so near to the goal that the part already lies in what it was put into."""
-HEIGHT = 0.65
+_HEIGHT = 0.65
 """Height of the tip over the part's lowest point, as a part of its height."""
 
 
@@ -69,7 +69,7 @@ def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str])
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place]) -> Grasp:
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
-    if _clear(scene, part, [preferred], places, MARGINS_M[-1]):
+    if _clear(scene, part, [preferred], places, _MARGINS_M[-1]):
         return preferred
     return _first_clear(scene, part, _candidates(scene, part, places[0].T), places) or preferred
 
@@ -89,11 +89,11 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Plac
         places: Where the part is picked up or put down besides, clear for the grasp that is used there.
     """
     ends = (*places, Place(stroke.T, stroke.around))
-    least = MARGINS_M[-1]
+    least = _MARGINS_M[-1]
     if _clear(scene, part, [preferred], ends, least) and not _nearest(scene, part, preferred, stroke, least):
         return Grips(preferred)
     everything = _candidates(scene, part, places[0].T)
-    for margin in MARGINS_M:
+    for margin in _MARGINS_M:
         able = [
             (_nearest(scene, part, grasp, stroke, margin), grasp)
             for grasp in _clear(scene, part, everything, places, margin)
@@ -115,7 +115,7 @@ def tip_frame(grasp: Grasp, T_part: Array) -> Array:
     return T
 
 
-def half_width(solid: Solid, grasp: Grasp) -> float:
+def _half_width(solid: Solid, grasp: Grasp) -> float:
     """Half the nominal part's width between the fingers, [m]."""
     low, high = solid.bounds
     return float(np.abs(grasp.across) @ (high - low)) / 2
@@ -127,7 +127,7 @@ def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, G
     last = _clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin)
     for left, first in able:
         change = Place(_back(stroke, left), stroke.around)
-        if 0.0 < left < MOST_LEFT_M and _clear(scene, part, [first], [change], margin):
+        if 0.0 < left < _MOST_LEFT_M and _clear(scene, part, [first], [change], margin):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
             for second in _clear(scene, part, last, [change], margin):
                 if _nearest(scene, part, second, near, margin) == 0.0:
@@ -141,13 +141,13 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
     low, high = solid.bounds
     size, middle = high - low, (high + low) / 2
     up = int(np.abs(T[2, :3]).argmax())
-    rise = np.sign(T[2, up]) * (HEIGHT - 0.5) * size[up] * np.eye(3)[up]
+    rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
     found = []
     for axis, along in (level, level[::-1]):
-        reach = max(0.0, size[along] / 2 - END_M)
-        offsets = np.arange(-reach, reach + 1e-9, GRID_M) if reach > GRID_M else np.zeros(1)
-        if size[axis] / 2 + STAND_OFF_M / 2 <= scene.arm.opening_m:
+        reach = max(0.0, size[along] / 2 - _END_M)
+        offsets = np.arange(-reach, reach + 1e-9, _GRID_M) if reach > _GRID_M else np.zeros(1)
+        if size[axis] / 2 + _STAND_OFF_M / 2 <= scene.arm.opening_m:
             for offset in sorted(offsets, key=abs):
                 found.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
     return found
@@ -155,7 +155,7 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
 
 def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place]) -> Grasp | None:
     """The first of those around which there is most room at every place, or None."""
-    for margin in MARGINS_M:
+    for margin in _MARGINS_M:
         clear = _clear(scene, part, grasps, places, margin)
         if clear:
             return clear[0]
@@ -167,8 +167,8 @@ def _clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Pl
     kept = []
     for across, those in groupby(grasps, key=lambda grasp: tuple(grasp.across)):
         same = list(those)
-        width = half_width(scene.scenario.assembly.solids[part], same[0])
-        opening = min(width + STAND_OFF_M, scene.arm.opening_m)
+        width = _half_width(scene.scenario.assembly.solids[part], same[0])
+        opening = min(width + _STAND_OFF_M, scene.arm.opening_m)
         points = np.array([grasp.point for grasp in same])
         struck = np.zeros(len(same), dtype=np.bool_)
         for place in places:
@@ -181,8 +181,8 @@ def _clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Pl
 
 def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
-    width = half_width(scene.scenario.assembly.solids[part], grasp)
-    lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / GRID_M) + 1))
+    width = _half_width(scene.scenario.assembly.solids[part], grasp)
+    lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way
     struck = _depth(scene, width, tip[:3, :3], at, stroke.around, margin) > 0.0

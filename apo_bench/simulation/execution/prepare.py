@@ -30,11 +30,11 @@ from apo_bench.simulation.execution.transfer import SAFE_M, Grip, Line, Motion, 
 from apo_bench.simulation.robot.paths import turn_from
 from apo_bench.simulation.scene.scene import Scene
 
-GRAVITY = 9.81
-PLACE_WEIGHTS, INSERT_WEIGHTS, SLIDE_WEIGHTS = 6.0, 2.5, 0.5
+_GRAVITY = 9.81
+_PLACE_WEIGHTS, _INSERT_WEIGHTS, _SLIDE_WEIGHTS = 6.0, 2.5, 0.5
 """Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
-FINGER_M = 0.01
+_FINGER_M = 0.01
 """So far fingers reach below their tip."""
 
 
@@ -130,7 +130,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: 
     macros = motions(comes, target, slides(plan.assembly, comes, after))
     top, bottom = ends_of(plan.assembly, operation.moves, believed)
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
-    weight = {p: GRAVITY * _mass(scene, p) for p in scene.work.free}
+    weight = {p: _GRAVITY * _mass(scene, p) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
@@ -144,13 +144,13 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: 
         into=into,
         departs=departing(leaves, start, slides(plan.assembly, leaves, believed)),
         macros=macros,
-        over=top + OVER_M + FINGER_M,
+        over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
         slow=slow_before(plan.assembly, comes, after, into.way),
         weight_n=held,
-        place_n=PLACE_WEIGHTS * held,
-        insert_n=INSERT_WEIGHTS * min(near, default=held),
-        slide_n=SLIDE_WEIGHTS * min(near, default=held),
+        place_n=_PLACE_WEIGHTS * held,
+        insert_n=_INSERT_WEIGHTS * min(near, default=held),
+        slide_n=_SLIDE_WEIGHTS * min(near, default=held),
         clearance=1e-3 * scene.clearance_mm,
         front=_front(scene, part, operation.moves, after, into.way) if searches and inserts else None,
     )

@@ -18,7 +18,7 @@ from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import awaken
 
-STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 class Kept(NamedTuple):
@@ -61,8 +61,8 @@ class Branches:
         awaken(robot.scene.work, robot.data)
         if mark not in self._kept:
             model, data = robot.model, robot.data
-            state = np.zeros(mujoco.mj_stateSize(model, STATE))
-            mujoco.mj_getState(model, data, state, STATE)
+            state = np.zeros(mujoco.mj_stateSize(model, _STATE))
+            mujoco.mj_getState(model, data, state, _STATE)
             self._kept[mark] = Kept(
                 state, data.sensordata.copy(), model.eq_data.copy(), robot.memory(), grip, tuple(after), tuple(timeline)
             )
@@ -73,7 +73,7 @@ class Branches:
             kept = self._kept.get(marks[i - 1])
             if kept is not None:
                 robot.model.eq_data[:] = kept.welds
-                mujoco.mj_setState(robot.model, robot.data, kept.state, STATE)
+                mujoco.mj_setState(robot.model, robot.data, kept.state, _STATE)
                 robot.data.sensordata[:] = kept.felt
                 awaken(robot.scene.work, robot.data)
                 robot.remember(kept.robot)

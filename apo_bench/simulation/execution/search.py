@@ -14,15 +14,15 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot.paths import moved, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 
-YAWS_DEG, YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
+_YAWS_DEG, _YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
 """Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
-BACK_M, BACK, BRING = 0.0005, 0.005, 0.03
+_BACK_M, _BACK, _BRING = 0.0005, 0.005, 0.03
 """Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
-DEEP_M = 0.001
+_DEEP_M = 0.001
 """What goes so much deeper than where it was stopped has found the hole."""
-SEARCHES = 3
+_SEARCHES = 3
 """A motion is searched for so many times at most, in one transfer up to twice as often."""
-PIECE_M, NOTHING_M = 0.01, 1e-6
+_PIECE_M, _NOTHING_M = 0.01, 1e-6
 """Giving way, the tip goes on in pieces of this length; less than the second is nothing."""
 
 
@@ -39,7 +39,7 @@ def press_in(
     if t.front is None:
         return left, None
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
-    for _ in range(SEARCHES):
+    for _ in range(_SEARCHES):
         if left <= near or aside >= RADIUS_M:
             break
         stopped = moved(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
@@ -47,7 +47,7 @@ def press_in(
         if more is None:
             break
         guard = Guard(more[:3, :3] @ guard.way, guard.newton)
-        more = moved(more, ease_in(robot, more @ end, guard), 1.0)
+        more = moved(more, _ease_in(robot, more @ end, guard), 1.0)
         found, end = after(found, more), more @ end
         left = float((end - robot.T)[:3, 3] @ guard.way)
         aside = float(np.linalg.norm((end - meant)[:3, 3]))
@@ -71,24 +71,24 @@ def search(robot: Robot, stopped: Array, front: Array, guard: Guard, press: floa
     Returns:
         What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
     """
-    off = moved(stopped, guard.way, -BACK_M)
-    for yaw in (0.0, *YAWS_DEG):
+    off = moved(stopped, guard.way, -_BACK_M)
+    for yaw in (0.0, *_YAWS_DEG):
         turn = _turned(yaw, front)
         _bring(robot, turn @ off, guard.way)
-        turned, far = Guard(turn[:3, :3] @ guard.way, guard.newton), min(radius, YAWED_RADIUS_M) if yaw else radius
-        spiral = Spiral(turned, press, far, BACK_M + DEEP_M, robot.step_s)
+        turned, far = Guard(turn[:3, :3] @ guard.way, guard.newton), min(radius, _YAWED_RADIUS_M) if yaw else radius
+        spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
         robot.servo(spiral)
         if spiral.found:
             return moved(turn, spiral.aside, 1.0)
     _bring(robot, off, guard.way)
-    robot.follow(smooth(robot.T, stopped, BACK), guard)
+    robot.follow(smooth(robot.T, stopped, _BACK), guard)
     return None
 
 
-def ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
+def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
     """Go on as deep as a tip pose, giving way across; returns how far aside of it that led, (3,), world, [m]."""
-    while (left := float((end - robot.T)[:3, 3] @ guard.way)) > NOTHING_M:
-        easing = Easing(guard, min(left, PIECE_M), robot.step_s)
+    while (left := float((end - robot.T)[:3, 3] @ guard.way)) > _NOTHING_M:
+        easing = Easing(guard, min(left, _PIECE_M), robot.step_s)
         robot.servo(easing)
         if easing.stopped:
             break
@@ -98,8 +98,8 @@ def ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
 
 def _bring(robot: Robot, T: Array, way: Array) -> None:
     """Back first, so that nothing is touched on the way."""
-    robot.follow(smooth(robot.T, moved(robot.T, way, -BACK_M), BACK))
-    robot.follow(smooth(robot.T, T, BRING))
+    robot.follow(smooth(robot.T, moved(robot.T, way, -_BACK_M), _BACK))
+    robot.follow(smooth(robot.T, T, _BRING))
 
 
 def _turned(yaw_deg: float, about: Array) -> Array:

@@ -12,17 +12,17 @@ from apo_bench.simulation.robot.robot import Guard
 
 RADIUS_M, PITCH_M = 0.002, 0.00035
 """How far off a hole is looked for; the turns are less far apart than the usual play of 0.5 mm is wide."""
-ACROSS, FEED, EASE = 0.01, 0.005, 0.02
+_ACROSS, _FEED, _EASE = 0.01, 0.005, 0.02
 """Speeds [m/s]: along the spiral, ahead where nothing pushes back, and ahead in a hole."""
-SOFT = 0.02
+_SOFT = 0.02
 """How fast the speed ahead grows, [m/s^2]: what lost touch by a few hundredths of a millimetre comes back softly."""
-YIELD = 0.0005
+_YIELD = 0.0005
 """How fast the tip gives way to a newton, [m/s/N]: the arm pushes with some 100 N per mm, and faster it rattles."""
-FELT_S = 0.01
+_FELT_S = 0.01
 """Forces are averaged over this time: hard parts rattle."""
-INNER_M = 0.0005
+_INNER_M = 0.0005
 """Inside this radius the spiral is slower: around its middle it would turn at once."""
-PATIENCE, DOWN_S = 3.0, 1.0
+_PATIENCE, _DOWN_S = 3.0, 1.0
 """A spiral ends after so many times the time that its length takes, and this long, [s], for the way ahead."""
 
 
@@ -44,7 +44,7 @@ class Spiral:
         first /= np.linalg.norm(first)
         self._axes = np.array([first, np.cross(guard.way, first)])
         self._force, self._ahead, self._speed, self._angle = np.zeros(3), 0.0, 0.0, 0.0
-        self._left = round((PATIENCE * np.pi * radius**2 / PITCH_M / ACROSS + DOWN_S) / step_s)
+        self._left = round((_PATIENCE * np.pi * radius**2 / PITCH_M / _ACROSS + _DOWN_S) / step_s)
         self.found = False
 
     @property
@@ -58,17 +58,17 @@ class Spiral:
 
     def __call__(self, force: Array) -> Array | None:
         """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
-        self._force += (force - self._force) * self.step_s / FELT_S
+        self._force += (force - self._force) * self.step_s / _FELT_S
         push = -float(self._force @ self.guard.way)
         side = float(np.linalg.norm(self._force + push * self.guard.way))
         self.found, self._left = self._ahead > self.deep, self._left - 1
         if self.found or self._r > self.radius or self._left < 0 or side > push + self.guard.newton:
             return None
         if push > self.press / 4:
-            self._speed = YIELD * (self.press - push)
-            self._angle += self.step_s * ACROSS / max(self._r, INNER_M)
+            self._speed = _YIELD * (self.press - push)
+            self._angle += self.step_s * _ACROSS / max(self._r, _INNER_M)
         else:
-            self._speed = min(max(self._speed, 0.0) + self.step_s * SOFT, FEED)
+            self._speed = min(max(self._speed, 0.0) + self.step_s * _SOFT, _FEED)
         self._ahead += self.step_s * self._speed
         return self.aside + self._ahead * self.guard.way
 
@@ -83,12 +83,12 @@ class Easing:
 
     def __call__(self, force: Array) -> Array | None:
         """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
-        self._force += (force - self._force) * self.step_s / FELT_S
+        self._force += (force - self._force) * self.step_s / _FELT_S
         push = -float(self._force @ self.guard.way)
         self.stopped = push > self.guard.newton
         if self.stopped or self._ahead >= self.length:
             return None
-        ahead = min(self.step_s * EASE, self.length - self._ahead)
-        across = self.step_s * YIELD * (self._force + push * self.guard.way)
+        ahead = min(self.step_s * _EASE, self.length - self._ahead)
+        across = self.step_s * _YIELD * (self._force + push * self.guard.way)
         self._ahead, self._offset = self._ahead + ahead, self._offset + across + ahead * self.guard.way
         return self._offset

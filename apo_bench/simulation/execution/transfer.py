@@ -15,7 +15,7 @@ from apo_bench.simulation.robot.paths import at_height, moved
 UP = np.array([0.0, 0.0, 1.0])
 SAFE_M = 0.15
 """Least height of the tip at which parts are carried over the others."""
-HOVER_M = 0.11
+_HOVER_M = 0.11
 """So far above a grasp the hand comes to a stand."""
 ASIDE_M = 0.006
 """A slide begins this far from the side it shall touch; what touches at its side is moved off as far before it is
@@ -132,4 +132,4 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 
 
 def hover(grasp: Array) -> float:
-    return float(grasp[2, 3]) + HOVER_M
+    return float(grasp[2, 3]) + _HOVER_M

@@ -15,7 +15,7 @@ from apo_bench.insertion.surroundings import OVER_M, ends_of, slides
 from apo_bench.scenario.nominal import understood
 from apo_bench.scenario.scenario import Scenario
 
-SIDE_M = 0.002
+_SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
 
 
@@ -67,7 +67,7 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         way=way,
         travel=what.after.line.travel_m,
         out=_out(scenario.assembly, what.before, stages[k]),
-        aside=SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
+        aside=_SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
         over=_over(scenario.assembly, operation.main, operation.moves, stages[k]),
@@ -85,7 +85,7 @@ def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
     way = poses[before.main][:3, :3] @ before.line.direction
     if before.touched and abs(way[2]) < 0.5:
         return np.asarray(-before.line.travel_m * way)
-    return SIDE_M * _off(slides(assembly, before, poses))
+    return _SIDE_M * _off(slides(assembly, before, poses))
 
 
 def _off(sides: tuple[Array, ...]) -> Array:

@@ -10,23 +10,23 @@ from apo_bench.simulation.human.acts import Act
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot.paths import Line, at_height, minimum_jerk, moved, smooth
 
-UP = np.array([0.0, 0.0, 1.0])
-SPEED = 0.9
+_UP = np.array([0.0, 0.0, 1.0])
+_SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
-STROKE = 0.15
+_STROKE = 0.15
 """Peak speed of a hand that brings a part to its place, [m/s]."""
-SHIFT = 0.03
+_SHIFT = 0.03
 """Peak speed of a small adjustment, and of coming to lie against another part, [m/s]."""
-NUDGE = 0.01
+_NUDGE = 0.01
 """Peak speed of lifting and lowering a part for an adjustment, [m/s]."""
-SAFE_M = 0.16
+_SAFE_M = 0.16
 """Least height at which parts are carried over the others."""
-DROP_M = 0.0002
+_DROP_M = 0.0002
 """A part is let go this much above its support, as nobody presses it into the table."""
-LIFT_M = 0.0003
+_LIFT_M = 0.0003
 """How far a part is lifted while it is adjusted, so that it does not drag the one below."""
 REST_S = 0.3
-SETTLE_S = 0.15
+_SETTLE_S = 0.15
 """A group trails behind a quick hand by a millimetre; so long it takes to catch up."""
 
 
@@ -38,16 +38,16 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
     before, beside, goal = _ends(hands, act, T)
     if act.out.any():
         T = _free(hands, T, act.out, clearance_m)
-    safe = max(SAFE_M, act.over, before[2, 3])
+    safe = max(_SAFE_M, act.over, before[2, 3])
     for end in (at_height(T, max(safe, T[2, 3])), at_height(before, safe), before):
-        hands.move((0, smooth(T, end, SPEED, turn_speed=4.0)))
+        hands.move((0, smooth(T, end, _SPEED, turn_speed=4.0)))
         T = end
     for part in (part for part in act.late if part in act.carries):
-        hands.wait(SETTLE_S)
+        hands.wait(_SETTLE_S)
         _shift_carried(hands, act, part, clearance_m)
-    _bring(hands, act, smooth(before, beside, STROKE))
+    _bring(hands, act, smooth(before, beside, _STROKE))
     if act.aside.any():
-        hands.move((0, smooth(beside, goal, SHIFT)))
+        hands.move((0, smooth(beside, goal, _SHIFT)))
         hands.wait(0.05)
     hands.let_go(0, act.part, *act.carries)
     hands.wait(REST_S)
@@ -55,9 +55,9 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
 
 def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
     """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
-    raised = moved(T, UP, clearance_m)
-    hands.move((0, smooth(T, raised, NUDGE)))
-    hands.move((0, smooth(raised, moved(raised, out, 1.0), STROKE)))
+    raised = moved(T, _UP, clearance_m)
+    hands.move((0, smooth(T, raised, _NUDGE)))
+    hands.move((0, smooth(raised, moved(raised, out, 1.0), _STROKE)))
     return moved(raised, out, 1.0)
 
 
@@ -65,7 +65,7 @@ def _ends(hands: Hands, act: Act, T: Array) -> tuple[Array, Array, Array]:
     """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go."""
     goal = act.target
     if act.from_above:
-        goal = moved(act.target, UP, DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
+        goal = moved(act.target, _UP, _DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
     beside = moved(goal, act.aside, 1.0) if act.aside.any() else goal
     return moved(moved(act.target, act.way, -act.travel), act.aside, 1.0), beside, goal
 
@@ -80,11 +80,11 @@ def _bring(hands: Hands, act: Act, stroke: Line) -> None:
     """The last motion; the other hand adjusts what is displaced on the way, the last of it while the part arrives."""
     standing = [part for part in act.late if part not in act.carries]
     for part in standing[:-1]:
-        _adjust(hands, part, act.true[part], LIFT_M, ())
+        _adjust(hands, part, act.true[part], _LIFT_M, ())
         hands.let_go(1, part)
     if standing:
-        _adjust(hands, standing[-1], act.true[standing[-1]], LIFT_M, ((0, _first(stroke, 0.15)),))
-        hands.move((0, smooth(_first(stroke, 0.15).end, stroke.end, STROKE)))
+        _adjust(hands, standing[-1], act.true[standing[-1]], _LIFT_M, ((0, _first(stroke, 0.15)),))
+        hands.move((0, smooth(_first(stroke, 0.15).end, stroke.end, _STROKE)))
     else:
         hands.move((0, stroke))
     hands.wait(0.05)
@@ -109,9 +109,9 @@ def _adjust(
     if held:
         hands.let_go(0, part)
     there = at_height(true, here[2, 3])
-    hands.move((1, smooth(here, moved(here, UP, lift), NUDGE)))
-    hands.move((1, smooth(moved(here, UP, lift), moved(there, UP, lift), SHIFT)), *meanwhile)
-    hands.move((1, smooth(moved(there, UP, lift), there, NUDGE)))
+    hands.move((1, smooth(here, moved(here, _UP, lift), _NUDGE)))
+    hands.move((1, smooth(moved(here, _UP, lift), moved(there, _UP, lift), _SHIFT)), *meanwhile)
+    hands.move((1, smooth(moved(there, _UP, lift), there, _NUDGE)))
 
 
 def _first(stroke: Line, fraction: float) -> Line:

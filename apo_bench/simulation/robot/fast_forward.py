@@ -10,7 +10,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.world import World, part_pose, place
 
-TINY_S = 1e-4
+_TINY_S = 1e-4
 """Speeds of the tip are differences over this time."""
 
 
@@ -34,11 +34,11 @@ def leap(
     at, dof = joints
     before = forward(data.qpos[at])
     q = data.qpos[at] + by
-    after, later = forward(q), forward(q + TINY_S * velocity)
+    after, later = forward(q), forward(q + _TINY_S * velocity)
     data.qpos[at], data.qvel[dof] = q, velocity
     way = after @ pose.inverse(before)
-    speed = (later[:3, 3] - after[:3, 3]) / TINY_S
-    spin = after[:3, :3] @ pose.log(pose.inverse(after) @ later)[3:] / TINY_S
+    speed = (later[:3, 3] - after[:3, 3]) / _TINY_S
+    spin = after[:3, :3] @ pose.log(pose.inverse(after) @ later)[3:] / _TINY_S
     for part in held:
         T = way @ part_pose(world, data, part)
         place(world, data, part, T)

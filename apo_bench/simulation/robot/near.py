@@ -19,20 +19,20 @@ from apo_bench.simulation.robot.paths import Line
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import Ints, part_pose
 
-NEAR_M, NEAR_GROUP_M = 0.00015, 0.002
+NEAR_M, _NEAR_GROUP_M = 0.00015, 0.002
 """A part drifts by less than the first in a hand; parts of a group have that much play and more in each other."""
-APART_M = 0.001
+_APART_M = 0.001
 """Looks along a line are this far apart."""
-RUN_UP_S = 0.04
+_RUN_UP_S = 0.04
 """A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
-SHORTEST_S = 0.05
+_SHORTEST_S = 0.05
 """Less than this is not worth leaving out."""
-STILL_M_S, STILL_RAD_S = 1e-3, 2e-2
+_STILL_M_S, _STILL_RAD_S = 1e-3, 2e-2
 """While anything that nobody holds moves faster, nothing is left out."""
-UPRIGHT = 1e-6
+_UPRIGHT = 1e-6
 
-Flags = NDArray[np.bool_]
-Span = tuple[int, int]
+_Flags = NDArray[np.bool_]
+_Span = tuple[int, int]
 """The first and the last of the points of a line that are simulated."""
 
 
@@ -45,7 +45,7 @@ class Moving(NamedTuple):
 
 def near_spans(
     scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], line: Line, s: Array
-) -> list[Span]:
+) -> list[_Span]:
     """The stretches of a line along which something comes near, each with its run-up.
 
     Args:
@@ -58,10 +58,10 @@ def near_spans(
     if not _still(scene, data, others):
         return [(0, n)]
     far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
-    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, 1.0, APART_M / max(far, APART_M))), n))
+    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, 1.0, _APART_M / max(far, _APART_M))), n))
     poses = {part: _pose(scene, data, part) for part in others}
     obstacles = {part: (scene.boxes[part], T) for part, T in poses.items()}
-    near = _near(moving, obstacles, line, s[looks], NEAR_M if len(held) < 2 else NEAR_GROUP_M)
+    near = _near(moving, obstacles, line, s[looks], NEAR_M if len(held) < 2 else _NEAR_GROUP_M)
     return _spans(near, looks, n, float(scene.physics.timestep_s))
 
 
@@ -76,11 +76,11 @@ def _near(
     line: Line,
     s: Array,
     margin: float,
-) -> Flags:
+) -> _Flags:
     """(k,), at which places along the line something is near."""
     angle = float(np.linalg.norm(line.turn))
-    turning = angle > UPRIGHT
-    if turning and abs((line.start[:3, :3] @ line.turn)[2]) < (1.0 - UPRIGHT) * angle:
+    turning = angle > _UPRIGHT
+    if turning and abs((line.start[:3, :3] @ line.turn)[2]) < (1.0 - _UPRIGHT) * angle:
         return np.ones(len(s), dtype=np.bool_)
     R, tips = line.start[:3, :3], line.start[:3, 3] + s[:, None] * (line.end[:3, 3] - line.start[:3, 3])
     near = np.zeros(len(s), dtype=np.bool_)
@@ -105,10 +105,10 @@ def _swept(low: Array, high: Array) -> tuple[Array, Array]:
     return np.array([-reach, -reach, low[2]]), np.array([reach, reach, high[2]])
 
 
-def _spans(near: Flags, looks: Ints, n: int, step_s: float) -> list[Span]:
+def _spans(near: _Flags, looks: Ints, n: int, step_s: float) -> list[_Span]:
     """Stretches that are near, begun earlier by the run-up, as one where little lies between."""
-    run_up, shortest = round(RUN_UP_S / step_s), round(SHORTEST_S / step_s)
-    spans: list[Span] = []
+    run_up, shortest = round(_RUN_UP_S / step_s), round(_SHORTEST_S / step_s)
+    spans: list[_Span] = []
     for i in map(int, np.flatnonzero(near)):
         begin, end = int(looks[max(i - 1, 0)]) - run_up, int(looks[min(i + 1, len(looks) - 1)])
         begin = 0 if begin < shortest else begin
@@ -123,7 +123,7 @@ def _spans(near: Flags, looks: Ints, n: int, step_s: float) -> list[Span]:
 def _still(scene: Scene, data: Any, parts: Iterable[str]) -> bool:
     starts = [scene.work.dof[part] for part in parts if part in scene.work.dof]
     speeds = np.abs(np.array([data.qvel[v : v + 6] for v in starts]).reshape(-1, 6))
-    return not len(speeds) or bool(speeds[:, :3].max() < STILL_M_S and speeds[:, 3:].max() < STILL_RAD_S)
+    return not len(speeds) or bool(speeds[:, :3].max() < _STILL_M_S and speeds[:, 3:].max() < _STILL_RAD_S)
 
 
 def _pose(scene: Scene, data: Any, part: str) -> Array:

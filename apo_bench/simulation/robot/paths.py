@@ -12,9 +12,9 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-PEAK = 1.875
+_PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
-STRAIGHT = 1e-8
+_STRAIGHT = 1e-8
 """Rotations this near to none are as good as their antisymmetric part, which is quick to have."""
 
 
@@ -32,7 +32,7 @@ class Line:
     @cached_property
     def turn(self) -> Array:
         """The rotation vector from start to end, (3,), in the frame of the start, [rad]."""
-        return turn_between(self.start, self.end)
+        return _turn_between(self.start, self.end)
 
     def poses(self, s: Array) -> Array:
         """(k,) parts of the way -> (k, 4, 4)."""
@@ -47,8 +47,8 @@ class Line:
 def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5, shortest: float = 0.15) -> Line:
     """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
     far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    turn = float(np.linalg.norm(turn_between(start, end)))
-    return Line(start, end, max(shortest, PEAK * far / speed, PEAK * turn / turn_speed), minimum_jerk)
+    turn = float(np.linalg.norm(_turn_between(start, end)))
+    return Line(start, end, max(shortest, _PEAK * far / speed, _PEAK * turn / turn_speed), minimum_jerk)
 
 
 def steady(start: Array, end: Array, speed: float, ramp: float = 0.1) -> Line:
@@ -76,10 +76,10 @@ class _Trapezoid:
         return s / top
 
 
-def turn_between(start: Array, end: Array) -> Array:
+def _turn_between(start: Array, end: Array) -> Array:
     """The rotation vector from one pose to another, (3,), in the frame of the first, [rad]."""
     R = start[:3, :3].T @ end[:3, :3]
-    if np.abs(R - np.eye(3)).max() < STRAIGHT:
+    if np.abs(R - np.eye(3)).max() < _STRAIGHT:
         return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
     T = np.eye(4)
     T[:3, :3] = R

@@ -9,9 +9,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.robot.paths import Line
 from apo_bench.simulation.scene.arm import Kinematics
 
-KNOT_M, KNOT_RAD = 0.03, 0.15
+_KNOT_M, _KNOT_RAD = 0.03, 0.15
 """Inverse kinematics is solved at least this densely along a line."""
-FAR_M, FAR_RAD = 0.1, 0.5
+_FAR_M, _FAR_RAD = 0.1, 0.5
 """So densely where only the joint angles at the end are asked for."""
 
 
@@ -24,7 +24,7 @@ def along(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | Non
     """
     if len(s) == 1:
         return np.asarray(q)[None]
-    count = max(4, int(np.ceil((s[-1] - s[0]) * _steps(line, KNOT_M, KNOT_RAD))) + 1)
+    count = max(4, int(np.ceil((s[-1] - s[0]) * _steps(line, _KNOT_M, _KNOT_RAD))) + 1)
     at = np.linspace(s[0], s[-1], count)
     found = _angles(kinematics, line, at, q)
     return None if found is None else np.asarray(CubicSpline(at, found)(s))
@@ -32,7 +32,7 @@ def along(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | Non
 
 def at_end(kinematics: Kinematics, line: Line, begin: float, end: float, q: Array) -> Array | None:
     """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
-    count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, FAR_M, FAR_RAD))))
+    count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, _FAR_M, _FAR_RAD))))
     found = _angles(kinematics, line, np.linspace(begin, end, count), q)
     return None if found is None else np.asarray(found[-1])
 

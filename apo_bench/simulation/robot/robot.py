@@ -26,9 +26,9 @@ from apo_bench.simulation.scene.world import fresh, part_pose, timestep, unfelt,
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
-COLLISION_N = 20.0
+_COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
-SHIFT_M = 0.001
+_SHIFT_M = 0.001
 """How far the tip is shifted in thought to see how the joints turn."""
 
 Watch = Callable[[Any], None]
@@ -132,8 +132,8 @@ class Robot:
     def _across(self, q: Array, T: Array, axis: Array) -> Array:
         """How the joints turn while the tip is shifted, (joints,), [rad/m]; as good as exact over some millimetres."""
         inverse = self.scene.kinematics.inverse
-        ends = [self._reached(inverse(moved(T, axis, by), q)) for by in (-SHIFT_M, SHIFT_M)]
-        return np.asarray((ends[1] - ends[0]) / (2 * SHIFT_M))
+        ends = [self._reached(inverse(moved(T, axis, by), q)) for by in (-_SHIFT_M, _SHIFT_M)]
+        return np.asarray((ends[1] - ends[0]) / (2 * _SHIFT_M))
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still; each physics step may be taken in so many parts."""
@@ -275,7 +275,7 @@ class Robot:
             raise Halt(self.stage, "unstable_simulation")
         self._feel()
         struck, force = self._hardest_blow()
-        if force > COLLISION_N:
+        if force > _COLLISION_N:
             raise Halt(self.stage, "collision", struck)
         if self.watch is not None:
             self.watch(self.data)

@@ -63,7 +63,7 @@ def six_axis() -> Arm:
     )
 
 
-ARMS = {"six_axis": six_axis}
+_ARMS = {"six_axis": six_axis}
 
 
 def find_arm(given: str | Arm) -> Arm:
@@ -83,9 +83,9 @@ def find_arm(given: str | Arm) -> Arm:
         if not isinstance(made, Arm):
             raise InputError(f"the arm '{given}' is a {type(made).__name__}; an `Arm`, or a function that returns one.")
         return made
-    if given not in ARMS:
-        raise InputError(unknown("arm", given, ARMS) + " Or give your own as 'package.module:name'.")
-    return ARMS[given]()
+    if given not in _ARMS:
+        raise InputError(unknown("arm", given, _ARMS) + " Or give your own as 'package.module:name'.")
+    return _ARMS[given]()
 
 
 class Kinematics:

@@ -18,7 +18,7 @@ from typing import Any
 
 from apo_bench.errors import InputError
 
-VARIABLE = "MUJOCO_GL"
+_VARIABLE = "MUJOCO_GL"
 
 
 def import_mujoco() -> None:
@@ -43,15 +43,15 @@ def import_mjcf() -> Any:
 
 @contextmanager
 def _without_backend() -> Iterator[None]:
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = "disable"
+    before = os.environ.get(_VARIABLE)
+    os.environ[_VARIABLE] = "disable"
     try:
         yield
     finally:
         if before is None:
-            del os.environ[VARIABLE]
+            del os.environ[_VARIABLE]
         else:
-            os.environ[VARIABLE] = before
+            os.environ[_VARIABLE] = before
 
 
 def _choose_later(module: ModuleType, source: ModuleType, *names: str) -> None:
@@ -65,7 +65,7 @@ def _choose_later(module: ModuleType, source: ModuleType, *names: str) -> None:
         if name not in vars(source):
             importlib.reload(source)
         if name not in vars(source):
-            raise AttributeError(f"{VARIABLE}={os.environ.get(VARIABLE)} turns pictures off")
+            raise AttributeError(f"{_VARIABLE}={os.environ.get(_VARIABLE)} turns pictures off")
         return vars(source)[name]
 
     vars(module)["__getattr__"] = chosen
@@ -81,8 +81,8 @@ def renderer(model: Any, width: int, height: int) -> Any:
         import mujoco
         from mujoco.rendering.classic import gl_context
 
-        if VARIABLE not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-            os.environ[VARIABLE] = "egl"
+        if _VARIABLE not in os.environ and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+            os.environ[_VARIABLE] = "egl"
             importlib.reload(gl_context)  # where somebody else imported MuJoCo it has chosen already
         if gl_context.GLContext.__module__ == "mujoco.glfw" and (why := _no_window()):
             raise RuntimeError(why)  # drawing without a display, MuJoCo ends the process at the second try
@@ -91,8 +91,8 @@ def renderer(model: Any, width: int, height: int) -> Any:
         raise
     except Exception as error:
         reason = _reason(error)
-        if VARIABLE in os.environ and VARIABLE not in reason:
-            reason = f"{VARIABLE}={os.environ[VARIABLE]}: {reason}"
+        if _VARIABLE in os.environ and _VARIABLE not in reason:
+            reason = f"{_VARIABLE}={os.environ[_VARIABLE]}: {reason}"
         raise InputError(
             f"no picture can be drawn here ({reason}); without a display install libegl1 and "
             "libgl1-mesa-dri (Debian) and set MUJOCO_GL=egl."

@@ -12,13 +12,13 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
 
-Color = tuple[float, float, float]
-WIDTH_M = 0.0035
-PIECES = 48
+_Color = tuple[float, float, float]
+_WIDTH_M = 0.0035
+_PIECES = 48
 """Straight pieces of a whole ring."""
-SWEEP_RAD = np.radians(304.0)
-HEAD_M = 0.022
-NAME_M = 0.011
+_SWEEP_RAD = np.radians(304.0)
+_HEAD_M = 0.022
+_NAME_M = 0.011
 """How far beyond its mark a name stands."""
 _NOWHERE, _UPRIGHT = np.zeros(3), np.eye(3).ravel()
 
@@ -36,7 +36,7 @@ class Shift:
     """How far from the centre they begin."""
     outer_m: float
     """How far from it they end."""
-    color: Color
+    color: _Color
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -46,7 +46,7 @@ class Shift:
     @property
     def tips(self) -> Array:
         """Where its name may stand, (2, 3)."""
-        return self.center + np.outer((-1.0, 1.0), (self.outer_m + NAME_M) * self.axis)
+        return self.center + np.outer((-1.0, 1.0), (self.outer_m + _NAME_M) * self.axis)
 
 
 @final
@@ -61,7 +61,7 @@ class Turn:
     away: Array
     """(3,), world frame: where the ring is open."""
     radius_m: float
-    color: Color
+    color: _Color
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -72,7 +72,7 @@ class Turn:
     @property
     def tips(self) -> Array:
         """Where its name may stand, (1, 3): at the opening, a little outside."""
-        return (self.center - (self.radius_m + NAME_M) * _frame(self)[0])[None]
+        return (self.center - (self.radius_m + _NAME_M) * _frame(self)[0])[None]
 
 
 @final
@@ -104,13 +104,13 @@ def _shift(scene: Any, mark: Shift) -> None:
 
 def _turn(scene: Any, mark: Turn) -> None:
     u, v = _frame(mark)
-    angles = np.linspace(-SWEEP_RAD / 2, SWEEP_RAD / 2, PIECES + 1)
+    angles = np.linspace(-_SWEEP_RAD / 2, _SWEEP_RAD / 2, _PIECES + 1)
     points = mark.center + mark.radius_m * (np.outer(np.cos(angles), u) + np.outer(np.sin(angles), v))
     for a, b in pairwise(points):
-        _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, mark.color, WIDTH_M / 2)
+        _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, mark.color, _WIDTH_M / 2)
     for end, before in ((points[0], points[1]), (points[-1], points[-2])):
         along = (end - before) / np.linalg.norm(end - before)
-        _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, end - 1e-3 * along, end + HEAD_M * along, mark.color)
+        _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, end - 1e-3 * along, end + _HEAD_M * along, mark.color)
 
 
 def _frame(mark: Turn) -> tuple[Array, Array]:
@@ -123,7 +123,7 @@ def _frame(mark: Turn) -> tuple[Array, Array]:
     return u, np.cross(mark.axis, u)
 
 
-def _connect(scene: Any, kind: Any, a: Array, b: Array, color: Color, width_m: float = WIDTH_M) -> None:
+def _connect(scene: Any, kind: Any, a: Array, b: Array, color: _Color, width_m: float = _WIDTH_M) -> None:
     if scene.ngeom >= scene.maxgeom:
         return
     geom = scene.geoms[scene.ngeom]

@@ -18,10 +18,10 @@ from apo_bench.simulation.scene.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, fresh, place
 
-Image = NDArray[np.uint8]
+_Image = NDArray[np.uint8]
 Camera = Any
 """The name of a camera of the room, or a `mujoco.MjvCamera`."""
-VIDEO_ENDINGS = (".mp4", ".gif")
+_VIDEO_ENDINGS = (".mp4", ".gif")
 
 
 def picture(
@@ -31,7 +31,7 @@ def picture(
     height: int = 480,
     camera: Camera = "overview",
     more: Callable[[Any], None] | None = None,
-) -> Image:
+) -> _Image:
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
 
     Args:
@@ -48,7 +48,7 @@ def picture_with_arm(
     width: int = 640,
     height: int = 480,
     camera: Camera = "overview",
-) -> Image:
+) -> _Image:
     """The same with the arm, at home with its fingers open, (height, width, 3).
 
     Args:
@@ -94,7 +94,7 @@ class Film:
         """
         middle = np.array([*scene.scenario.site.center_m, 0.08])
         self.fps, self.camera = fps, camera or view(middle, 0.85, 128.0, -24.0)
-        self.frames: list[Image] = []
+        self.frames: list[_Image] = []
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._close = weakref.finalize(self, _release, self._renderer)
@@ -105,7 +105,7 @@ class Film:
             self.frames.append(self.shot(data))
             self._next = data.time + self._every - 1e-9
 
-    def shot(self, data: Any) -> Image:
+    def shot(self, data: Any) -> _Image:
         """One picture of the present state, not kept."""
         self._renderer.update_scene(data, camera=self.camera)
         return np.array(self._renderer.render())
@@ -123,7 +123,7 @@ class Film:
         self._close()
 
 
-def save_film(frames: Iterable[Image], path: str | Path, fps: float) -> None:
+def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
     """Write pictures as a film, MP4 or GIF by the ending.
 
     Raises:
@@ -132,7 +132,7 @@ def save_film(frames: Iterable[Image], path: str | Path, fps: float) -> None:
     import imageio.v3 as imageio
 
     path = Path(path)
-    if path.suffix.lower() not in VIDEO_ENDINGS:
+    if path.suffix.lower() not in _VIDEO_ENDINGS:
         raise InputError(f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.")
     how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
     if path.suffix.lower() == ".mp4":
@@ -175,7 +175,7 @@ class Viewer:
 
 def _drawn(
     world: World, data: Any, width: int, height: int, camera: Camera, more: Callable[[Any], None] | None = None
-) -> Image:
+) -> _Image:
     with renderer(world.model, width, height) as draws:
         draws.update_scene(data, camera=camera)
         if more is not None:

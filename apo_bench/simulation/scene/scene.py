@@ -23,11 +23,11 @@ from apo_bench.simulation.scene.physics import Physics, physics
 from apo_bench.simulation.scene.world import World, world
 
 GRASPS = ("friction", "weld")
-Grasp = Literal["friction", "weld"]
+_Grasp = Literal["friction", "weld"]
 HANDS = ("hand0", "hand1")
-HAND_WELD = {"solref": (0.01, 1.0), "solimp": (0.95, 0.99, 0.001, 0.5, 2.0)}
+_HAND_WELD = {"solref": (0.01, 1.0), "solimp": (0.95, 0.99, 0.001, 0.5, 2.0)}
 """Soft like a hand: a part held by it yields a little and is not torn through its neighbours."""
-ARM_WELD = {"solref": (0.004, 1.0), "solimp": (0.98, 0.999, 0.0005, 0.5, 2.0)}
+_ARM_WELD = {"solref": (0.004, 1.0), "solimp": (0.98, 0.999, 0.0005, 0.5, 2.0)}
 
 
 @final
@@ -37,7 +37,7 @@ class Scene:
 
     scenario: Scenario
     clearance_mm: float
-    grasp: Grasp
+    grasp: _Grasp
     arm: Arm
     physics: Physics
     boxes: Mapping[str, tuple[Box, ...]]
@@ -169,7 +169,7 @@ def _add_hands(room: Any, movable: Mapping[str, Any]) -> None:
         mocap = room.worldbody.add("body", name=hand, mocap=True, pos=(0.0, 0.5 + 0.1 * i, 0.3))
         mocap.add("geom", type="sphere", size=(0.012,), contype=0, conaffinity=0, rgba=(0.90, 0.70, 0.60, 0.7))
         for part, body in movable.items():
-            room.equality.add("weld", name=f"{hand}_{part}", body1=mocap, body2=body, active=False, **HAND_WELD)
+            room.equality.add("weld", name=f"{hand}_{part}", body1=mocap, body2=body, active=False, **_HAND_WELD)
 
 
 def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings: Physics) -> None:
@@ -179,7 +179,7 @@ def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings
     room.attach(model).pos = arm.base
     mount = model.find("body", arm.mount)
     for part, body in welded.items():
-        room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **ARM_WELD)
+        room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **_ARM_WELD)
 
 
 def _with_force_sensors(xml: str, scenario: Scenario, arm: Arm | None) -> str:

@@ -16,7 +16,7 @@ from apo_bench.geometry.arrays import Array
 
 Ints = NDArray[np.int64]
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
 
 @final
@@ -120,7 +120,7 @@ def timestep(model: Any, seconds: float) -> Iterator[None]:
 def unfelt(model: Any) -> Iterator[None]:
     """Steps after which no sensor is asked: they need not be computed for a while."""
     before = int(model.opt.disableflags)
-    model.opt.disableflags = before | NO_SENSORS
+    model.opt.disableflags = before | _NO_SENSORS
     try:
         yield
     finally:

@@ -13,7 +13,7 @@ from apo_bench.depth_camera.view import View
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.world import World
 
-AWAY_M = -5.0
+_AWAY_M = -5.0
 """Hands are put this deep below the floor before anything is looked at."""
 
 
@@ -46,7 +46,7 @@ class Sight:
     def look(self, qpos: Array) -> None:
         """Put all parts where a simulation has them."""
         self._own.qpos[:] = qpos
-        self._own.mocap_pos[:, 2] = AWAY_M
+        self._own.mocap_pos[:, 2] = _AWAY_M
         mujoco.mj_kinematics(self._model, self._own)
 
     def strike(self, view: View) -> Strike:
@@ -65,7 +65,7 @@ class Sight:
     def _fixed_parts(self, view: View) -> Strike:
         moving = self._model.body_weldid[self._model.geom_bodyid] != 0
         places = np.array(self._own.geom_xpos)
-        self._own.geom_xpos[moving, 2] = AWAY_M
+        self._own.geom_xpos[moving, 2] = _AWAY_M
         geom, distance, normal = self._cast(view, fixed=True)
         self._own.geom_xpos[:] = places
         cosine = np.abs(np.einsum("ni,ni->n", normal, view.rays))

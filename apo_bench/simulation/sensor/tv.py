@@ -13,15 +13,15 @@ from apo_bench.depth_camera.view import View, looking
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.sensor.rays import Strike
 
-LIGHT = np.array([0.25, -0.35, 1.0]) / np.linalg.norm([0.25, -0.35, 1.0])
+_LIGHT = np.array([0.25, -0.35, 1.0]) / np.linalg.norm([0.25, -0.35, 1.0])
 """Where the light comes from: that of the room."""
-AMBIENT = 0.4
-LUMA = np.array([0.299, 0.587, 0.114])
-BACKGROUND = 0.9
+_AMBIENT = 0.4
+_LUMA = np.array([0.299, 0.587, 0.114])
+_BACKGROUND = 0.9
 
 
 @lru_cache(maxsize=1)
-def front_view() -> View:
+def _front_view() -> View:
     """Obliquely from the front, 160 x 120: a pixel is 6 mm wide, and a motion of some millimetres changes few."""
     return View(looking((0.85, -0.35, 0.75), MIDDLE_M), 160, 120, 45.0)
 
@@ -31,7 +31,7 @@ def front_view() -> View:
 class TvCamera:
     """How it sees, and when it calls something a change."""
 
-    view: View = field(default_factory=front_view)
+    view: View = field(default_factory=_front_view)
     noise: float = 2.0 / 255.0
     """Standard deviation of the brightness of a pixel, where white is 1."""
     changed: float = 12.0 / 255.0
@@ -51,9 +51,9 @@ class TvCamera:
         Args:
             rgba: (geoms, 4).
         """
-        lit = AMBIENT + (1.0 - AMBIENT) * np.maximum(strike.normal @ LIGHT, 0.0)
-        grey = np.append(rgba[:, :3] @ LUMA, BACKGROUND)[strike.geom]
-        return np.where(strike.geom < 0, BACKGROUND, grey * lit)
+        lit = _AMBIENT + (1.0 - _AMBIENT) * np.maximum(strike.normal @ _LIGHT, 0.0)
+        grey = np.append(rgba[:, :3] @ _LUMA, _BACKGROUND)[strike.geom]
+        return np.where(strike.geom < 0, _BACKGROUND, grey * lit)
 
 
 @final

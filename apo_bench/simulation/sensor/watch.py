@@ -13,7 +13,7 @@ from apo_bench.simulation.scene.world import World
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.tv import Change, TvCamera
 
-STILL = 5e-5
+_STILL = 5e-5
 """Where no coordinate has changed by more, [m] or of a quaternion, the picture is the same."""
 
 
@@ -72,7 +72,7 @@ class Watcher:
 
     def _picture(self, qpos: Array) -> Array:
         """The next picture of the TV camera; where nothing moved only its noise is new."""
-        if self._drawn is None or np.abs(qpos - self._drawn[0]).max() > STILL:
+        if self._drawn is None or np.abs(qpos - self._drawn[0]).max() > _STILL:
             self._drawn = np.array(qpos), self._grey(qpos)
         grey = self._drawn[1]
         return np.asarray(grey + self.camera.noise * self._rng.standard_normal(len(grey)))
