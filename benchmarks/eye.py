@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.placement import placed
-from apo_bench.depth_camera.distance import joined, shape_of, struck
+from apo_bench.assembly.placement import placements
+from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose
 from apo_bench.geometry.clearance import physical_boxes
@@ -67,7 +67,7 @@ def noticed(scene: Scene, shown: Shown, event: Event) -> int:
     Per part some 1500 can be seen in both views together.
     """
     parts, demonstration = shifted(shown), shown.demonstration
-    stages = (demonstration.start, *placed(demonstration.assembly, demonstration.start, demonstration.goals))
+    stages = (demonstration.start, *placements(demonstration.assembly, demonstration.start, demonstration.goals))
     solids, play = scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm
     count = 0
     for view, region in zip(shown.watched.finder.views, event.regions, strict=True):
@@ -75,7 +75,7 @@ def noticed(scene: Scene, shown: Shown, event: Event) -> int:
             shapes = [shape_of(physical_boxes(solids[part], play), poses[part]) for part in solids]
             owner = np.concatenate([[part] * len(shape.center) for part, shape in zip(solids, shapes, strict=True)])
             pixels = np.flatnonzero(mask)
-            _, box = struck(joined(shapes), view.origin, view.rays[pixels])
+            _, box = strike_distances(join_shapes(shapes), view.origin, view.rays[pixels])
             count += int(np.isin(owner[box[box >= 0]], list(parts)).sum())
     return count
 

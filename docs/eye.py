@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.show.eye_one import see_once
+from apo_bench.show.eye_one import run_sensor
 from apo_bench.show.eye_picture import draw_eye
 
 HERE = Path(__file__).parent
@@ -14,7 +14,7 @@ SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}
 
 def main() -> None:
     for scenario, seed in SHOWN.items():
-        draw_eye(see_once(scenario, 1.0, seed, 1.0), HERE / "pictures" / f"eye_{scenario}.png")
+        draw_eye(run_sensor(scenario, 1.0, seed, 1.0), HERE / "pictures" / f"eye_{scenario}.png")
 
 
 if __name__ == "__main__":

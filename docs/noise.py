@@ -9,7 +9,14 @@ import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
-from apo_bench.show.noise_card import SCENARIO, demonstrated, described, draw, listed, measured
+from apo_bench.show.noise_card import (
+    SCENARIO,
+    draw_errors,
+    drawn_sentence,
+    listed_models,
+    model_description,
+    nominal_demonstration,
+)
 from apo_bench.show.noise_picture import draw_histogram
 
 HERE = Path(__file__).parent
@@ -63,7 +70,7 @@ does not explain the correction. All relations are right, so that is a false ala
 
 def row(name: str) -> str:
     """What `contact` makes of one model, as a line of the table."""
-    shown, noise = demonstrated(), make_noise(name, LEVEL)
+    shown, noise = nominal_demonstration(), make_noise(name, LEVEL)
     whole, fails, seen_off, off = 0, 0, [], []
     for seed in range(TRIALS):
         seen = observe(shown, noise, np.random.default_rng([seed, 2]))
@@ -80,23 +87,25 @@ def row(name: str) -> str:
 
 
 def table(names: list[str]) -> list[str]:
-    made = correct(observe(demonstrated(), make_noise("isotropic", LEVEL), np.random.default_rng(0)), "contact")
+    made = correct(
+        observe(nominal_demonstration(), make_noise("isotropic", LEVEL), np.random.default_rng(0)), "contact"
+    )
     assert made.test is not None
     head = TABLE.format(trials=TRIALS, scenario=SCENARIO, level=100 * made.test.level)
     return [head.rstrip("\n"), *map(row, names)]
 
 
 def main() -> None:
-    models = listed()
+    models = listed_models()
     lines = ["<!-- Written by `python docs/noise.py`; change the models, not this page. -->", "", "# Noise models"]
     lines += [INTRODUCTION, *(f"- [{name}](#{name}): {title}" for name, title in models.items())]
     lines += table(list(models))
     for name in models:
         picture = PICTURE.format(name.replace("-", "_"))
-        drawn = draw(name, LEVEL)
+        drawn = draw_errors(name, LEVEL)
         draw_histogram(drawn, HERE / picture)
-        lines += ["", f'<a id="{name}"></a>', "", described(name, 2)]
-        lines += [f"![Errors of {name}]({picture})", "", f"*{measured(name, drawn, LEVEL)}.*"]
+        lines += ["", f'<a id="{name}"></a>', "", model_description(name, 2)]
+        lines += [f"![Errors of {name}]({picture})", "", f"*{drawn_sentence(name, drawn, LEVEL)}.*"]
     (HERE / "noise.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -14,7 +14,7 @@ from apo_bench.assembly.goals import Plan
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
-from apo_bench.show.believed_picture import belief, draw_beliefs
+from apo_bench.show.believed_picture import belief_panel, draw_beliefs
 from apo_bench.simulation.scene.render import Film, view
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import attempt, see, show
@@ -41,7 +41,7 @@ def main() -> None:
         _strip(
             HERE / f"{name}.png", film, f"{title}: {'right' if tried.verdict.success else tried.result.outcome.code}"
         )
-    panels = [belief("as seen", seen, seen.goals, 3), belief("corrected by paper", seen, corrected, 3)]
+    panels = [belief_panel("as seen", seen, seen.goals, 3), belief_panel("corrected by paper", seen, corrected, 3)]
     draw_beliefs(scene.scenario, 3, panels, HERE / "believed.png")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from apo_bench.assembly.goals import Reached, Snapshot
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.judgement import Judgement
@@ -79,7 +79,7 @@ def never(*moments: int) -> Edit:
 def reached(scene: scenes.Scene, edits: Sequence[Edit]) -> list[dict]:
     """After each operation and at the end: everything as it should be but for the edits."""
     there = scenes.turned(scene, LAYOUT)
-    history = placed(there.assembly, there.start, there.goals)
+    history = placements(there.assembly, there.start, there.goals)
     states: list[dict] = [dict(poses) for poses in (*history, history[-1])]
     for edit in edits:
         edit(states)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -287,7 +287,7 @@ def turned(scene: Scene, T_world: Array) -> Scene:
 def shown(scene: Scene, careless: Array | None = None) -> Demonstration:
     """A demonstration that shows the true goals."""
     n = len(scene.assembly)
-    final = placed(scene.assembly, scene.start, scene.goals)[-1]
+    final = placements(scene.assembly, scene.start, scene.goals)[-1]
     added = np.zeros((n, 6, 6)) if careless is None else careless
     return Demonstration(scene.assembly, scene.start, scene.goals, final, added)
 

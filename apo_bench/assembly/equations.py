@@ -162,7 +162,7 @@ def lies_on(assembly: Assembly, contact: Contact) -> bool:
     return _smaller(_flat(assembly.face(contact.manipulated)), _flat(assembly.face(contact.environment)))
 
 
-def gap(assembly: Assembly, start: Poses, goals: Array) -> float:
+def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:
     """The largest |e| of all contacts at `goals`, [m]; 0 if there are none."""
     return largest(equations(assembly, start, goals).residual(goals))
 

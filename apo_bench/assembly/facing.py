@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import area, overlap
+from apo_bench.geometry.overlap import face_area, overlap
 from apo_bench.geometry.solid import Face, Solid
 
 
@@ -84,7 +84,7 @@ def facing(
             yield found
 
 
-def gap(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
+def face_gap(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
     """From the middle of the overlap, on b, to the plane of a, [m]; from the middle of b where nothing overlaps."""
     common = overlap(a, T_a, b, T_b)
     middle = (common.corners if len(common.corners) else pose.apply(T_b, b.outline)).mean(axis=0)
@@ -130,7 +130,7 @@ class _Measured(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def _measured(face: Face) -> _Measured:
-    return _Measured(face.normal, area(face))
+    return _Measured(face.normal, face_area(face))
 
 
 def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> Facing | None:

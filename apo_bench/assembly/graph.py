@@ -16,7 +16,7 @@ from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, i
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-Residuals = Sequence[float | None]
+ArcResiduals = Sequence[float | None]
 """The largest |e| of every arc, [m]; None where an operation was not seen."""
 
 
@@ -114,7 +114,7 @@ def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) 
     return tuple(largest(gaps[chosen]) for chosen in mine)
 
 
-def seen_residuals(seen: Observation, graph: Graph) -> tuple[float | None, ...]:
+def observed_residuals(seen: Observation, graph: Graph) -> tuple[float | None, ...]:
     """The same at what was seen; None for an arc whose equations need an operation that was not."""
     residuals = arc_residuals(seen.assembly, seen.start, seen.goals, graph)
     known = [all(seen.seen[k] for k in arc.operations) for arc in graph.arcs]

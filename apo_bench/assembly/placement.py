@@ -10,7 +10,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
 
-def placed(assembly: Assembly, start: Poses, goals: Array) -> tuple[Poses, ...]:
+def placements(assembly: Assembly, start: Poses, goals: Array) -> tuple[Poses, ...]:
     """The pose of every part after each operation, what an ODL stands for (Section 3.2.1), by walking the operations.
 
     Args:

@@ -9,7 +9,7 @@ from apo_bench.assembly.goals import Step
 REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
 
 
-def fault(schedule: Sequence[Step], operations: int) -> str:
+def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     """What is wrong with it, such as `undoes operation 2, which is not done`; empty if nothing is.
 
     What is done is always the first few operations: an operation may stand on all that came before it, and what was

@@ -13,7 +13,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 
 
-class Touching(NamedTuple):
+class TouchedContact(NamedTuple):
     """A contact, seen from the part that moves."""
 
     contact: Contact
@@ -23,18 +23,20 @@ class Touching(NamedTuple):
     """From the resting face into the free side, unit length, (3,), world."""
 
 
-def touching(assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses) -> list[Touching]:
+def touched_contacts(
+    assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses
+) -> list[TouchedContact]:
     """Those contacts of which one face moves and the other one rests."""
     moving, found = set(moves), []
     for contact in contacts:
         rests = [of for of in contact if of.part not in moving]
         if len(rests) == 1:
             n = poses[rests[0].part][:3, :3] @ assembly.face(rests[0]).normal
-            found.append(Touching(contact, rests[0].part, n))
+            found.append(TouchedContact(contact, rests[0].part, n))
     return found
 
 
-def corners(assembly: Assembly, touched: Iterable[Touching], poses: Poses) -> tuple[Array, Array]:
+def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
     """The corners of the overlaps, (k, 3), world, [m], and the normal at each, (k, 3)."""
     points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for (m, e), _, n in touched:

@@ -105,12 +105,12 @@ def scenarios(
     """List the scenarios that come with the package, or print the task card of one."""
     from apo_bench.cli.terminal import print_scenarios
     from apo_bench.scenario.file import load_scenario, scenario_names
-    from apo_bench.show.card import card
+    from apo_bench.show.card import scenario_card
 
     if scenario is None:
         print_scenarios([load_scenario(name) for name in scenario_names()])
     else:
-        typer.echo(card(load_scenario(scenario)), nl=False)
+        typer.echo(scenario_card(load_scenario(scenario)), nl=False)
 
 
 @app.command()
@@ -122,7 +122,7 @@ def graph(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
-    from apo_bench.assembly.graph import relation_graph, seen_residuals
+    from apo_bench.assembly.graph import observed_residuals, relation_graph
     from apo_bench.files.observation import read_observation
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.graph.picture import draw_graph
@@ -133,7 +133,7 @@ def graph(
     loaded = load_scenario(scenario)
     found = relation_graph(loaded.assembly, step)
     seen = None if observation is None else read_observation(observation, loaded)
-    residuals = None if seen is None else seen_residuals(seen, found)
+    residuals = None if seen is None else observed_residuals(seen, found)
     gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
     if as_json:
         typer.echo(json.dumps(graph_form(loaded.name, found, residuals), allow_nan=False))

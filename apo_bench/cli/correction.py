@@ -11,7 +11,7 @@ import typer
 from apo_bench.assembly.goals import Correction, Observation, Plan
 from apo_bench.cli.arguments import check_writable
 from apo_bench.errors import InputError
-from apo_bench.io.output import aside
+from apo_bench.io.output import redirect_output
 
 NO_RESULT = 1
 EXACT_M = 1e-9
@@ -43,7 +43,7 @@ def explain(
     """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
     from apo_bench.correction.correctors import correct as corrected
     from apo_bench.correction.explanation import explain as explained
-    from apo_bench.files.observation import as_planned, observed
+    from apo_bench.files.observation import as_planned, read_observation_file
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.explain_text import explanation_form, explanation_tables, sentences, total
 
@@ -54,7 +54,9 @@ def explain(
         seen = as_planned(loaded, deviation_mm, deviation_deg)
         goals, where = seen.goals, f"at the nominal goals, {_stated(deviation_mm, deviation_deg)}"
     else:
-        seen, loaded, assumed = observed(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
+        seen, loaded, assumed = read_observation_file(
+            observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
+        )
         made = corrected(seen, "contact")
         if not made.ok:
             raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {made.sentence}.")
@@ -88,7 +90,7 @@ def correct(
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
     from apo_bench.correction.own_code.own import correct_named
-    from apo_bench.files.observation import observed
+    from apo_bench.files.observation import read_observation_file
     from apo_bench.show.correct_text import correction_form, correction_lines, pose_table, suspect_table
     from apo_bench.trial.methods import with_simulated
 
@@ -99,8 +101,10 @@ def correct(
                 f"--out {out} is the file of the observation; name another, so that what was seen is kept."
             )
     corrector = _corrector(method, if_doubtful)
-    seen, loaded, assumed = observed(observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
-    with aside(as_json):
+    seen, loaded, assumed = read_observation_file(
+        observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
+    )
+    with redirect_output(as_json):
         made = correct_named(seen, with_simulated(corrector))
     found = _explained(seen, made)
     if as_json:
@@ -129,9 +133,9 @@ def _explained(seen: Observation, made: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
     from apo_bench.correction.baselines.measured import gap_of
     from apo_bench.correction.explanation import explain as explained
-    from apo_bench.correction.posterior import LARGE
+    from apo_bench.correction.posterior import LARGEST_POSTERIOR
 
-    if not made.ok or 6 * len(made.goals) > LARGE or gap_of(seen, made.goals, made.dropped) > EXACT_M:
+    if not made.ok or 6 * len(made.goals) > LARGEST_POSTERIOR or gap_of(seen, made.goals, made.dropped) > EXACT_M:
         return None
     return explained(seen, made.goals, made.dropped)
 

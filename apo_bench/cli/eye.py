@@ -28,13 +28,13 @@ def eye(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
-    from apo_bench.show.eye_one import checked_view, see_once
+    from apo_bench.show.eye_one import checked_view, run_sensor
     from apo_bench.show.eye_text import eye_form, eye_lines
 
     if out is not None:
         check_writable(out, "--out", (".png",))
     shows = checked_view(view)
-    seen = see_once(scenario, level, seed, careless)
+    seen = run_sensor(scenario, level, seed, careless)
     form = eye_form(seen, level, seed, careless)
     typer.echo(json.dumps(form, allow_nan=False) if as_json else "\n".join(eye_lines(form)))
     if out is not None:

@@ -31,9 +31,9 @@ def _without_command(context: typer.Context) -> None:
 @noise.command("list")
 def list_models() -> None:
     """List the noise models that have a name."""
-    from apo_bench.show.noise_card import listed
+    from apo_bench.show.noise_card import listed_models
 
-    models = listed()
+    models = listed_models()
     width = max(map(len, models))
     for name, title in models.items():
         typer.echo(f"{name:{width}}  {title}")
@@ -51,13 +51,13 @@ def card(
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
     from apo_bench.records.settings import check_level
-    from apo_bench.show.noise_card import draw, noise_card
+    from apo_bench.show.noise_card import draw_errors, noise_card
     from apo_bench.show.noise_picture import draw_histogram
 
     check_level(level)
     if out is not None:
         check_writable(out, "--out", (".png",))
-    drawn = draw(name, Level(level, level))
+    drawn = draw_errors(name, Level(level, level))
     typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
     if out is None:
         return
@@ -91,7 +91,7 @@ def fit(
     from apo_bench.files.bop_truth import read_truth
     from apo_bench.observation.fitting import fit as fits
     from apo_bench.observation.models.empirical import residuals_text
-    from apo_bench.observation.models.residuals import compare
+    from apo_bench.observation.models.residuals import match_residuals
     from apo_bench.observation.noise_file import noise_text
     from apo_bench.show.fit_picture import draw_fit
     from apo_bench.show.fit_text import fit_form, fit_lines
@@ -104,9 +104,9 @@ def fit(
                 if path.exists() and given.exists() and path.samefile(given):
                     raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
     seen = read_results(estimates)
-    found = compare(seen, read_truth(truth, seen, scene_id), scene_id)
-    measured = fits.fit(found, _printable(source or f"{estimates.name} against {truth.name}"))
-    figures = fits.compared(found, measured)
+    found = match_residuals(seen, read_truth(truth, seen, scene_id), scene_id)
+    measured = fits.fit_noise(found, _printable(source or f"{estimates.name} against {truth.name}"))
+    figures = fits.goodness_of_fit(found, measured)
     if as_json:
         typer.echo(json.dumps(fit_form(found, measured, figures), allow_nan=False))
     else:

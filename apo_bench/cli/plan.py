@@ -11,7 +11,7 @@ import typer
 from apo_bench.assembly.goals import Plan
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
-from apo_bench.io.output import aside
+from apo_bench.io.output import redirect_output
 from apo_bench.scenario.scenario import Scenario
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
@@ -37,7 +37,7 @@ def plan(
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.plan_lines import plan_lines
-    from apo_bench.show.plan_text import plan_form, plan_text
+    from apo_bench.show.plan_text import plan_lines_form, plan_text
 
     if observation is None:
         if method is not None:
@@ -49,13 +49,13 @@ def plan(
         frames = "directions and until in the frame of the assembly"
     else:
         method = "contact" if method is None else method
-        with aside(as_json):
+        with redirect_output(as_json):
             loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
         frames = "directions in the frame of the assembly, until in the world"
     lines = plan_lines(asked, loaded)
     if as_json:
-        typer.echo(json.dumps(plan_form(lines, loaded, notes), allow_nan=False))
+        typer.echo(json.dumps(plan_lines_form(lines, loaded, notes), allow_nan=False))
         return
     typer.echo(f"{loaded.name} {where}; {frames}: mm and degrees\n")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
@@ -65,12 +65,14 @@ def _planned(
     scenario: str, observation: Path, method: str, deviations: tuple[float | None, float | None]
 ) -> tuple[Scenario, Plan, list[str]]:
     """The scenario, the plan that a method makes of an observation of it, and what is to be said with it."""
-    from apo_bench.files.observation import observed
+    from apo_bench.files.observation import read_observation_file
     from apo_bench.trial.misgivings import misgivings
     from apo_bench.trial.planning import plan as planned
 
     stated = zip(("deviation_mm", "deviation_deg"), deviations, strict=True)
-    seen, loaded, assumed = observed(observation, scenario, **{name: x for name, x in stated if x is not None})
+    seen, loaded, assumed = read_observation_file(
+        observation, scenario, **{name: x for name, x in stated if x is not None}
+    )
     if method == "oracle":
         raise InputError("--method oracle was given; it knows the truth, which an observation does not tell.")
     found = planned(method, seen, None)

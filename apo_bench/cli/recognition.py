@@ -10,7 +10,7 @@ import typer
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import assumed_deviations
-from apo_bench.io.output import aside
+from apo_bench.io.output import redirect_output
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
@@ -47,7 +47,7 @@ def recognise(
     asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     name = load_scenario(scenario).name
-    with aside(as_json):
+    with redirect_output(as_json):
         seen, assumed = looked_at(scenario, observation, asked, deviations)
     found = recognised(seen, relations)
     if as_json:

@@ -10,7 +10,7 @@ import typer
 
 from apo_bench.cli.arguments import check_writable, path_given
 from apo_bench.cli.sweep_command import EYE, FIDELITY, NOISE, RELATIONS, CorrectorLimit, interrupted
-from apo_bench.io.output import aside
+from apo_bench.io.output import redirect_output
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
 
 NO_RESULT = 1
@@ -91,7 +91,7 @@ def replay(
         corrector_limit_s=corrector_limit,
     )
     try:
-        with aside(as_json):
+        with redirect_output(as_json):
             row = run_one(request)
     except KeyboardInterrupt as error:
         raise interrupted(error) from error

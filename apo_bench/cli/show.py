@@ -14,7 +14,7 @@ from apo_bench.files.deviations import assumed_deviations
 from apo_bench.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    from apo_bench.show.believed_picture import Belief
+    from apo_bench.show.believed_picture import BeliefPanel
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
@@ -42,7 +42,7 @@ def show(
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.believed_picture import belief, belief_lines, draw_beliefs
+    from apo_bench.show.believed_picture import belief_lines, belief_panel, draw_beliefs
     from apo_bench.sweeps.one import looked_at
 
     check_writable(out, "--out", (".png",))
@@ -52,7 +52,7 @@ def show(
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     looked, assumed = looked_at(scenario, observation, asked, deviations)
     _check_seen(looked, k)
-    panels = [] if corrected and not seen else [belief("as seen", looked, looked.goals, k)]
+    panels = [] if corrected and not seen else [belief_panel("as seen", looked, looked.goals, k)]
     if corrected or not seen:
         panels.append(_corrected(loaded, looked, method, k))
     draw_beliefs(loaded, k, panels, out)
@@ -62,9 +62,9 @@ def show(
     typer.echo("\n".join([*said, f"Wrote {out}"]))
 
 
-def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> Belief:
+def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> BeliefPanel:
     from apo_bench.correction.own_code.own import correct_named
-    from apo_bench.show.believed_picture import belief
+    from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.methods import with_simulated
     from apo_bench.trial.misgivings import misgivings
     from apo_bench.trial.planning import planned
@@ -75,7 +75,7 @@ def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) 
             f"{method} did not correct what was seen: {made.sentence.rstrip('.')}; --seen draws what was seen."
         )
     warning = misgivings(scenario, planned(looked, made), made)
-    return belief(f"corrected by {method}", looked, made.goals, step, warning)
+    return belief_panel(f"corrected by {method}", looked, made.goals, step, warning)
 
 
 def _check_seen(looked: Observation, step: int) -> None:

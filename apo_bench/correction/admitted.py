@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import FARTHEST_M, rigid
+from apo_bench.geometry.rigid import FARTHEST_M, is_rigid
 
 _ASYMMETRY = 1e-9
 """Of its largest entry, how far a covariance may be from symmetric."""
@@ -56,7 +56,7 @@ def _check_lengths(one: Observation, name: str) -> None:
 
 def _check_poses(T: Array, name: Callable[[int], str]) -> None:
     """Poses (p, 4, 4); `name` says which one is number j."""
-    for j in map(int, np.flatnonzero(~rigid(T))):
+    for j in map(int, np.flatnonzero(~is_rigid(T))):
         raise InputError(
             f"{name(j)} is not a rigid pose; give a rotation matrix, a position [m] and the last row (0, 0, 0, 1)."
         )

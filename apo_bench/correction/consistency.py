@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Consistency, Suspect
 from apo_bench.assembly.topology import Assembly
-from apo_bench.correction.posterior import rank
-from apo_bench.correction.solvers.compact import Compact
-from apo_bench.correction.solvers.manifold import Nearest, nearest
+from apo_bench.correction.posterior import jacobian_rank
+from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.geometry.arrays import Array
 
 LEVEL = 0.01
 """False alarms that are accepted."""
-MOST = 64
+MOST_SUSPECTS = 64
 """Relations that are left out in turn; of more, those that pull hardest."""
 _Measure = Callable[[NDArray[np.bool_]], Consistency]
 """The test of a correction by some of the contacts, (c,)."""
@@ -38,17 +38,20 @@ def suspects(
     """Every relation that has contacts `among`, (c,), those considered, left out in turn; the most suspect first.
 
     Args:
-        pull: How hard each contact pulls, (c,): of more relations than `MOST`, only those that pull hardest are tried.
+        pull: How hard each contact pulls, (c,): of more relations than `MOST_SUSPECTS`, only those that pull hardest
+            are tried.
     """
     every = assembly.arcs()
     considered = [i for i, arc in enumerate(every) if among[list(arc)].any()]
-    if len(considered) > MOST:
+    if len(considered) > MOST_SUSPECTS:
         size = pull()
-        considered = sorted(sorted(considered, key=lambda i: -size[list(every[i])].sum())[:MOST])
+        considered = sorted(sorted(considered, key=lambda i: -size[list(every[i])].sum())[:MOST_SUSPECTS])
     return _ranked(assembly, among, measure, [(f"R{i + 1}", every[i]) for i in considered])
 
 
-def narrowed(assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, relation: str) -> tuple[Suspect, ...]:
+def contact_suspects(
+    assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, relation: str
+) -> tuple[Suspect, ...]:
     """The same for every contact of one relation, such as `R3`; each is called `R3: stick.py on castle1.spy`."""
     arc = assembly.arcs()[int(relation.removeprefix("R")) - 1]
     contacts = assembly.relations()
@@ -70,7 +73,7 @@ def _ranked(
     return tuple(sorted(found, key=lambda s: (-s.p_value, (s.chi_square - s.freedom) / sqrt(2 * s.freedom + 1))))
 
 
-def slack(fits: NDArray[np.bool_], system: Compact, play_m: float) -> Array:
+def fit_deviation(fits: NDArray[np.bool_], system: CompactEquations, play_m: float) -> Array:
     """The standard deviation of each compact equation, (3 c,), [m]: a contact that fits is uniform within its play.
 
     A row stands for all vertices of its contact, so it is off by as much as they are together.
@@ -89,9 +92,9 @@ def p_value(chi_square: float, freedom: int) -> float:
     return float(chdtrc(freedom, chi_square)) if freedom else 1.0
 
 
-def measured(
-    system: Compact, seen: Array, L: Array, found: Nearest, slack_m: Array
-) -> tuple[float, int, Nearest | None]:
+def correction_length(
+    system: CompactEquations, seen: Array, L: Array, found: NearestGoals, slack_m: Array
+) -> tuple[float, int, NearestGoals | None]:
     """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
 
     These have no nearest goals; those that share the contradiction out are returned with the numbers, otherwise None.
@@ -101,14 +104,14 @@ def measured(
         L: (n, 6, 6), their covariance is L L^t.
         slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
     """
-    freedom = rank(found.Jt)
+    freedom = jacobian_rank(found.Jt)
     if not found.finite:
         return np.inf, freedom, None
     holds = found.at_rest and np.abs(found.e).max(initial=0.0) <= SOFT_M
     if holds and not slack_m.any():
         return float(found.z @ found.z), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
-    relaxed = nearest(system, seen, L, soft)
+    relaxed = nearest_goals(system, seen, L, soft)
     asked = soft > 0.0
     over = relaxed.e[asked] / soft[asked]
     return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Consistency, Correction, Iterate, Observation, Suspect
 from apo_bench.correction.consistency import LEVEL
-from apo_bench.correction.ending import refused, sentence
-from apo_bench.correction.posterior import freedom, marginals, rank
+from apo_bench.correction.ending import refused_correction, status_sentence
+from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
 from apo_bench.correction.problem import Problem, Solver, problem
 from apo_bench.correction.solvers import compiled
-from apo_bench.correction.solvers.manifold import Nearest, nearest
+from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.errors import InputError
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
@@ -36,8 +36,8 @@ class ContactCorrector:
     test passes."""
     level: float = LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
-    solver: Solver = nearest
-    """What finds the nearest goals; `compiled.nearest` is the same, compiled."""
+    solver: Solver = nearest_goals
+    """What finds the nearest goals; `compiled.nearest_goals_compiled` is the same, compiled."""
 
     def __post_init__(self) -> None:
         if self.doubt not in ("apply", "warn", "refuse", "drop"):
@@ -58,10 +58,10 @@ class ContactCorrector:
         """
         return self.given(seen, None)
 
-    def given(self, seen: Observation, found: Nearest | None) -> Correction:
+    def given(self, seen: Observation, found: NearestGoals | None) -> Correction:
         """The same, if the nearest goals without walls are known already."""
         if not seen.seen.all():
-            return refused(seen)
+            return refused_correction(seen)
         asked = problem(seen, self.solver)
         every = asked.without(())
         found, first = asked.solve(every, found)
@@ -82,25 +82,25 @@ class ContactCorrector:
 
     def _narrowed(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
         """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
-        single = asked.narrowed(kept, worst.relation)[0]
+        single = asked.contact_suspects(kept, worst.relation)[0]
         return single.relation if single.p_value >= self.level else worst.relation
 
     def _report(
         self,
         asked: Problem,
-        found: Nearest,
+        found: NearestGoals,
         kept: NDArray[np.bool_],
         tested: Consistency,
         first: Consistency,
         dropped: tuple[str, ...],
     ) -> Correction:
         seen, known = asked.seen, freedom(found.Jt)
-        directions = rank(found.Jt) if known is None else known.rank
+        directions = jacobian_rank(found.Jt) if known is None else known.rank
         status = _status(found, asked.gap(found.goals, kept), seen.gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not tested.passes:
             status = "doubtful"
         of = "every contact" if kept.all() else f"every contact but those of {', '.join(dropped)}"
-        said = sentence(status, seen.gap_m, of) + ("" if self.doubt == "apply" else _doubts(first, dropped))
+        said = status_sentence(status, seen.gap_m, of) + ("" if self.doubt == "apply" else _doubts(first, dropped))
         every = asked.without(())
         return Correction(
             goals=found.goals,
@@ -122,10 +122,10 @@ contact = ContactCorrector()
 contact_apply = ContactCorrector("apply")
 contact_refuse = ContactCorrector("refuse")
 contact_drop = ContactCorrector("drop")
-contact_fast = ContactCorrector(solver=compiled.nearest)
+contact_fast = ContactCorrector(solver=compiled.nearest_goals_compiled)
 
 
-def _status(found: Nearest, left_m: float, gap_m: float) -> str:
+def _status(found: NearestGoals, left_m: float, gap_m: float) -> str:
     if not found.finite:
         return "not_finite"
     if left_m <= gap_m:

@@ -11,11 +11,11 @@ import numpy as np
 
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.correction.admitted import check_observations
-from apo_bench.correction.baselines.measured import gap_of, measured
-from apo_bench.correction.own_code.returned import RIGID, check_near, checked
+from apo_bench.correction.baselines.measured import gap_of, goals_as_given
+from apo_bench.correction.own_code.returned import RIGID, check_correction, check_near
 from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry.arrays import Array, NotReal, real
-from apo_bench.geometry.rigid import rigid
+from apo_bench.geometry.rigid import is_rigid
 from apo_bench.names import resolve
 from apo_bench.records.short_names import CORRECTORS
 
@@ -25,7 +25,7 @@ _Corrector = Callable[[Observation], Correction]
 _STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
 
 
-class Misbehaved(InputError):
+class CorrectorMisbehaved(InputError):
     """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
 
 
@@ -38,7 +38,7 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
 
     Raises:
         InputError: There is no such corrector, or the observation makes no sense.
-        Misbehaved: The corrector raised an error, or returned something else, or a schedule that makes no sense.
+        CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observations((seen,))
     chosen = checked_corrector(corrector)
@@ -46,11 +46,11 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
     try:
         return _admitted(chosen(seen), seen, chosen, name)
     except InputError as error:
-        if _ours(chosen) or isinstance(error, Misbehaved):
+        if _ours(chosen) or isinstance(error, CorrectorMisbehaved):
             raise
-        raise Misbehaved(str(error)) from error
+        raise CorrectorMisbehaved(str(error)) from error
     except Exception as error:
-        raise Misbehaved(str(failed(f"the corrector '{name}'", error))) from error
+        raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
 
 
 def checked_corrector(given: Any) -> Any:
@@ -72,13 +72,13 @@ def checked_corrector(given: Any) -> Any:
 def _admitted(found: Any, seen: Observation, chosen: Any, name: str) -> Correction:
     """What a corrector returned, as a `Correction` that makes sense."""
     if not isinstance(found, Correction):
-        return measured(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
+        return goals_as_given(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
     if found.status not in _STATUSES:
         raise InputError(
             f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(_STATUSES)}."
         )
     goals = _bare(found.goals, len(seen.goals), name)
-    found = checked(found, seen.assembly, name)
+    found = check_correction(found, seen.assembly, name)
     if found.ok and not _ours(chosen):
         before, after = gap_of(seen, seen.goals), gap_of(seen, goals)
         found = replace(found, gap_before_m=before, gap_after_m=after)
@@ -104,7 +104,7 @@ def _bare(found: Any, n: int, name: str) -> Array:
     if goals.shape != (n, 4, 4):
         given = f"an array of shape {found.shape}" if isinstance(found, np.ndarray) else kind(found)
         raise InputError(f"the corrector '{name}' returned {given}; return a Correction or goals of shape ({n}, 4, 4).")
-    for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~rigid(goals)):
+    for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~is_rigid(goals)):
         raise InputError(
             f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; {RIGID}."
         )

@@ -15,8 +15,8 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
 
-SHIFTS = ("x", "y", "z")
-TURNS = ("roll", "pitch", "yaw")
+SHIFT_NAMES = ("x", "y", "z")
+TURN_NAMES = ("roll", "pitch", "yaw")
 _LENGTH_M = 0.05
 """Way of a point per radian, at which a turn weighs as much as a shift."""
 _ZERO = 1e-6
@@ -41,11 +41,11 @@ class Direction:
     @property
     def names(self) -> tuple[str, ...]:
         """The axes that take part, the most important first; of a turn whose point is not the origin, the axes only."""
-        words = TURNS if self.turns else SHIFTS
+        words = TURN_NAMES if self.turns else SHIFT_NAMES
         order = np.argsort(-np.abs(self.axis).round(6), kind="stable")
         own = [words[i] for i in order if abs(self.axis[i]) > _ZERO]
         screwed = abs(self.pitch_m) > _ZERO * _LENGTH_M
-        return (*own, *(SHIFTS[i] for i in order if screwed and abs(self.axis[i]) > _ZERO))
+        return (*own, *(SHIFT_NAMES[i] for i in order if screwed and abs(self.axis[i]) > _ZERO))
 
     @property
     def turns(self) -> bool:
@@ -87,7 +87,7 @@ def directions(space: Array) -> tuple[Direction, ...]:
 def held(free: Sequence[Direction]) -> tuple[str, ...]:
     """The words for what is not free: six less those that free directions are mainly along."""
     taken = {direction.names[0] for direction in free}
-    return tuple(name for name in (*SHIFTS, *TURNS) if name not in taken)
+    return tuple(name for name in (*SHIFT_NAMES, *TURN_NAMES) if name not in taken)
 
 
 def _span(columns: Array) -> Array:

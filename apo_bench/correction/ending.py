@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench.assembly.equations import gap
+from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.correction.solvers.newton import Solution
 from apo_bench.records import outcomes
 
 
-def status(found: Solution, left_m: float, gap_m: float) -> str:
+def solver_status(found: Solution, left_m: float, gap_m: float) -> str:
     """`converged` if what is left, [m], is within `gap_m`; otherwise why not."""
     if not found.finite:
         return "not_finite"
@@ -19,13 +19,13 @@ def status(found: Solution, left_m: float, gap_m: float) -> str:
     return "inconsistent" if found.at_rest else "not_converged"
 
 
-def sentence(status: str, gap_m: float, of: str = "every contact") -> str:
+def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str:
     """What a status means; `of` says which contacts were looked at."""
     return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
 
 
-def refused(seen: Observation) -> Correction:
+def refused_correction(seen: Observation) -> Correction:
     """What was seen, unchanged: an operation without a pose has no motion parameter to start from."""
     missing = int(np.argmin(seen.seen))
-    now = gap(seen.assembly, seen.start, seen.goals)
+    now = largest_gap(seen.assembly, seen.start, seen.goals)
     return Correction(seen.goals, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)

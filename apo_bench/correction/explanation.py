@@ -17,13 +17,13 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.goals import Observation, Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import ODL, Assembly, Operation
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.holding import Hold, by_relation, holds
-from apo_bench.correction.posterior import LARGE, Freedom, freedom
+from apo_bench.correction.holding import Hold, by_relation, relation_holds
+from apo_bench.correction.posterior import LARGEST_POSTERIOR, Freedom, freedom
 from apo_bench.correction.problem import problem
-from apo_bench.correction.solvers.manifold import nearest
+from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -35,7 +35,7 @@ _ZERO = 1e-7
 
 @final
 @dataclass(frozen=True, eq=False)
-class Free:
+class FreeDirection:
     """A direction that no contact fixes."""
 
     direction: Direction
@@ -47,7 +47,7 @@ class Free:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Determined:
+class OperationExplanation:
     """What the contacts determine of one operation, given those before."""
 
     operation: int
@@ -56,7 +56,7 @@ class Determined:
     rank: int
     """Directions that are fixed, of six."""
     fixed: tuple[str, ...]
-    free: tuple[Free, ...]
+    free: tuple[FreeDirection, ...]
     through: tuple[Hold, ...]
     """An irreducible set of relations that fix as much as all of them."""
     agreeing: tuple[Hold, ...]
@@ -67,7 +67,7 @@ class Determined:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Standing:
+class PartExplanation:
     """A part at the end: where it stands in the world, and how well that is known."""
 
     part: str
@@ -79,7 +79,7 @@ class Standing:
     rank: int
     """Directions that are fixed in the world."""
     fixed: tuple[str, ...]
-    free: tuple[Free, ...]
+    free: tuple[FreeDirection, ...]
     covariance: Array
     """(6, 6), posterior, of its body twist, [m, rad]."""
 
@@ -97,8 +97,8 @@ class Explanation:
     assembly: Assembly
     goals: Array
     """(n, 4, 4), at which it was asked."""
-    operations: tuple[Determined, ...]
-    parts: tuple[Standing, ...]
+    operations: tuple[OperationExplanation, ...]
+    parts: tuple[PartExplanation, ...]
     """Those that were moved, in the order in which they were placed."""
     rank: int
     freedom: int
@@ -118,13 +118,13 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
     """
     n, assembly = len(goals), seen.assembly
-    if 6 * n > LARGE:
+    if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    asked = problem(replace(seen, goals=goals), nearest)
+    asked = problem(replace(seen, goals=goals), nearest_goals)
     kept = asked.exact & asked.without(tuple(dropped))
     B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ asked.L
     Jt = asked.compact.gathered(asked.compact.blocks(goals, B)[1])
-    every, relations = holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
+    every, relations = relation_holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
     known = freedom(relations.Jt)
     if known is None:
         raise _too_many(n)
@@ -136,12 +136,12 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
         named = directions(B[k] @ own[block])
         needed = relations.holding(k, 6 - own.shape[1])
         found.append(
-            Determined(
+            OperationExplanation(
                 operation=k,
                 part=assembly.operations[k].main,
                 rank=6 - own.shape[1],
                 fixed=held(named),
-                free=tuple(Free(d, _deviation(C, d), _along(k, own, B[k], d)) for d in named),
+                free=tuple(FreeDirection(d, _deviation(C, d), _along(k, own, B[k], d)) for d in named),
                 through=tuple(every[i] for i in needed),
                 agreeing=tuple(every[i] for i in relations.direct(k) if i not in needed and every[i].made == k),
                 covariance=C,
@@ -166,7 +166,9 @@ def _deviation(C: Array, direction: Direction) -> float:
 
 
 def _too_many(n: int) -> InputError:
-    return InputError(f"{n} operations were given; up to {LARGE // 6} can be explained, so take fewer of them.")
+    return InputError(
+        f"{n} operations were given; up to {LARGEST_POSTERIOR // 6} can be explained, so take fewer of them."
+    )
 
 
 def _own(known: Freedom, n: int) -> Iterator[Array]:
@@ -192,11 +194,11 @@ def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...
     return tuple(int(j) for j in np.flatnonzero(moved > 1e-6 * moved[k]) if j > k)
 
 
-def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Array) -> tuple[Standing, ...]:
+def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Array) -> tuple[PartExplanation, ...]:
     """Every part that was moved, at the end; its pose is a product of goals, so errors go through all of them."""
     if not len(assembly):
         return ()
-    final, last, words = placed(assembly, start, goals)[-1], assembly.odls()[-1], _rooted(assembly)
+    final, last, words = placements(assembly, start, goals)[-1], assembly.odls()[-1], _rooted(assembly)
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
     found = []
     for part in last:
@@ -205,9 +207,9 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Ar
         U, w, _ = np.linalg.svd(spread / unit, full_matrices=False)
         C = spread @ spread.T
         named = directions(unit * U[:, w > _ZERO])
-        loose = tuple(Free(d, _deviation(C, d)) for d in named)
+        loose = tuple(FreeDirection(d, _deviation(C, d)) for d in named)
         placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
-        found.append(Standing(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
+        found.append(PartExplanation(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
     return tuple(sorted(found, key=lambda one: one.placed))
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.topology import ODL, Assembly, inverted, simplified
-from apo_bench.correction.posterior import CUT_OFF
-from apo_bench.correction.solvers.compact import Compact
+from apo_bench.correction.posterior import RANK_CUT_OFF
+from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.geometry.arrays import Array
 
 
@@ -37,7 +37,7 @@ class Hold:
     """The product D_a^-1 D_b in its equations (Eq. 26); constant poses are left out."""
 
 
-def holds(assembly: Assembly) -> tuple[Hold, ...]:
+def relation_holds(assembly: Assembly) -> tuple[Hold, ...]:
     """Every relation of an assembly."""
     relations, history = assembly.relations(), assembly.odls()
     found = []
@@ -50,7 +50,7 @@ def holds(assembly: Assembly) -> tuple[Hold, ...]:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Relations:
+class RelationEquations:
     """The equations of an assembly by relation, ready to be left out."""
 
     Jt: Array
@@ -99,18 +99,18 @@ class Relations:
         return self.Jt[[6 * j + i for j in operations for i in range(6)]]
 
 
-def by_relation(assembly: Assembly, system: Compact, Jt: Array, kept: NDArray[np.bool_]) -> Relations:
+def by_relation(assembly: Assembly, system: CompactEquations, Jt: Array, kept: NDArray[np.bool_]) -> RelationEquations:
     """Group the equations of all contacts, in the order of `assembly.relations()`; those not `kept`, (c,), are void."""
     arcs = assembly.arcs()
     operations = []
     for arc in arcs:
         said = [i for i in arc if kept[i]]
         operations.append(frozenset(int(j) for j in system.columns[said].ravel() if j < system.n))
-    return Relations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, tuple(operations))
+    return RelationEquations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, tuple(operations))
 
 
 def _rank(Jt: Array) -> int:
     if not Jt.size:
         return 0
     w = np.linalg.svd(Jt, compute_uv=False)
-    return int(np.count_nonzero(w > CUT_OFF * w[0]))
+    return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))

@@ -12,15 +12,15 @@ from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
-from apo_bench.correction.solvers.compact import Compact, compact, moments
-from apo_bench.correction.solvers.manifold import Nearest
-from apo_bench.correction.solvers.walls import asked
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
+from apo_bench.correction.solvers.inequalities import demanded
+from apo_bench.correction.solvers.manifold import NearestGoals
 from apo_bench.correction.solvers.whitened import scales
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-CHUNK = 64
+BATCH = 64
 """Observations that are solved together: more would leave the cache of the processor."""
 
 
@@ -48,18 +48,18 @@ def correct_many(seen: Sequence[Observation], corrector: ContactCorrector = cont
                 f"observation {i} is of another assembly, start or play than observation 1; "
                 "correct those together that share them."
             )
-    return tuple(made for i in range(0, len(seen), CHUNK) for made in _chunk(seen[i : i + CHUNK], corrector))
+    return tuple(made for i in range(0, len(seen), BATCH) for made in _chunk(seen[i : i + BATCH], corrector))
 
 
 def _chunk(seen: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
     goals, L = np.array([one.goals for one in seen]), np.array([scales(one.covariance) for one in seen])
     plain = equations(seen[0].assembly, seen[0].start, seen[0].goals)
-    pattern, exact, _ = asked(plain, seen[0].assembly, seen[0].play_m)
+    pattern, exact, _ = demanded(plain, seen[0].assembly, seen[0].play_m)
     found = corrector.solver(compact_many(seen[0].assembly, pattern, goals).among(exact), goals, L)
     return [corrector.given(one, _one(found, i)) for i, one in enumerate(seen)]
 
 
-def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> Compact:
+def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> CompactEquations:
     """The compact equations of many observations, goals (b, n, 4, 4), each with the vertices that it gives itself.
 
     Vertices of the environment's face are the same for all; those of the manipulated face are laid onto the other one
@@ -68,7 +68,7 @@ def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> Compac
     Args:
         pattern: The equations of one of them.
     """
-    one = compact(pattern, goals.shape[1])
+    one = compact_equations(pattern, goals.shape[1])
     contacts = [relation.contact for relation in assembly.relations()]
     laid = np.array([lies_on(assembly, contact) for contact in contacts], dtype=np.bool_)
     points = np.array(np.broadcast_to(one.points, (len(goals), *one.points.shape)))
@@ -91,8 +91,8 @@ def _alike(a: Observation, b: Observation) -> bool:
     )
 
 
-def _one(found: Nearest, i: int) -> Nearest:
-    return Nearest(
+def _one(found: NearestGoals, i: int) -> NearestGoals:
+    return NearestGoals(
         *(found.goals[i], found.z[i], found.e[i], found.Jt[i], found.B[i], found.at_rest[i], found.finite[i]),
         trace=found.trace,
     )

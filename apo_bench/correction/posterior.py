@@ -18,17 +18,17 @@ from scipy.linalg.lapack import dpstrf
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.correction.solvers import sparse
-from apo_bench.correction.solvers.compact import compact
-from apo_bench.correction.solvers.manifold import Nearest
+from apo_bench.correction.solvers.compact import compact_equations
+from apo_bench.correction.solvers.manifold import NearestGoals
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
-LARGE = 600
+LARGEST_POSTERIOR = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
 _UNCLEAR = (1e-14, 1e-9)
 """Squares of pivots, in parts of the largest: with none between these, rounding is told from rank quickly."""
-CUT_OFF = 1e-7
+RANK_CUT_OFF = 1e-7
 """Singular values below this part of the largest one are rounding, at a solution."""
 
 
@@ -48,25 +48,28 @@ class Freedom:
 
 
 def freedom(Jt: Any) -> Freedom | None:
-    """Read off the transposed Jacobian (6 n, 3 c) at a solution, dense or sparse; None above `LARGE` unknowns."""
+    """Read off the transposed Jacobian (6 n, 3 c) at a solution, dense or sparse.
+
+    None above `LARGEST_POSTERIOR` unknowns.
+    """
     unknowns, equations_ = Jt.shape
-    if unknowns > LARGE:
+    if unknowns > LARGEST_POSTERIOR:
         return None
     if not isinstance(Jt, np.ndarray):
         Jt = Jt.toarray()
     if not Jt.size:
         return Freedom(0, equations_, np.inf, np.eye(unknowns))
     U, w, _ = np.linalg.svd(Jt, full_matrices=True)
-    rank = int(np.count_nonzero(w > CUT_OFF * w[0]))
+    rank = int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
     left = w[rank:].max(initial=0.0)
     gap = float(w[rank - 1] / left) if rank and left > 0.0 else np.inf
     return Freedom(rank, equations_ - rank, gap, U[:, rank:])
 
 
-def rank(Jt: Any) -> int:
+def jacobian_rank(Jt: Any) -> int:
     """The rank alone, of a dense or a sparse matrix; from the pivots of a Cholesky factor where they are clear."""
     if not isinstance(Jt, np.ndarray):
-        return sparse.rank(Jt)
+        return sparse.sparse_rank(Jt)
     if not Jt.size:
         return 0
     G = Jt @ Jt.T if Jt.shape[0] <= Jt.shape[1] else Jt.T @ Jt
@@ -77,16 +80,16 @@ def rank(Jt: Any) -> int:
     if R[found - 1, found - 1] ** 2 > _UNCLEAR[1] * largest:
         return int(found)
     w = np.linalg.svd(Jt, compute_uv=False)
-    return int(np.count_nonzero(w > CUT_OFF * w[0]))
+    return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
 
 
-def marginals(found: Nearest, free: Array) -> Array:
+def marginals(found: NearestGoals, free: Array) -> Array:
     """The posterior covariance of the body twist of each corrected goal, (n, 6, 6), [m, rad]."""
     spread = found.B @ free.reshape(len(found.B), 6, free.shape[1])
     return np.asarray(spread @ np.swapaxes(spread, 1, 2))
 
 
-def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.95) -> bool | None:
+def contains_truth(seen: Observation, made: Correction, truth: Array, level: float = 0.95) -> bool | None:
     """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
 
     The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
@@ -101,7 +104,7 @@ def inside(seen: Observation, made: Correction, truth: Array, level: float = 0.9
         return None
     L = np.linalg.cholesky(seen.covariance)
     xi = pose.log(pose.inverse(seen.goals) @ made.goals)
-    system = compact(equations(seen.assembly, seen.start, seen.goals), len(made.goals))
+    system = compact_equations(equations(seen.assembly, seen.start, seen.goals), len(made.goals))
     system = system.among(_equal(seen, made.dropped))
     _, blocks = system.blocks(made.goals, right_jacobian(xi) @ L)
     known = freedom(system.gathered(blocks))

@@ -11,15 +11,23 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import Equations, equations, largest
 from apo_bench.assembly.goals import Consistency, Observation, Suspect
-from apo_bench.correction.consistency import LEVEL, SOFT_M, measured, narrowed, p_value, slack, suspects
-from apo_bench.correction.solvers.compact import Compact, compact
-from apo_bench.correction.solvers.manifold import Nearest, nearest
-from apo_bench.correction.solvers.walls import Walls, asked, between, left_open, touching
+from apo_bench.correction.consistency import (
+    LEVEL,
+    SOFT_M,
+    contact_suspects,
+    correction_length,
+    fit_deviation,
+    p_value,
+    suspects,
+)
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violation
+from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.whitened import scales
 from apo_bench.geometry.arrays import Array
 
-Solver = Callable[[Compact, Array, Array], Nearest]
-"""(equations, goals seen, L) -> nearest goals; `manifold.nearest` and what does the same."""
+Solver = Callable[[CompactEquations, Array, Array], NearestGoals]
+"""(equations, goals seen, L) -> nearest goals; `manifold.nearest_goals` and what does the same."""
 
 
 @final
@@ -30,18 +38,18 @@ class Problem:
     seen: Observation
     system: Equations
     """Of every contact, planes shifted to where they are asked to be."""
-    compact: Compact
+    compact: CompactEquations
     """The same, three per contact."""
     exact: NDArray[np.bool_]
     """(c,): contacts that are equations; the others are walls."""
-    walls: Walls
+    walls: Inequalities
     L: Array
     """(n, 6, 6)."""
     slack_m: Array
     """(3 c,): what the play of parts that fit leaves, for the test."""
     solver: Solver
 
-    def solve(self, kept: NDArray[np.bool_], found: Nearest | None = None) -> tuple[Nearest, Consistency]:
+    def solve(self, kept: NDArray[np.bool_], found: NearestGoals | None = None) -> tuple[NearestGoals, Consistency]:
         """The nearest goals by the contacts that are `kept`, (c,), and the test of their correction.
 
         Of walls, those that are touched count like equations: given which they are, the squared length is chi-square
@@ -56,13 +64,13 @@ class Problem:
         chosen = kept & self.exact
         part, slack_m = self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
         found = self.solver(part, self.seen.goals, self.L) if found is None else found
-        chi_square, freedom, shared = measured(part, self.seen.goals, self.L, found, slack_m)
+        chi_square, freedom, shared = correction_length(part, self.seen.goals, self.L, found, slack_m)
         if found.finite and largest(self.system.gaps(found.goals)[chosen]) > self.seen.gap_m:
-            found = shared or nearest(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
+            found = shared or nearest_goals(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
         elif found.finite and kept[~self.exact].any():
             walls = self.walls.among(kept[~self.exact])
-            held = between(part, walls, self.seen.goals, self.L, found)
-            touched = touching(found.Jt, walls, held)
+            held = nearest_between(part, walls, self.seen.goals, self.L, found)
+            touched = active_rank(found.Jt, walls, held)
             chi_square += float(held.z @ held.z - found.z @ found.z)
             found, freedom = held, freedom + touched
         return found, Consistency(chi_square, freedom, p_value(chi_square, freedom), LEVEL)
@@ -71,9 +79,9 @@ class Problem:
         """Relations whose contacts are `kept`, the most suspect first."""
         return suspects(self.seen.assembly, kept, self._test, lambda: self._pull(kept))
 
-    def narrowed(self, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
+    def contact_suspects(self, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
         """The contacts of one relation that are `kept`, the most suspect first."""
-        return narrowed(self.seen.assembly, kept, self._test, relation)
+        return contact_suspects(self.seen.assembly, kept, self._test, relation)
 
     def _test(self, kept: NDArray[np.bool_]) -> Consistency:
         return self.solve(kept)[1]
@@ -83,7 +91,7 @@ class Problem:
         chosen = kept & self.exact
         soft = np.hypot(self.slack_m, SOFT_M)[np.repeat(chosen, 3)]
         pull = np.zeros((len(self.compact), 3))
-        relaxed = nearest(self.compact.among(chosen), self.seen.goals, self.L, soft)
+        relaxed = nearest_goals(self.compact.among(chosen), self.seen.goals, self.L, soft)
         pull[chosen] = (relaxed.e / soft).reshape(-1, 3)
         return np.asarray((pull * pull).sum(axis=1))
 
@@ -93,7 +101,7 @@ class Problem:
 
     def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
         """The largest |e| of what is kept, [m]; of walls, by how much they are overstepped."""
-        return left_open(self.system, self.exact, self.walls, goals, kept)
+        return violation(self.system, self.exact, self.walls, goals, kept)
 
 
 def problem(seen: Observation, solver: Solver) -> Problem:
@@ -104,7 +112,7 @@ def problem(seen: Observation, solver: Solver) -> Problem:
     """
     L = scales(seen.covariance)
     plain = equations(seen.assembly, seen.start, seen.goals)
-    system, exact, walls = asked(plain, seen.assembly, seen.play_m)
-    every = compact(system, len(seen.goals))
+    system, exact, walls = demanded(plain, seen.assembly, seen.play_m)
+    every = compact_equations(system, len(seen.goals))
     fits = np.array([seen.assembly.is_fit(r.contact) for r in seen.assembly.relations()], dtype=np.bool_)
-    return Problem(seen, system, every, exact, walls, L, slack(fits, every, seen.play_m), solver)
+    return Problem(seen, system, every, exact, walls, L, fit_deviation(fits, every, seen.play_m), solver)

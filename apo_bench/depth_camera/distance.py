@@ -31,7 +31,7 @@ def shape_of(boxes: Iterable[Box], T: Array | None = None) -> Shape:
     return Shape(center @ T[:3, :3].T + T[:3, 3], half, np.repeat(T[None, :3, :3], len(kept), axis=0))
 
 
-def joined(shapes: Iterable[Shape]) -> Shape:
+def join_shapes(shapes: Iterable[Shape]) -> Shape:
     """One shape of several that have the same frame."""
     kept = tuple(shapes)
     return Shape(*(np.concatenate([shape[i] for shape in kept]) for i in range(3)))
@@ -59,7 +59,7 @@ def signed_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
     return np.take_along_axis(each, nearest, axis=-1)[..., 0], gradient
 
 
-def struck(shape: Shape, origin: Array, rays: Array) -> tuple[Array, NDArray[np.int64]]:
+def strike_distances(shape: Shape, origin: Array, rays: Array) -> tuple[Array, NDArray[np.int64]]:
     """How far rays from one point go until they strike the shape, (n,), and which box, (n,); infinite and -1 if none.
 
     Args:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.depth_camera.distance import Shape, struck
+from apo_bench.depth_camera.distance import Shape, strike_distances
 from apo_bench.depth_camera.regions import Mask
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
@@ -20,7 +20,7 @@ _AROUND = 12
 """Pixels around a region that a wrong model may cover."""
 
 
-def explained(
+def share_explained(
     shape: Shape, T: Array, views: Sequence[View], images: Array, appeared: Sequence[Mask], noise_m: float
 ) -> float:
     """Of the pixels that appeared, or that the model at T should cover, the share that agrees with it, 0 to 1.
@@ -37,7 +37,7 @@ def explained(
         measured = image.ravel()[pixels]
         pixels, measured = pixels[np.isfinite(measured)], measured[np.isfinite(measured)]
         origin, rays = pose.apply(to, view.origin[None])[0], view.rays[pixels] @ T[:3, :3]
-        expected, _ = struck(shape, origin, rays)
+        expected, _ = strike_distances(shape, origin, rays)
         new = mask.ravel()[pixels]
         agrees = np.abs(expected - measured) < close
         good += int((new & agrees).sum())

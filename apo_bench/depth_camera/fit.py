@@ -61,7 +61,7 @@ class Fits(NamedTuple):
     """(s,), mean of the robust loss, in units of its width squared, 0 to 1."""
 
 
-def refined(shape: Shape, points: Points, starts: Array, width_m: float, turns: int) -> Fits:
+def refine(shape: Shape, points: Points, starts: Array, width_m: float, turns: int) -> Fits:
     """Go down from every start (s, 4, 4) at once, by damped Gauss-Newton on body twists.
 
     The loss of a distance d is that of Geman and McClure, d^2 / (d^2 + w^2): points that are farther away than some

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
-from apo_bench.depth_camera.distance import Shape, joined, shape_of, struck
-from apo_bench.depth_camera.locate import ALIKE, Appearance, Located, Model, located, rivals
+from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, strike_distances
+from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
 from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.depth_camera.regions import Regions, regions
-from apo_bench.depth_camera.symmetry import nearest, symmetries
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.symmetry import nearest_symmetric_pose, symmetries
 
 _GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""
@@ -42,7 +42,7 @@ class Event:
     """The parts that are gone from where they were."""
     explained: Mapping[str, float]
     """How much of what appeared each model explains."""
-    found: Located | None
+    found: LocatedModel | None
     """Where the main part is now; None if nothing was recognised."""
     shape: Shape | None
     """What was fitted, in the frame of its main part; None if it is not known what moved."""
@@ -63,7 +63,9 @@ class Expected:
     """Clearance per side: the models are the parts as they are made."""
 
 
-def follow(images: Sequence[Array], finder: RangeFinder, level_m: float, expected: Expected) -> tuple[Event, ...]:
+def follow_demonstration(
+    images: Sequence[Array], finder: RangeFinder, level_m: float, expected: Expected
+) -> tuple[Event, ...]:
     """Find every operation in range images, one per quiet spell, each (views, height, width), [m]; the first is before.
 
     An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
@@ -86,11 +88,13 @@ def follow(images: Sequence[Array], finder: RangeFinder, level_m: float, expecte
         shares, found = _recognised(expected, shapes, group, which, seen)
         if which is not None and found is not None:
             operation = assembly.operations[which]
-            T = nearest(found.T, symmetries(assembly.solids[operation.main]), frame @ expected.turns[which])
+            T = nearest_symmetric_pose(
+                found.T, symmetries(assembly.solids[operation.main]), frame @ expected.turns[which]
+            )
             C = _turned(found, T)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
-            found = Located(T, C, found.explained)
+            found = LocatedModel(T, C, found.explained)
             step = T @ pose.inverse(believed[operation.main])
             believed |= {part: step @ believed[part] for part in operation.moves}
         k = k + 1 if which is None else which + 1
@@ -141,9 +145,9 @@ def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared:
 def _owners(view: View, shapes: Mapping[str, Shape], believed: Poses) -> NDArray[np.int64]:
     """Which part every few pixels of a view should show, by number, -1 for none."""
     owner = np.concatenate([np.full(len(shape.center), i) for i, shape in enumerate(shapes.values())])
-    scene = joined(_posed(shape, believed[part]) for part, shape in shapes.items())
+    scene = join_shapes(_posed(shape, believed[part]) for part, shape in shapes.items())
     pixels = np.arange(view.height * view.width).reshape(view.height, view.width)[::_GRID, ::_GRID]
-    _, box = struck(scene, view.origin, view.rays[pixels.ravel()])
+    _, box = strike_distances(scene, view.origin, view.rays[pixels.ravel()])
     return np.where(box < 0, -1, owner[box]).reshape(pixels.shape)
 
 
@@ -153,13 +157,13 @@ def _posed(shape: Shape, T: Array) -> Shape:
 
 def _recognised(
     expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, seen: Appearance
-) -> tuple[Mapping[str, float], Located | None]:
+) -> tuple[Mapping[str, float], LocatedModel | None]:
     """How much each model explains, and where the one that moved is, if none explains more."""
     assembly, points = expected.assembly, seen.points()
     shares: dict[str, float] = {}
     found = None
     if which is not None and group is not None:
-        found = located(group, seen, points)
+        found = locate(group, seen, points)
         shares["+".join(assembly.operations[which].moves)] = found.explained if found else 0.0
     models: dict[str, Model] = {}
     known = [] if group is None else [group.shape]
@@ -167,7 +171,7 @@ def _recognised(
         if part not in assembly.fixed and not any(_alike(shapes[part], shape) for shape in known):
             models[part] = Model(shapes[part], symmetries(solid))
             known.append(shapes[part])
-    shares |= rivals(models, seen, points)
+    shares |= model_shares(models, seen, points)
     if found is not None and found.explained < max(shares.values()) - ALIKE:
         found = None
     return shares, found
@@ -180,7 +184,7 @@ def _moved(assembly: Assembly, shapes: Mapping[str, Shape], believed: Poses, whi
     if not operation.carries:
         return Model(alone, symmetries(assembly.solids[operation.main]))
     back = pose.inverse(believed[operation.main])
-    together = joined(_posed(shapes[part], back @ believed[part]) for part in operation.moves)
+    together = join_shapes(_posed(shapes[part], back @ believed[part]) for part in operation.moves)
     return Model(together, np.eye(4)[None], main=len(alone.center))
 
 
@@ -188,7 +192,7 @@ def _alike(a: Shape, b: Shape) -> bool:
     return all(x.shape == y.shape and np.allclose(x, y) for x, y in zip(a, b, strict=True))
 
 
-def _turned(found: Located, T: Array) -> Array:
+def _turned(found: LocatedModel, T: Array) -> Array:
     """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
     S = pose.inverse(T) @ found.T
     A = np.zeros((6, 6))

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.ndimage import binary_erosion
 
 from apo_bench.depth_camera.distance import Shape, signed_distance
-from apo_bench.depth_camera.explained import explained
-from apo_bench.depth_camera.fit import Fits, Points, covariance, refined
-from apo_bench.depth_camera.regions import Mask, smoothed
+from apo_bench.depth_camera.explained import share_explained
+from apo_bench.depth_camera.fit import Fits, Points, covariance, refine
+from apo_bench.depth_camera.regions import Mask, median_filtered
 from apo_bench.depth_camera.starts import starts
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry.arrays import Array
@@ -75,7 +75,7 @@ class Appearance:
     @cached_property
     def smooth(self) -> Array:
         """The images with less noise, edges kept; NaN around what is missing."""
-        return np.array([smoothed(image) for image in self.images])
+        return np.array([median_filtered(image) for image in self.images])
 
     @property
     def width_m(self) -> float:
@@ -84,7 +84,7 @@ class Appearance:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Located:
+class LocatedModel:
     """A model where it was found."""
 
     T: Array
@@ -95,7 +95,7 @@ class Located:
     """0 to 1."""
 
 
-def located(model: Model, seen: Appearance, points: Points) -> Located | None:
+def locate(model: Model, seen: Appearance, points: Points) -> LocatedModel | None:
     """Fit a model to what appeared; None if there are too few points, or they are not explained by it.
 
     A main part with what it carries is found as one rigid thing. As a carried part may have been shifted in the hand,
@@ -117,10 +117,10 @@ def located(model: Model, seen: Appearance, points: Points) -> Located | None:
             alone = _fine(main, seen, own.thinned(_FINE), T)
             if (np.sqrt(np.diag(alone[1])) < _WELL_SEEN).all():
                 T, C = alone
-    return Located(T, C, share)
+    return LocatedModel(T, C, share)
 
 
-def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Mapping[str, float]:
+def model_shares(models: Mapping[str, Model], seen: Appearance, points: Points) -> Mapping[str, float]:
     """How much of what appeared each model explains where it fits best, 0 to 1."""
     if len(points) < 6:
         return dict.fromkeys(models, 0.0)
@@ -129,18 +129,18 @@ def rivals(models: Mapping[str, Model], seen: Appearance, points: Points) -> Map
 
 def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
     """The last fit, from a good start, and its covariance."""
-    T = refined(shape, points, T[None], seen.width_m, 20).T[0]
+    T = refine(shape, points, T[None], seen.width_m, 20).T[0]
     return T, covariance(shape, points, T, seen.width_m, seen.noise_m, seen.bias_m)
 
 
 def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
     """The best few of the fits from all starts."""
     begun = starts(model.shape, points.at, model.same)
-    first = refined(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * seen.width_m), 10)
+    first = refine(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * seen.width_m), 10)
     best = first.T[np.argsort(first.cost, kind="stable")[:_BEST]]
     middle = points.thinned(_MIDDLE)
-    nearer = refined(model.shape, middle, best, np.sqrt(seen.width_m * max(_WIDE_M, 3.0 * seen.width_m)), 8)
-    return refined(model.shape, middle, nearer.T, seen.width_m, 8)
+    nearer = refine(model.shape, middle, best, np.sqrt(seen.width_m * max(_WIDE_M, 3.0 * seen.width_m)), 8)
+    return refine(model.shape, middle, nearer.T, seen.width_m, 8)
 
 
 def _best(model: Model, seen: Appearance, points: Points) -> tuple[Array, float]:
@@ -152,4 +152,4 @@ def _best(model: Model, seen: Appearance, points: Points) -> tuple[Array, float]
 
 
 def _share(model: Model, seen: Appearance, T: Array) -> float:
-    return explained(model.shape, T, seen.views, seen.smooth, seen.masks, seen.noise_m)
+    return share_explained(model.shape, T, seen.views, seen.smooth, seen.masks, seen.noise_m)

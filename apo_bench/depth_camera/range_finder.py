@@ -8,10 +8,10 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.depth_camera.view import View, looking
+from apo_bench.depth_camera.view import View, look_at
 from apo_bench.geometry.arrays import Array
 
-MIDDLE_M = (0.05, 0.0, 0.03)
+VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
 
 
@@ -32,9 +32,9 @@ def _two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
     either side. At 0.95 m a pixel is 3 mm wide.
     """
     reach, height_m = 0.67, 0.67
-    at = np.array(MIDDLE_M)
+    at = np.array(VIEWED_POINT_M)
     ways = (np.array([side * 0.707 * reach, side * 0.707 * reach, height_m]) for side in (1.0, -1.0))
-    return tuple(View(looking(at + way, at), width, height, 48.0) for way in ways)
+    return tuple(View(look_at(at + way, at), width, height, 48.0) for way in ways)
 
 
 @final

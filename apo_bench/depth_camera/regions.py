@@ -45,14 +45,14 @@ def regions(before: Array, after: Array, noise_m: float) -> Regions:
 
     with np.errstate(invalid="ignore"):
         difference = after - before
-    change = smoothed(np.where(np.isfinite(difference), difference, 0.0))
+    change = median_filtered(np.where(np.isfinite(difference), difference, 0.0))
     least = max(_LEAST_M, _DEVIATIONS * _SMOOTHED * np.sqrt(2.0) * noise_m)
     square = np.ones((3, 3), dtype=np.bool_)
-    appeared, vanished = (large(binary_opening(sign * change > least, square)) for sign in (-1.0, 1.0))
+    appeared, vanished = (without_small(binary_opening(sign * change > least, square)) for sign in (-1.0, 1.0))
     return Regions(appeared, vanished, change)
 
 
-def smoothed(image: Array) -> Array:
+def median_filtered(image: Array) -> Array:
     """The median of the medians of three neighbours in a row, in three rows; edges stay where they are."""
     padded = np.pad(image, 1, mode="edge")
     rows = _median(padded[:, :-2], padded[:, 1:-1], padded[:, 2:])
@@ -63,7 +63,7 @@ def _median(a: Array, b: Array, c: Array) -> Array:
     return np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
 
 
-def large(mask: Mask) -> Mask:
+def without_small(mask: Mask) -> Mask:
     """A mask without its small and its thin components."""
     from scipy.ndimage import binary_erosion, label
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.depth_camera.distance import Shape
-from apo_bench.depth_camera.symmetry import quarter_turns
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.symmetry import quarter_turns
 
 _EDGE = 0.01
 """Share of the points beyond either end of their extent: noise makes regions larger than parts."""
@@ -30,7 +30,7 @@ def starts(shape: Shape, points: Array, same: Array) -> Array:
     low, high = _extent(points @ Z)
     found = []
     for R in distinct(quarter_turns(), same):
-        a, b = extent(shape, R)
+        a, b = turned_bounds(shape, R)
         at = np.array([*((low + high) / 2 - (a + b) / 2)[:2], high[2] - b[2]])
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = Z @ R, Z @ at
@@ -47,7 +47,7 @@ def distinct(turns: Array, same: Array) -> Array:
     return np.array(kept)
 
 
-def extent(shape: Shape, R: Array) -> tuple[Array, Array]:
+def turned_bounds(shape: Shape, R: Array) -> tuple[Array, Array]:
     """The lowest and the highest corner of the turned shape, (3,) each, [m]."""
     centers, reach = shape.center @ R.T, np.einsum("kij,kj->ki", np.abs(R @ shape.turn), shape.half)
     return (centers - reach).min(axis=0), (centers + reach).max(axis=0)

@@ -44,7 +44,7 @@ class View:
         return rays
 
 
-def looking(from_m: ArrayLike, at_m: ArrayLike) -> Array:
+def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
     """The pose (4, 4) of a camera that stands at a point, looks at another and holds its picture upright, [m]."""
     origin, at = np.asarray(from_m, dtype=np.float64), np.asarray(at_m, dtype=np.float64)
     z = (at - origin) / np.linalg.norm(at - origin)

@@ -31,7 +31,7 @@ _METRES = 20.0
 
 @final
 @dataclass(frozen=True, eq=False)
-class Located:
+class PoseRows:
     """Parts in images, one row for each."""
 
     file: str
@@ -50,7 +50,7 @@ class Located:
         return f"{self.file}, {place if isinstance(place, str) else f'line {place}'}"
 
 
-def read_results(path: str | Path) -> Located:
+def read_results(path: str | Path) -> PoseRows:
     """The rows of a results file; scores and times are checked and not kept.
 
     Raises:
@@ -70,10 +70,10 @@ def read_results(path: str | Path) -> Located:
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 12)
     where = np.frombuffer(ids, dtype=np.int64).reshape(-1, 3)
     R, t = cells[:, :9].reshape(-1, 3, 3), cells[:, 9:]
-    return checked(Located(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64)))
+    return check_rows(PoseRows(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64)))
 
 
-def checked(rows: Located) -> Located:
+def check_rows(rows: PoseRows) -> PoseRows:
     """The same rows.
 
     Raises:
@@ -95,7 +95,7 @@ def checked(rows: Located) -> Located:
     return rows
 
 
-def _refuse_twice(rows: Located) -> None:
+def _refuse_twice(rows: PoseRows) -> None:
     """Refuse the first row that is an earlier one once more, number by number."""
     cells = np.concatenate([rows.where.astype(np.float64), rows.t_mm, rows.R.reshape(-1, 9)], axis=1)
     order = np.lexsort(cells.T[::-1])

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.files.bop import LARGEST_ID, LARGEST_MM, Located, checked, read_results
+from apo_bench.files.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, read_results
 from apo_bench.io.reading import read_text
-from apo_bench.io.strict_json import Node, parse_json
+from apo_bench.io.strict_json import JsonNode, parse_json
 
-LARGEST_BYTES = 8_000_000
+LARGEST_TRUTH_BYTES = 8_000_000
 
 
-def read_truth(path: str | Path, estimates: Located, scene: int | None = None) -> Located:
+def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) -> PoseRows:
     """The truth that estimates are compared with.
 
     A `.json` file holds one scene, and does not say which: it is `scene`, else the number of its folder, else the only
@@ -57,10 +57,10 @@ def read_truth(path: str | Path, estimates: Located, scene: int | None = None) -
     return truth
 
 
-def _only(rows: Located, kept: Any) -> Located:
+def _only(rows: PoseRows, kept: Any) -> PoseRows:
     """The rows of a mask."""
     place = rows.place[kept] if isinstance(rows.place, np.ndarray) else tuple(np.array(rows.place)[kept].tolist())
-    return Located(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], place)
+    return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], place)
 
 
 def _among(where: Any, known: Any) -> Any:
@@ -69,7 +69,7 @@ def _among(where: Any, known: Any) -> Any:
     return np.isin(where[:, 0] * size + where[:, 1], known[:, 0] * size + known[:, 1])
 
 
-def _which_scene(path: Path, estimates: Located) -> int:
+def _which_scene(path: Path, estimates: PoseRows) -> int:
     folder = path.resolve().parent.name
     if folder.isascii() and folder.isdigit() and len(folder) <= 9:
         return int(folder)
@@ -83,15 +83,15 @@ def _which_scene(path: Path, estimates: Located) -> int:
     return int(scenes[0])
 
 
-def _read_scene(path: Path, scene: int) -> Located:
-    rows = list(_entries(parse_json(read_text(path, "JSON file of one scene", LARGEST_BYTES), str(path)), scene))
+def _read_scene(path: Path, scene: int) -> PoseRows:
+    rows = list(_entries(parse_json(read_text(path, "JSON file of one scene", LARGEST_TRUTH_BYTES), str(path)), scene))
     if not rows:
         raise InputError(f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
     where, R, t, place = zip(*rows, strict=True)
-    return checked(Located(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), place))
+    return check_rows(PoseRows(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), place))
 
 
-def _entries(root: Node, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:
+def _entries(root: JsonNode, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:
     """Of every entry: scene, image and object, R (3, 3), t (3,), and where it stands."""
     if not isinstance(root.value, dict):
         root.fail("an object is needed whose keys are the numbers of images")
@@ -100,7 +100,7 @@ def _entries(root: Node, scene: int) -> Iterator[tuple[tuple[int, int, int], Any
             raise InputError(f"{root.file}: the keys are numbers of images, '{image[:40]}' was given.")
         for i, entry in enumerate(root.child(entries, f"image {image}").items("entry"), start=1):
             place = f"image {image}, entry {i}"
-            node = Node(entry.value, root.file, place)
+            node = JsonNode(entry.value, root.file, place)
             part = _member(node, "obj_id").integer()
             if not 0 <= part <= LARGEST_ID:
                 _member(node, "obj_id").fail("a whole number from 0 is needed")
@@ -110,7 +110,7 @@ def _entries(root: Node, scene: int) -> Iterator[tuple[tuple[int, int, int], Any
             yield (scene, int(image), part), R, t, place
 
 
-def _member(node: Node, key: str) -> Node:
+def _member(node: JsonNode, key: str) -> JsonNode:
     """A member of an entry; others than those of the format are nobody's business."""
     if not isinstance(node.value, dict) or key not in node.value:
         raise InputError(

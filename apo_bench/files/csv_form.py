@@ -21,11 +21,11 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
-from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, within
+from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import FARTHEST_M
-from apo_bench.io.strict_csv import Columns, Row, read_csv
+from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
@@ -59,7 +59,7 @@ def read_table(
     Raises:
         InputError: Anything in the file that is not as described, naming line and column.
     """
-    assembly, rows = scenario.assembly, dict[int, Row]()
+    assembly, rows = scenario.assembly, dict[int, CsvRow]()
     for row in read_csv(path, _COLUMNS, _REQUIRED):
         k = _operation(row, assembly)
         if k in rows:
@@ -100,7 +100,7 @@ def table(assembly: Assembly, goals: Array) -> str:
     return text.getvalue()
 
 
-def _operation(row: Row, assembly: Assembly) -> int:
+def _operation(row: CsvRow, assembly: Assembly) -> int:
     """Which operation a row is of, counted from 0."""
     text = row.text("operation")
     if not text.isdecimal() or len(text) > 9 or not 1 <= int(text) <= len(assembly):
@@ -111,7 +111,7 @@ def _operation(row: Row, assembly: Assembly) -> int:
     return k
 
 
-def _pose(row: Row) -> Array:
+def _pose(row: CsvRow) -> Array:
     position = [row.number(name, FARTHEST_M) for name in _POSITION]
     x, *others = (row.cells[name] for name in _POSITION)
     for other in others:
@@ -129,18 +129,18 @@ def _pose(row: Row) -> Array:
     return pose.unpack(np.array([*position, *q]))
 
 
-def _deviation(row: Row, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
+def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
     """A standard deviation; the assumed one if the cell is empty."""
     if not row.text(meaning):
         return assumed
     x, unit = row.number(meaning, math.inf), row.cells[meaning][2]
-    if not within(x, limits):
+    if not is_within(x, limits):
         low, high = (limit / unit for limit in limits)
         row.fail(meaning, f"a standard deviation from {low:g} to {high:g} is needed")
     return x
 
 
-def _play(rows: Sequence[Row], assumed: float) -> float:
+def _play(rows: Sequence[CsvRow], assumed: float) -> float:
     """The play of parts that fit, [m], which is one number for all rows."""
     stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
@@ -151,7 +151,7 @@ def _play(rows: Sequence[Row], assumed: float) -> float:
     return stated[0][1] if stated else assumed
 
 
-def _flag(row: Row) -> bool:
+def _flag(row: CsvRow) -> bool:
     text = row.text("seen").lower()
     if text not in _FLAGS:
         row.fail("seen", "true or false is needed")

@@ -13,7 +13,7 @@ DEVIATION_MM, DEVIATION_DEG = 1.0, 1.0
 """What is assumed where a file states no standard deviations."""
 SHIFT_M, TURN_RAD = (1e-7, 10.0), (1e-4 * pi / 180.0, pi)
 """Least and greatest standard deviation, [m] and [rad]: within, ranks and gaps are told from rounding."""
-ALLOWED = "standard deviations from 0.0001 to 10000 mm and from 0.0001 to 180 deg are allowed"
+ALLOWED_DEVIATIONS = "standard deviations from 0.0001 to 10000 mm and from 0.0001 to 180 deg are allowed"
 _ROUNDING = 1e-9
 
 
@@ -28,7 +28,7 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
         ("deviation_deg", deviation_deg, pi / 180.0, TURN_RAD),
     ):
         number = isinstance(given, int | float | np.floating | np.integer) and not isinstance(given, bool)
-        if not number or not within(given * size, limits):
+        if not number or not is_within(given * size, limits):
             shown = f"{given:g}" if number else repr(given)
             low, high = (x / size for x in limits)
             raise InputError(f"{name} {shown} was given; a number from {low:g} to {high:g} is allowed.")
@@ -41,12 +41,12 @@ def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) 
     return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"
 
 
-def within(deviation: float, limits: tuple[float, float]) -> bool:
+def is_within(deviation: float, limits: tuple[float, float]) -> bool:
     """Whether a standard deviation, [m] or [rad], is between its limits; a NaN is not."""
     return limits[0] * (1.0 - _ROUNDING) <= deviation <= limits[1] * (1.0 + _ROUNDING)
 
 
-def sensible(covariance: Array) -> bool:
+def is_sensible(covariance: Array) -> bool:
     """Whether every variance of a body twist, on the diagonal of (6, 6) [m, rad], is that of such a deviation."""
     found = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    return all(within(float(x), SHIFT_M if i < 3 else TURN_RAD) for i, x in enumerate(found))
+    return all(is_within(float(x), SHIFT_M if i < 3 else TURN_RAD) for i, x in enumerate(found))

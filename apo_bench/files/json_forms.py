@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
-from apo_bench.assembly.schedule import REMEDY, fault
+from apo_bench.assembly.schedule import REMEDY, schedule_fault
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, unknown
-from apo_bench.files.deviations import ALLOWED, SHIFT_M, TURN_RAD, sensible, within
+from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.strict_json import Node, read_json
+from apo_bench.io.strict_json import JsonNode, read_json
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
@@ -85,7 +85,7 @@ def write_form(form: Form, path: str | Path) -> None:
 
 
 def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> Demonstration:
-    """A demonstration from its file; see `read_observation` for `scenario` and errors."""
+    """A demonstration from its file; see `read_json_observation` for `scenario` and errors."""
     root = _root(path, DEMONSTRATION, ("start", "operations", "final", "code"), ())
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     entries = _operations(root["operations"], found.assembly, ("careless_mm_deg",), ())
@@ -99,7 +99,7 @@ def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> De
     )
 
 
-def read_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
+def read_json_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
     """An observation from its file, measured or written by `write_form`.
 
     `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`) and `seen`
@@ -113,10 +113,10 @@ def read_observation(path: str | Path, scenario: Scenario | None = None) -> Obse
     Raises:
         InputError: Anything in the file that is not as described, naming file and key.
     """
-    return read_observed(path, scenario, None)[0]
+    return read_json_observed(path, scenario, None)[0]
 
 
-def read_observed(
+def read_json_observed(
     path: str | Path, scenario: Scenario | None, assumed: tuple[float, float] | None
 ) -> tuple[Observation, bool]:
     """The same, and whether a standard deviation had to be assumed.
@@ -142,13 +142,13 @@ def read_observed(
 
 
 def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
-    """A plan from its file; see `read_observation` for `scenario` and errors."""
+    """A plan from its file; see `read_json_observation` for `scenario` and errors."""
     root = _root(path, PLAN, ("start", "operations", "schedule"), ())
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     goals = np.array([_pose(entry) for entry in _operations(root["operations"], found.assembly, (), ())])
     steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]
     schedule = tuple(step for step, _ in steps)
-    if steps and (wrong := fault(schedule, len(goals))):
+    if steps and (wrong := schedule_fault(schedule, len(goals))):
         raise InputError(f"{path}, schedule: it {wrong}; {REMEDY}.")
     targets = np.array([T for _, T in steps] or goals)
     return Plan(found.assembly, _poses(root["start"], found), goals, schedule, targets)
@@ -183,14 +183,16 @@ def _operations_form(assembly: Assembly, goals: Array, extra: list[Form]) -> lis
     ]
 
 
-def _root(path: str | Path, schema: str, required: tuple[str, ...], optional: tuple[str, ...]) -> Mapping[str, Node]:
+def _root(
+    path: str | Path, schema: str, required: tuple[str, ...], optional: tuple[str, ...]
+) -> Mapping[str, JsonNode]:
     document = read_json(path)
     if isinstance(document.value, dict) and "schema" in document.value and document.value["schema"] != schema:
         document.child(document.value["schema"], "schema").fail(f'"{schema}" is needed')
     return document.fields(("schema", "scenario", *required), optional)
 
 
-def _scenario(node: Node, given: Scenario | None, folder: Path) -> Scenario:
+def _scenario(node: JsonNode, given: Scenario | None, folder: Path) -> Scenario:
     from apo_bench.scenario.file import load_scenario
 
     name = node.text()
@@ -204,8 +206,8 @@ def _scenario(node: Node, given: Scenario | None, folder: Path) -> Scenario:
 
 
 def _operations(
-    node: Node, assembly: Assembly, required: tuple[str, ...], optional: tuple[str, ...]
-) -> list[Mapping[str, Node]]:
+    node: JsonNode, assembly: Assembly, required: tuple[str, ...], optional: tuple[str, ...]
+) -> list[Mapping[str, JsonNode]]:
     entries = [
         entry.fields(("operation", "part", *_POSE, *required), optional)
         for entry in node.items("operation", len(assembly))
@@ -218,14 +220,14 @@ def _operations(
     return entries
 
 
-def _pose(fields: Mapping[str, Node]) -> Array:
+def _pose(fields: Mapping[str, JsonNode]) -> Array:
     position, q = fields["position_mm"].numbers(3), fields["quaternion_wxyz"].numbers(4)
     if abs(np.linalg.norm(q) - 1.0) > 1e-3:
         fields["quaternion_wxyz"].fail("a quaternion of length 1 (within 0.001) is needed", "divide it by its length")
     return pose.unpack(np.concatenate([position * 1e-3, q]))
 
 
-def _poses(node: Node, scenario: Scenario) -> Poses:
+def _poses(node: JsonNode, scenario: Scenario) -> Poses:
     parts = tuple(scenario.assembly.solids)
     for part in node.value if isinstance(node.value, dict) else ():
         if part not in parts:
@@ -234,7 +236,7 @@ def _poses(node: Node, scenario: Scenario) -> Poses:
     return {part: _pose(fields[part].fields(_POSE)) for part in parts}
 
 
-def _covariance(node: Node, *, definite: bool = True) -> Array:
+def _covariance(node: JsonNode, *, definite: bool = True) -> Array:
     C = node.numbers(6, 6)
     largest = float(np.abs(C).max())
     if np.abs(C - C.T).max() > 1e-9 * largest:
@@ -247,14 +249,16 @@ def _covariance(node: Node, *, definite: bool = True) -> Array:
     return (C + C.T) / 2 / np.outer(_TO_MM_DEG, _TO_MM_DEG)
 
 
-def _stated(entry: Mapping[str, Node], assumed: tuple[float, float] | None) -> Array:
+def _stated(entry: Mapping[str, JsonNode], assumed: tuple[float, float] | None) -> Array:
     """The covariance of an operation, (6, 6) [m, rad], out of either way to state it, or of what is assumed."""
     by_deviation = [key for key in _DEVIATIONS if key in entry]
     if "covariance_mm_deg" in entry and not by_deviation:
         C = _covariance(entry["covariance_mm_deg"])
-        if not sensible(C):
+        if not is_sensible(C):
             node = entry["covariance_mm_deg"]
-            raise InputError(f"{node.file}, {node.key}: the square root of a variance is out of range; {ALLOWED}.")
+            raise InputError(
+                f"{node.file}, {node.key}: the square root of a variance is out of range; {ALLOWED_DEVIATIONS}."
+            )
         return C
     if "covariance_mm_deg" in entry or (assumed is None and len(by_deviation) != 2):
         node = entry["operation"]
@@ -268,14 +272,14 @@ def _stated(entry: Mapping[str, Node], assumed: tuple[float, float] | None) -> A
     return np.diag(np.array([mm] * 3 + [deg] * 3) / _TO_MM_DEG) ** 2
 
 
-def _deviation(node: Node, limits: tuple[float, float], unit: float) -> float:
+def _deviation(node: JsonNode, limits: tuple[float, float], unit: float) -> float:
     x = node.number(0.0, above=True)
-    if not within(x * unit, limits):
+    if not is_within(x * unit, limits):
         node.fail(f"a standard deviation from {limits[0] / unit:g} to {limits[1] / unit:g} is needed")
     return x
 
 
-def _named(entry: Mapping[str, Node], by_deviation: list[str]) -> str:
+def _named(entry: Mapping[str, JsonNode], by_deviation: list[str]) -> str:
     given = [key for key in ("covariance_mm_deg", *by_deviation) if key in entry]
     return " with ".join(f"'{key}'" for key in given) or "neither"
 
@@ -285,7 +289,7 @@ def _step_form(plan: Plan, step: Step, target: Array) -> Form:
     return {"operation": step.operation + 1, "undo": step.undo, **own}
 
 
-def _step(node: Node, goals: Array) -> tuple[Step, Array]:
+def _step(node: JsonNode, goals: Array) -> tuple[Step, Array]:
     """A step of the schedule and its target, which is the goal of its operation if none is stated."""
     stated = isinstance(node.value, dict) and any(key in node.value for key in _POSE)
     fields = node.fields(("operation", *_POSE) if stated else ("operation",), ("undo",) if stated else ("undo", *_POSE))

@@ -17,7 +17,7 @@ from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
 
-class Observed(NamedTuple):
+class ObservationFile(NamedTuple):
     """An observation with its scenario."""
 
     observation: Observation
@@ -43,16 +43,16 @@ def read_observation(
     Raises:
         InputError: Anything that is not as described, with the place where it stands.
     """
-    return observed(path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg).observation
+    return read_observation_file(path, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg).observation
 
 
-def observed(
+def read_observation_file(
     path: str | Path,
     scenario: Scenario | str | Path,
     *,
     deviation_mm: float = DEVIATION_MM,
     deviation_deg: float = DEVIATION_DEG,
-) -> Observed:
+) -> ObservationFile:
     """The same, with what is known of it."""
     from apo_bench.files import json_forms as files
     from apo_bench.scenario.file import load_scenario
@@ -62,11 +62,11 @@ def observed(
         raise InputError(f"{path!r} was given as an observation; give the path of a .csv or .json file.")
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
-        seen, assumed = files.read_observed(path, known, (deviation_mm, deviation_deg))
+        seen, assumed = files.read_json_observed(path, known, (deviation_mm, deviation_deg))
         _check_near(path, seen)
     else:
         seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
-    return Observed(seen, known, assumed)
+    return ObservationFile(seen, known, assumed)
 
 
 def read_stated(path: str | Path, scenario: Scenario) -> Observation:
@@ -78,10 +78,10 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
     if Path(path).suffix.lower() != ".csv":
         from apo_bench.files import json_forms as files
 
-        seen = files.read_observation(path, scenario)
+        seen = files.read_json_observation(path, scenario)
         _check_near(path, seen)
         return seen
-    seen, _, assumed = observed(path, scenario)
+    seen, _, assumed = read_observation_file(path, scenario)
     if assumed:
         raise InputError(
             f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row."

@@ -23,10 +23,10 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     if between @ between > (reach_a + reach_b + _TOUCHING_M) ** 2:
         return 0.0
-    return max(0.0, float(depths(a.boxes, T_a[:3, :3], T_a[None, :3, 3], b.boxes, T_b)[0]))
+    return max(0.0, float(intrusion_depths(a.boxes, T_a[:3, :3], T_a[None, :3, 3], b.boxes, T_b)[0]))
 
 
-def depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: Array) -> Array:
+def intrusion_depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: Array) -> Array:
     """As `intrusion`, of boxes that keep their orientation at k places; negative where they are apart.
 
     Args:
@@ -68,7 +68,7 @@ def _axes(R_a: Array, R_b: Array) -> Array:
     return np.concatenate([R_a.T, R_b.T, crossed[kept] / length[kept, None]])
 
 
-def upright(boxes: tuple[Box, ...], R: Array, at: Array) -> tuple[Array, Array]:
+def upright_bounds(boxes: tuple[Box, ...], R: Array, at: Array) -> tuple[Array, Array]:
     """The lowest and the highest corner, (3,) each, of the box around posed boxes whose sides are those of the world.
 
     Args:

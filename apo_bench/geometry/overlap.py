@@ -77,7 +77,7 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     return Overlap(corners, float(sum(piece.area for piece in pieces)), common)
 
 
-def area(face: Face) -> float:
+def face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
     return float(_polygon(face, pose.inverse(_plane_frame(face))).area)
 

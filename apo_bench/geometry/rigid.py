@@ -11,7 +11,7 @@ FARTHEST_M = 1e4
 """Nothing is farther from the origin: beyond it, rounding is no longer small."""
 
 
-def rigid(T: ArrayLike) -> NDArray[np.bool_]:
+def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
     """Whether each matrix, (n, 4, 4), is a proper rigid displacement, -> (n,); numbers that are not finite are not."""
     T = np.asarray(T, dtype=np.float64)
     finite = np.isfinite(T).all(axis=(1, 2))

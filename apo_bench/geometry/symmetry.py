@@ -60,7 +60,7 @@ def folds(symmetric: Array) -> Array:
     return np.array([1.0 + sum(R[i, i] == 1.0 for R in symmetric[1:, :3, :3]) for i in range(3)])
 
 
-def nearest(symmetric: Array, off: Array) -> Array:
+def nearest_symmetry(symmetric: Array, off: Array) -> Array:
     """For each displacement (n, 4, 4), the symmetry g (n, 4, 4) for which `off @ g` turns the least.
 
     Of several that are as good the first is taken, which is the identity wherever that is one of them.
@@ -68,6 +68,12 @@ def nearest(symmetric: Array, off: Array) -> Array:
     traces = np.einsum("nij,mji->nm", off[:, :3, :3], symmetric[:, :3, :3])
     close = traces >= traces.max(axis=1, keepdims=True) - 1e-12
     return np.asarray(symmetric[np.argmax(close, axis=1)])
+
+
+def nearest_symmetric_pose(T: Array, symmetric: Array, expected: Array) -> Array:
+    """Of all poses T g that look the same, (4, 4), the one turned least away from an expected rotation (3, 3)."""
+    poses = T @ symmetric
+    return np.asarray(poses[np.einsum("nij,ij->n", poses[:, :3, :3], expected).argmax()])
 
 
 def _same(a: list[tuple[Array, Array]], b: list[tuple[Array, Array]]) -> bool:

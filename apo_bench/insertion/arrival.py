@@ -10,13 +10,13 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.assembly.touching import Touching, corners, touching
+from apo_bench.assembly.touching import TouchedContact, corners, touched_contacts
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.insertion.line import Attach, Preference
-from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departs
+from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
 from apo_bench.insertion.screw import Screw, screw_state
-from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space, snapped
-from apo_bench.insertion.swept import Posed, exit_after, free
+from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space, snap_normals
+from apo_bench.insertion.swept import Posed, exit_distance, is_way_free
 
 _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
@@ -36,7 +36,7 @@ class Arrival:
     main: str
     T: Array
     """(4, 4), where the main part then is; directions below are in the frame of the same world."""
-    touched: tuple[Touching, ...]
+    touched: tuple[TouchedContact, ...]
     chain: Chain
     """Its macros, contacts by their number in `touched`."""
     departs: tuple[Macro, ...]
@@ -92,7 +92,7 @@ def arrive(
         angle_rad: Normals this near to parallel are; more than rounding where poses were only seen.
     """
     T = poses[moves[0]]
-    touched = tuple(touching(assembly, contacts, moves, poses))
+    touched = tuple(touched_contacts(assembly, contacts, moves, poses))
     normals = _normals(touched, angle_rad)
     moving = [Posed(assembly.solids[part].boxes, poses[part]) for part in moves]
     resting = {part: Posed(solid.boxes, poses[part]) for part, solid in assembly.solids.items() if part not in moves}
@@ -103,7 +103,7 @@ def arrive(
     def clear(way: Array, length_m: float) -> bool:
         begin = [Posed(posed.boxes, _shifted(posed.T, length_m * way)) for posed in moving]
         others = list(resting.values())
-        return free(moving, way, length_m, others) and free(begin, UP, _CLEAR_M, others)
+        return is_way_free(moving, way, length_m, others) and is_way_free(begin, UP, _CLEAR_M, others)
 
     def reach(exit_m: float) -> float:
         return _length(exit_m) if stated.travel_m is None else stated.travel_m
@@ -112,7 +112,7 @@ def arrive(
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
         floors = [normals[i] for i in range(len(normals)) if i not in walls]
         there = [-(T[:3, :3] @ direction)] if direction is not None else list(_directions(along, floors, T))
-        ways = [Way(u, exit_after(moving, u, around), False) for u in there]
+        ways = [Way(u, exit_distance(moving, u, around), False) for u in there]
         found = (way._replace(free=True) for way in ways if clear(way.direction, reach(way.length_m)))
         return next(found, ways[0])
 
@@ -126,10 +126,10 @@ def arrive(
     if direction is not None:
         line = Attach(direction, line.travel_m)
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > 0.5)
-    return Arrival(moves[0], T, touched, found, departs(found, supports), line, is_free and not found.locked)
+    return Arrival(moves[0], T, touched, found, departure(found, supports), line, is_free and not found.locked)
 
 
-def turning(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
+def turning_state(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
     """The state of what has arrived if it may also turn; `poses` as it was understood at."""
     return screw_state(*corners(assembly, found.touched, poses))
 
@@ -174,8 +174,8 @@ def _length(exit_m: float) -> float:
     return max(_TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3)))
 
 
-def _normals(touched: Sequence[Touching], angle_rad: float = ANGLE_RAD) -> Array:
-    return snapped(np.array([each.normal for each in touched]).reshape(-1, 3), angle_rad)
+def _normals(touched: Sequence[TouchedContact], angle_rad: float = ANGLE_RAD) -> Array:
+    return snap_normals(np.array([each.normal for each in touched]).reshape(-1, 3), angle_rad)
 
 
 def _own(direction: Array, T: Array) -> Array:

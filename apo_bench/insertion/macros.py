@@ -16,7 +16,7 @@ from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.insertion.peeling import Layer, peel
 from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space
 
-Name = Literal[
+MacroName = Literal[
     "move-to-contact",
     "slide-to-contact",
     "insert-into",
@@ -25,7 +25,7 @@ Name = Literal[
     "move-to-bottom",
     "depart",
 ]
-_INSERTIONS: tuple[Name, ...] = ("insert-into", "insert-between", "insert-into-slot")
+_INSERTIONS: tuple[MacroName, ...] = ("insert-into", "insert-between", "insert-into-slot")
 UP = np.array([0.0, 0.0, 1.0])
 _SMALL = 1e-9
 
@@ -35,7 +35,7 @@ _SMALL = 1e-9
 class Macro:
     """One straight motion, in the frame in which the contacts were given."""
 
-    name: Name
+    name: MacroName
     direction: Array
     """Unit vector, (3,)."""
     makes: tuple[int, ...]
@@ -108,7 +108,7 @@ def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
     return Chain(state, tuple(macros), way, False)
 
 
-def departs(found: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
+def departure(found: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     """The macros by which a part leaves the contacts of a chain: the same ways back, in reverse order.
 
     A part that only rests on supports is simply lifted, which belongs to every transfer; that is no macro.
@@ -129,7 +129,7 @@ def departs(found: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
 
 def _insertion(layer: Layer, layers: Sequence[Layer], way: Way) -> Macro:
     """The motion between walls: along an axis, with a floor at the end, or between two planes."""
-    name: Name = "insert-into"
+    name: MacroName = "insert-into"
     if layer.cone.state.constraining == 1:
         name = "insert-into-slot" if len(layers) > 1 else "insert-between"
     return Macro(name, -way.direction, layer.breaks, (), way.length_m)
@@ -145,7 +145,7 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
         if not closed:  # nothing is left to move along, so the rest closes with what was made last
             macros[-1] = Macro(macros[-1].name, macros[-1].direction, (*macros[-1].makes, *left), macros[-1].keeps)
             break
-        name: Name = "slide-to-contact" if macros else "move-to-contact"
+        name: MacroName = "slide-to-contact" if macros else "move-to-contact"
         if layer.cone.state.constraining == 2:
             name = "move-to-bottom"
         macros.append(Macro(name, -off, closed, made))

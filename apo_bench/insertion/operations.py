@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import final
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import ANY, Arrival, arrive
@@ -21,7 +21,7 @@ from apo_bench.insertion.states import ANGLE_RAD
 
 @final
 @dataclass(frozen=True, eq=False)
-class Understood:
+class OperationMacros:
     """One operation, in terms of macros."""
 
     operation: int
@@ -45,7 +45,7 @@ def understand(
     goals: Array,
     stated: Sequence[Preference] = (),
     angle_rad: float = ANGLE_RAD,
-) -> tuple[Understood, ...]:
+) -> tuple[OperationMacros, ...]:
     """Every operation.
 
     Args:
@@ -55,9 +55,9 @@ def understand(
             is not.
         angle_rad: Faces this near to parallel are; more than rounding where goals were only seen.
     """
-    stages = (start, *placed(assembly, start, goals))
+    stages = (start, *placements(assembly, start, goals))
     lines = tuple(stated) or (ANY,) * len(assembly)
-    understood: list[Understood] = []
+    understood: list[OperationMacros] = []
     put: dict[str, int] = {}
     for k, operation in enumerate(assembly.operations):
         was = _held_by(assembly, put.get(operation.main), operation.moves)
@@ -68,7 +68,7 @@ def understand(
         )
         before = arrive(assembly, operation.moves, _lost_at(assembly, k), stages[k], back, angle_rad)
         after = arrive(assembly, operation.moves, operation.contacts, stages[k + 1], lines[k], angle_rad)
-        understood.append(Understood(k, operation.main, operation.carries, before, after))
+        understood.append(OperationMacros(k, operation.main, operation.carries, before, after))
         put[operation.main] = k
     return tuple(understood)
 

@@ -22,7 +22,7 @@ _RANK = 1e-4
 """Singular values below this part of the largest are zero."""
 _FASTEST = 1e3
 """Bound of the components of a motion that opens contacts at unit speed: a narrower cone counts as flat."""
-LETTERS = {
+STATE_LETTERS = {
     (3, 0, 0): "S",
     (2, 1, 0): "A",
     (2, 0, 1): "B",
@@ -47,7 +47,7 @@ class State(NamedTuple):
     @property
     def letter(self) -> str:
         """Of a state of translation; empty for screws."""
-        return LETTERS.get((self.maintaining, self.detaching, self.constraining), "")
+        return STATE_LETTERS.get((self.maintaining, self.detaching, self.constraining), "")
 
     def __str__(self) -> str:
         """`D (1,1,1)`."""
@@ -88,7 +88,7 @@ def classify(rows: Array) -> Cone:
     different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
     opens, x = _opened(different.tobytes(), *different.shape)
     detachable = opens[which.ravel()]
-    maintaining, constraining = n - rank(rows), rank(rows[~detachable])
+    maintaining, constraining = n - row_rank(rows), row_rank(rows[~detachable])
     return Cone(rows, detachable, x, State(maintaining, n - maintaining - constraining, constraining))
 
 
@@ -110,7 +110,7 @@ def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
     return opens, x / max(float(np.linalg.norm(x)), 1e-300)
 
 
-def rank(rows: Array) -> int:
+def row_rank(rows: Array) -> int:
     """How many rows, (k, n), are independent."""
     if not len(rows):
         return 0
@@ -122,10 +122,10 @@ def null_space(rows: Array) -> Array:
     """An orthonormal basis of the motions that keep every contact closed, (m, n)."""
     if not len(rows):
         return np.eye(rows.shape[1])
-    return np.linalg.svd(rows)[2][rank(rows) :]
+    return np.linalg.svd(rows)[2][row_rank(rows) :]
 
 
-def snapped(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
+def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
     """Unit normals, (k, 3), of which those within an angle of an earlier one, or of its opposite, become that.
 
     Between two walls a part is held; between two that are seen a little askew it would seem to be in a wedge.

@@ -18,7 +18,7 @@ OVER_M = 0.02
 """Room between what is carried and what it is carried over."""
 
 
-def slides(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[Array, ...]:
+def slide_directions(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[Array, ...]:
     """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are believed to be."""
     sides: list[Array] = []
     for macro in found.macros:

@@ -27,7 +27,7 @@ class Posed(NamedTuple):
     """(4, 4), world, [m]."""
 
 
-def meetings(moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M) -> Array:
+def overlap_intervals(moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M) -> Array:
     """Where along a line the boxes of two parts overlap by more than a slack, (k, 2), [m]: from and until.
 
     Args:
@@ -44,19 +44,19 @@ def meetings(moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_
     return _intervals(at, axes @ way, reach)
 
 
-def free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
+def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
     """Whether parts can be moved so far as one without coming into any other."""
     for m, r in product(moving, resting):
         if _near(m, way, length_m, r):
-            spans = meetings(m, way, r)
+            spans = overlap_intervals(m, way, r)
             if ((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any():
                 return False
     return True
 
 
-def exit_after(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
+def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
     """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap."""
-    found = [meetings(m, way, r, -_SLACK_M) for m in moving for r in resting]
+    found = [overlap_intervals(m, way, r, -_SLACK_M) for m in moving for r in resting]
     spans = np.concatenate(found) if found else np.zeros((0, 2))
     at = 0.0
     while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):

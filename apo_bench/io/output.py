@@ -11,7 +11,7 @@ from apo_bench.io.processes import flush
 
 
 @contextmanager
-def aside(asked: bool) -> Iterator[None]:
+def redirect_output(asked: bool) -> Iterator[None]:
     """If asked, what is printed meanwhile, by whatever code and below Python too, goes to standard error."""
     if not asked:
         yield

@@ -20,7 +20,7 @@ Columns = Mapping[str, tuple[str, float]]
 
 @final
 @dataclass(frozen=True)
-class Row:
+class CsvRow:
     """One row, its cells by what they stand for."""
 
     file: str
@@ -49,7 +49,7 @@ class Row:
         return x
 
 
-def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Iterator[Row]:
+def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Iterator[CsvRow]:
     """Every row that is not empty, behind the first, which names the columns.
 
     Args:
@@ -75,7 +75,7 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
                     f"{len(texts)} were given."
                 )
             cells_of = {columns[c][0]: (c, text, columns[c][1]) for c, text in zip(names, texts, strict=True)}
-            yield Row(str(path), reader.line_num, cells_of)
+            yield CsvRow(str(path), reader.line_num, cells_of)
     except csv.Error as error:
         raise InputError(f"{path}, line {reader.line_num}: this is not a CSV file ({error}).") from error
     if not names:

@@ -26,7 +26,7 @@ _LARGEST_INTEGER = 10**308
 
 @final
 @dataclass(frozen=True)
-class Node:
+class JsonNode:
     """A value of a JSON document and where it stands in it."""
 
     value: Any
@@ -39,10 +39,10 @@ class Node:
         place = f"{self.file}, {self.key}" if self.key else self.file
         raise InputError(f"{place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
 
-    def child(self, value: Any, key: str) -> Node:
-        return Node(value, self.file, f"{self.key}, {key[:60]}" if self.key else key[:60])
+    def child(self, value: Any, key: str) -> JsonNode:
+        return JsonNode(value, self.file, f"{self.key}, {key[:60]}" if self.key else key[:60])
 
-    def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, Node]:
+    def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
         """The members of an object: every required key, no unknown one."""
         required, optional = tuple(required), tuple(optional)
         if not isinstance(self.value, dict):
@@ -60,13 +60,13 @@ class Node:
                 raise InputError(f"{place}: the key '{key}' is missing; needed are {', '.join(required)}.")
         return {key: self.child(value, key) for key, value in self.value.items()}
 
-    def items(self, name: str, count: int | None = None) -> Sequence[Node]:
+    def items(self, name: str, count: int | None = None) -> Sequence[JsonNode]:
         """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given."""
         if not isinstance(self.value, list):
             self.fail("a list is needed")
         if count is not None and len(self.value) != count:
             raise InputError(f"{self.file}, {self.key}: {count} entries are needed, {len(self.value)} were given.")
-        return [Node(value, self.file, f"{name} {i}") for i, value in enumerate(self.value, start=1)]
+        return [JsonNode(value, self.file, f"{name} {i}") for i, value in enumerate(self.value, start=1)]
 
     def numbers(self, *shape: int) -> Array:
         """Finite numbers in nested lists of this shape."""
@@ -107,7 +107,7 @@ class Node:
         return self.value
 
 
-def read_json(path: str | Path) -> Node:
+def read_json(path: str | Path) -> JsonNode:
     """The document in a file.
 
     Raises:
@@ -116,7 +116,7 @@ def read_json(path: str | Path) -> Node:
     return parse_json(read_text(path, "JSON file"), str(path))
 
 
-def parse_json(text: str, file: str) -> Node:
+def parse_json(text: str, file: str) -> JsonNode:
     """The document in a text; `file` is its name in messages."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -140,7 +140,7 @@ def parse_json(text: str, file: str) -> Node:
             f"{file}: this is not a JSON document that can be read (nested too deep, or a huge number)."
         ) from error
     check_plain(document, file)
-    return Node(document, file)
+    return JsonNode(document, file)
 
 
 def check_plain(document: Any, file: str) -> None:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from apo_bench.errors import InputError
 from apo_bench.io.reading import decoded, read_bytes
-from apo_bench.io.strict_json import DEEPEST, Node, check_plain
+from apo_bench.io.strict_json import DEEPEST, JsonNode, check_plain
 
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST}}}")
 """More names with dots between them than any key has; the time to read such keys grows with their square."""
 
 
-def read_toml(path: str | Path, kind: str) -> Node:
+def read_toml(path: str | Path, kind: str) -> JsonNode:
     """The document in a file.
 
     Args:
@@ -27,7 +27,7 @@ def read_toml(path: str | Path, kind: str) -> Node:
     return parse_toml(read_bytes(path, f"{kind}, which ends in .toml"), str(path))
 
 
-def parse_toml(raw: bytes, file: str) -> Node:
+def parse_toml(raw: bytes, file: str) -> JsonNode:
     """The document in a text; `file` is its name in messages."""
     text = decoded(raw, file, "TOML file")
     if found := _LONG_KEY.search(text):
@@ -39,4 +39,4 @@ def parse_toml(raw: bytes, file: str) -> Node:
         what = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "nested too deep, or a huge number"
         raise InputError(f"{file}: this is not TOML: {what}; mend the file at that place.") from error
     check_plain(document, file)
-    return Node(document, file)
+    return JsonNode(document, file)

@@ -13,7 +13,7 @@ import msgspec
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import clean
 
-HALF = re.compile("[\ud800-\udfff]")
+HALF_LETTER = re.compile("[\ud800-\udfff]")
 """Half a letter, such as a lone \\ud800, which no file can hold as UTF-8."""
 HALF_BUT_OF_FILES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 """The same but for those that stand for bytes in names of files that are not UTF-8."""
@@ -31,7 +31,7 @@ def read_whole(text: bytes, where: str, half: re.Pattern[str]) -> Any:
 
     Args:
         where: File and line, for the complaint.
-        half: `HALF` or `HALF_BUT_OF_FILES`.
+        half: `HALF_LETTER` or `HALF_BUT_OF_FILES`.
 
     Raises:
         InputError: A key stands twice, or a text has half a letter.

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from apo_bench.assembly.goals import Reached, Snapshot
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -17,7 +17,7 @@ from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
 
 
-def demonstrated(
+def judge_demonstrated(
     assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
 ) -> Judgement:
     """Judge every contact when it is made and, if it still stands, at the end; and every state for what is around it.
@@ -69,7 +69,7 @@ def _true_overlaps(assembly: Assembly, after: Sequence[Snapshot | None], referen
     first = next((snapshot for snapshot in after if snapshot is not None), None)
     if first is None:
         return [NOTHING] * len(assembly.relations())
-    history = placed(assembly, first.poses, reference)
+    history = placements(assembly, first.poses, reference)
     return [face_overlap(assembly, contact, history[made]) for contact, made, _ in assembly.relations()]
 
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from apo_bench.assembly.goals import Reached, Snapshot
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Relation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import Overlap
 from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import nearest, symmetries
+from apo_bench.geometry.symmetry import nearest_symmetry, symmetries
 from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
@@ -21,7 +21,7 @@ from apo_bench.records.thresholds import Thresholds
 _SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
 
 
-def finished(
+def judge_finished(
     assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
 ) -> Judgement:
     """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and that all parts stayed where put.
@@ -75,7 +75,7 @@ def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
 def _contacts(asked: ContactJudge, final: Snapshot, reference: Array, away: frozenset[str]) -> Iterator[ContactVerdict]:
     """Those that stand at the end, of parts that are no fixtures."""
     assembly = asked.assembly
-    true = placed(assembly, final.poses, reference)[-1]
+    true = placements(assembly, final.poses, reference)[-1]
     poses = {part: _nearest_alike(assembly, part, T, true[part]) for part, T in final.poses.items()}
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
@@ -87,7 +87,7 @@ def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Arra
     """The pose at which the part looks as it does, turned from the true one the least."""
     if part in assembly.fixed:
         return T
-    return np.asarray(T @ nearest(symmetries(assembly.solids[part]), (pose.inverse(true) @ T)[None])[0])
+    return np.asarray(T @ nearest_symmetry(symmetries(assembly.solids[part]), (pose.inverse(true) @ T)[None])[0])
 
 
 def _share_of_area(found: Overlap, true: Overlap) -> float:

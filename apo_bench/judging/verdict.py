@@ -10,8 +10,8 @@ import numpy as np
 from apo_bench.assembly.goals import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
-from apo_bench.judging.demonstrated import demonstrated
-from apo_bench.judging.finished import finished
+from apo_bench.judging.demonstrated import judge_demonstrated
+from apo_bench.judging.finished import judge_finished
 from apo_bench.judging.judgement import Judgement
 from apo_bench.records.thresholds import Meaning, Thresholds
 
@@ -69,8 +69,8 @@ def judge(
     sound = Reached(after=tuple(map(_sound, reached.after)), final=_sound(reached.final))
     return Verdict(
         meaning,
-        finished=finished(assembly, sound, reference, thresholds, clearance_mm),
-        demonstrated=demonstrated(assembly, sound, reference, thresholds, clearance_mm),
+        finished=judge_finished(assembly, sound, reference, thresholds, clearance_mm),
+        demonstrated=judge_demonstrated(assembly, sound, reference, thresholds, clearance_mm),
     )
 
 

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Fitted, Measured
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Fitted, MeasuredNoise
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.records.short_names import RESIDUALS
@@ -55,7 +55,7 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
     return Fitted(measured, level, camera)
 
 
-def read_noise(path: str | Path) -> tuple[Measured, Camera]:
+def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     """What a noise file states, and the camera it names, else the default one."""
     root = read_toml(path, "noise file")
     if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) != _SCHEMA:
@@ -63,7 +63,7 @@ def read_noise(path: str | Path) -> tuple[Measured, Camera]:
     required = ("schema", "source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
     top = root.fields(required, ("camera",))
     shift, turn = _split(top["shift"], "mm", 1000.0), _split(top["turn"], "deg", 180.0)
-    measured = Measured(
+    measured = MeasuredNoise(
         source=top["source"].text(),
         shift_mm=shift,
         turn_deg=turn,
@@ -74,7 +74,7 @@ def read_noise(path: str | Path) -> tuple[Measured, Camera]:
     return measured, Camera(read_pose(top["camera"])) if "camera" in top else Camera()
 
 
-def noise_text(measured: Measured, notes: tuple[str, ...] = ()) -> str:
+def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
     """A noise file, with notes at its head."""
     source = measured.source.replace("\\", "\\\\").replace('"', '\\"')
     head = (
@@ -97,7 +97,7 @@ def _split_lines(name: str, split: Split, unit: str) -> list[str]:
     return lines
 
 
-def _split(node: Node, unit: str, largest: float) -> Split:
+def _split(node: JsonNode, unit: str, largest: float) -> Split:
     tails = [(f"{d}_scale_{unit}", f"{d}_degrees_of_freedom") for d in ("across", "along")]
     keys = node.fields((f"limit_{unit}", *(key for pair in tails for key in pair)))
     limit = _number(keys[f"limit_{unit}"], 1e-3, largest)
@@ -108,7 +108,7 @@ def _split(node: Node, unit: str, largest: float) -> Split:
     return Split(across, along, limit)
 
 
-def _number(node: Node, low: float, high: float) -> float:
+def _number(node: JsonNode, low: float, high: float) -> float:
     """A number within bounds; infinity only where that is the bound."""
     x = node.value
     if isinstance(x, bool) or not isinstance(x, int | float) or not low <= x <= high:

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import rigid
+from apo_bench.geometry.rigid import is_rigid
 from apo_bench.observation.noise import Noise
 
 
@@ -49,7 +49,7 @@ def _complaint(shown: Demonstration, seen: Any) -> str:
         return "changed the assembly, which is taken as certain; pass on the one it was given"
     if set(seen.start) != set(shown.start):
         return "changed which parts have a start pose; pass on `shown.start`"
-    for wrong in np.flatnonzero(~rigid(seen.goals)):
+    for wrong in np.flatnonzero(~is_rigid(seen.goals)):
         return (
             f"returned a goal for operation {wrong + 1} that is not a rigid pose; return `shown.goals[k] @ exp(twist)`"
         )

@@ -19,7 +19,7 @@ import numpy as np
 from apo_bench.assembly.facing import height, opposed
 from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.graph import relation_graph
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
@@ -59,7 +59,9 @@ def make_relations(given: Any) -> Relations | None:
     return _callable(resolve(name, RELATIONS, "kind of relations"), name)
 
 
-def told(seen: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator) -> Observation:
+def with_relations(
+    seen: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator
+) -> Observation:
     """The same observation with wrong relations.
 
     Args:
@@ -169,7 +171,7 @@ def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
 def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
     """Faces of parts that an operation moved, and faces of those that stand there, apart by more than nothing."""
     standing = dict.fromkeys(part for part in assembly.solids if part in assembly.fixed)
-    for k, poses in enumerate(placed(assembly, start, goals)):
+    for k, poses in enumerate(placements(assembly, start, goals)):
         moves = assembly.operations[k].moves
         standing |= dict.fromkeys(moves)
         for part in moves:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+FACE_OR_PART_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""
 _LONGEST_NAME = 64
 _LARGEST_M = 10.0
@@ -15,7 +15,7 @@ _THINNEST_M = 0.0005
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
-class Numbers(NamedTuple):
+class NumbersRule(NamedTuple):
     """Numbers with spaces between them."""
 
     spans: tuple[tuple[float, float], ...]
@@ -37,7 +37,7 @@ class Numbers(NamedTuple):
         return f"{count} number{'s' * (most > 1)} of {', '.join(spans)}{self.unit}"
 
 
-class Words(NamedTuple):
+class WordsRule(NamedTuple):
     """One of some words."""
 
     words: tuple[str, ...]
@@ -49,52 +49,52 @@ class Words(NamedTuple):
         return " or ".join(f'"{word}"' for word in self.words)
 
 
-class Name(NamedTuple):
+class NameRule(NamedTuple):
     """A name."""
 
     def allows(self, text: str) -> bool:
-        return len(text) <= _LONGEST_NAME and NAME.fullmatch(text) is not None
+        return len(text) <= _LONGEST_NAME and FACE_OR_PART_NAME.fullmatch(text) is not None
 
     def said(self) -> str:
         return f"a name is a letter, then letters, digits and underscores, {_LONGEST_NAME} in all at most"
 
 
-class Allowed(NamedTuple):
+class ElementRule(NamedTuple):
     """What an element may have."""
 
     inside: Mapping[str, int]
     """Elements, and how many of each."""
-    attributes: Mapping[str, Numbers | Words | Name]
+    attributes: Mapping[str, NumbersRule | WordsRule | NameRule]
 
 
-_NAMED = Name()
-_POINT = Numbers(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
-_HALF_SIZES = Numbers(((_THINNEST_M, _LARGEST_M),) * 3, 3, " m")
-_COLOR = Numbers((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
+_NAMED = NameRule()
+_POINT = NumbersRule(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
+_HALF_SIZES = NumbersRule(((_THINNEST_M, _LARGEST_M),) * 3, 3, " m")
+_COLOR = NumbersRule((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
 """What cannot be seen, a range finder of MuJoCo would not see."""
-_SURFACE: Mapping[str, Numbers | Words | Name] = {
-    "type": Words(("box",)),
-    "density": Numbers(((1.0, 25_000.0),), 1, " kg/m^3"),
-    "friction": Numbers(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1),
+_SURFACE: Mapping[str, NumbersRule | WordsRule | NameRule] = {
+    "type": WordsRule(("box",)),
+    "density": NumbersRule(((1.0, 25_000.0),), 1, " kg/m^3"),
+    "friction": NumbersRule(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1),
     "rgba": _COLOR,
 }
-_DOT: Mapping[str, Numbers | Words | Name] = {
-    "size": Numbers(((1e-4, 0.1),) * 3, 1, " m"),
-    "group": Words(tuple("012345")),
+_DOT: Mapping[str, NumbersRule | WordsRule | NameRule] = {
+    "size": NumbersRule(((1e-4, 0.1),) * 3, 1, " m"),
+    "group": WordsRule(tuple("012345")),
     "rgba": _COLOR,
 }
 MOST_BOXES, MOST_SITES, MOST_CLASSES = 100, 600, 20
 _DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
-ALLOWED: Mapping[str, Allowed] = {
-    "mujoco": Allowed({"default": 1, "worldbody": 1}, {"model": _NAMED}),
-    "mujoco/default": Allowed(_DEFAULTS, {"class": Words(("main",))}),
-    "default/default": Allowed(_DEFAULTS, {"class": _NAMED}),
-    "default/geom": Allowed({}, _SURFACE),
-    "default/site": Allowed({}, _DOT),
-    "mujoco/worldbody": Allowed({"body": 1}, {}),
-    "worldbody/body": Allowed({"geom": MOST_BOXES, "site": MOST_SITES}, {"name": _NAMED}),
-    "body/geom": Allowed({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, "size": _HALF_SIZES, **_SURFACE}),
-    "body/site": Allowed({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, **_DOT}),
+ELEMENT_RULES: Mapping[str, ElementRule] = {
+    "mujoco": ElementRule({"default": 1, "worldbody": 1}, {"model": _NAMED}),
+    "mujoco/default": ElementRule(_DEFAULTS, {"class": WordsRule(("main",))}),
+    "default/default": ElementRule(_DEFAULTS, {"class": _NAMED}),
+    "default/geom": ElementRule({}, _SURFACE),
+    "default/site": ElementRule({}, _DOT),
+    "mujoco/worldbody": ElementRule({"body": 1}, {}),
+    "worldbody/body": ElementRule({"geom": MOST_BOXES, "site": MOST_SITES}, {"name": _NAMED}),
+    "body/geom": ElementRule({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, "size": _HALF_SIZES, **_SURFACE}),
+    "body/site": ElementRule({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, **_DOT}),
 }
 """Element, behind the one that it stands in -> what it may have."""
 REMEDIES: Mapping[str, str] = {

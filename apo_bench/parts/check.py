@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.overlap import area
+from apo_bench.geometry.overlap import face_area
 from apo_bench.geometry.solid import Solid
 
 _APART_M = 1e-8
@@ -26,7 +26,7 @@ def check_solid(solid: Solid, file: str) -> None:
         )
     room = _APART_M * float(mesh.area)
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
-    enclosed = sum(area(face) * float(face.normal @ face.outline[0]) for face in solid.faces.values()) / 3.0
+    enclosed = sum(face_area(face) * float(face.normal @ face.outline[0]) for face in solid.faces.values()) / 3.0
     for name, volume in (("of its cells", solid.volume), ("that its faces enclose", enclosed)):
         if abs(volume - mesh.volume) > room:
             raise InputError(

@@ -10,7 +10,7 @@ from xml.parsers import expat
 
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_text
-from apo_bench.parts.allowed import ALLOWED, MOST_CLASSES, REMEDIES, Allowed
+from apo_bench.parts.allowed import ELEMENT_RULES, MOST_CLASSES, REMEDIES, ElementRule
 
 _DEEPEST = 8
 """Levels of nesting; classes stand in classes, all else at most four levels deep."""
@@ -43,7 +43,7 @@ class _Reader:
         self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.ProcessingInstructionHandler = self._instruction
-        self._open: list[tuple[str, Allowed, Counter[str]]] = []
+        self._open: list[tuple[str, ElementRule, Counter[str]]] = []
         """Of each element that has begun: its tag, what it may have, and how many elements it had of each tag."""
         self._classes = 0
 
@@ -62,12 +62,12 @@ class _Reader:
         self._open.append((tag, allowed, Counter()))
         self.builder.start(tag, attributes)
 
-    def _known(self, tag: str) -> Allowed:
+    def _known(self, tag: str) -> ElementRule:
         """What an element may have that begins here."""
         if not self._open:
             if tag != "mujoco":
                 self._refuse(f"the outermost element is <{tag[:60]}>; a part file begins with <mujoco>")
-            return ALLOWED["mujoco"]
+            return ELEMENT_RULES["mujoco"]
         outer, around, had = self._open[-1]
         if tag not in around.inside:
             listed = ", ".join(f"<{name}>" for name in around.inside) or "no elements"
@@ -78,7 +78,7 @@ class _Reader:
         self._classes += tag == "default"
         if self._classes > MOST_CLASSES or len(self._open) == _DEEPEST:
             self._refuse(f"at most {MOST_CLASSES} <default>, {_DEEPEST - 1} of them in each other, are allowed")
-        return ALLOWED[f"{outer}/{tag}"]
+        return ELEMENT_RULES[f"{outer}/{tag}"]
 
     def _end(self, tag: str) -> None:
         self._open.pop()

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -24,8 +24,8 @@ from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Attach
-from apo_bench.prediction.resting import is_support, residual, settled
-from apo_bench.prediction.stability import unstable
+from apo_bench.prediction.resting import is_support, residual, resting_poses
+from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.thresholds import Thresholds
 
 _Code = Literal["ok", "residual", "interference", "unstable_goal"]
@@ -88,7 +88,7 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
     """
     doings = tuple(_doings(plan))
     for doing in doings:
-        if unstable(doing.alone, doing.before, _goal(doing)[None]) is not None:
+        if first_unstable(doing.alone, doing.before, _goal(doing)[None]) is not None:
             return _fails(doing, "unstable_goal", None, "the part would fall there")
     physical, worst = _physical(plan.assembly, clearance_mm), 0.0
     for doing in doings:
@@ -121,11 +121,11 @@ def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Po
         operation, before = plan.assembly.operations[k], now
         alone = replace(plan.assembly, operations=(operation,))
         if undo:
-            (now,) = placed(alone, before, origin[k][None])
+            (now,) = placements(alone, before, origin[k][None])
             continue
         origin[k] = before[operation.main]
-        (now,) = placed(alone, before, target[None])
-        now = settled(alone, operation, now) if settling else now
+        (now,) = placements(alone, before, target[None])
+        now = resting_poses(alone, operation, now) if settling else now
         yield k, alone, before, now
 
 

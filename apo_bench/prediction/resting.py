@@ -20,7 +20,7 @@ _LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""
 
 
-def settled(assembly: Assembly, operation: Operation, poses: Poses) -> Poses:
+def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Poses:
     """The poses of all parts once what the operation moves has come to rest, as one body.
 
     Args:

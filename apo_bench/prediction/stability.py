@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -17,7 +17,7 @@ _BALANCED = 1e-7
 """What is left of the weight, and of its moments over 10 mm, where forces balance it."""
 
 
-def unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
+def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
     """The first operation whose part, with what it carries, would not stand at its planned goal, counted from 0.
 
     Vertical forces act at the corners of the overlaps of its contacts: floors push up, ceilings push down, walls
@@ -31,7 +31,7 @@ def unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
     Returns:
         The operation, or None if every part would stand.
     """
-    for k, (operation, poses) in enumerate(zip(assembly.operations, placed(assembly, start, goals), strict=True)):
+    for k, (operation, poses) in enumerate(zip(assembly.operations, placements(assembly, start, goals), strict=True)):
         forces = _forces(assembly, operation, poses)
         if forces is not None and not _balanced(*forces, _centroid(assembly, operation, poses)):
             return k

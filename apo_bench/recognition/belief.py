@@ -18,7 +18,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
 
-class Standing(NamedTuple):
+class PartBeliefs(NamedTuple):
     """Every part after an operation."""
 
     poses: Poses
@@ -38,7 +38,7 @@ class Belief:
     covariance: Array
     """(6 n, 6 n), of the body twists by which the goals are wrong, [m, rad]."""
 
-    def standing(self, k: int) -> Standing:
+    def standing(self, k: int) -> PartBeliefs:
         """Where every part is after operation k, counted from 0, and what errors of the goals do to it.
 
         With D' = T D_m^-1 D_s of a carried part, and exp(w) D a displaced D: w' = Ad(T) xi + Ad(T D_m^-1) (w_s - w_m).
@@ -54,7 +54,7 @@ class Belief:
                 poses[part] = by @ poses[part]
                 reach[part] = own + pose.adjoint(by) @ (reach[part] - reach[operation.main])
             poses[operation.main], reach[operation.main] = T, own
-        return Standing(poses, reach)
+        return PartBeliefs(poses, reach)
 
     def given(self, e: Array, J: Array, noise: Array) -> Belief:
         """The same after learning that three quantities, now e (3,) with derivative J (3, 6 n), are zero up to noise.
@@ -69,7 +69,7 @@ class Belief:
         return Belief(self.assembly, self.start, goals, (covariance + covariance.T) / 2)
 
 
-def believed(seen: Observation) -> Belief:
+def initial_belief(seen: Observation) -> Belief:
     """What an observation says before any contact is known: goals are wrong independently of each other."""
     n = len(seen.goals)
     covariance = np.zeros((n, 6, n, 6))

@@ -16,13 +16,13 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.facing import Facing, facing, gap
+from apo_bench.assembly.facing import Facing, face_gap, facing
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
-from apo_bench.recognition.belief import Belief, Standing, believed
-from apo_bench.recognition.thresholds import NOISE, Allowed, Rules, allowed, reality, slack
+from apo_bench.recognition.belief import Belief, PartBeliefs, initial_belief
+from apo_bench.recognition.thresholds import RULES_BY_NOISE, PairThresholds, Rules, pair_thresholds, reality, slack
 
 _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""
@@ -41,7 +41,7 @@ class Evidence:
     angle_rad: float
     share: float
     """Overlap over the smaller face."""
-    most: Allowed
+    most: PairThresholds
     """The thresholds."""
     seen_gap_m: float
     """The gap at the goals as they were seen."""
@@ -57,7 +57,7 @@ class Recognised:
     """One for each contact, in the order of `assembly.relations()`."""
 
 
-def recognise(seen: Observation, rules: Rules = NOISE, *, first_seen: Array | None = None) -> Recognised:
+def recognise(seen: Observation, rules: Rules = RULES_BY_NOISE, *, first_seen: Array | None = None) -> Recognised:
     """Find the face contacts of every operation; those that the observation came with are not looked at.
 
     Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
@@ -79,7 +79,7 @@ def recognise(seen: Observation, rules: Rules = NOISE, *, first_seen: Array | No
     bare = tuple(replace(operation, contacts=()) for operation in seen.assembly.operations)
     assembly = replace(seen.assembly, operations=bare, gaps={})
     seen = replace(seen, assembly=assembly)
-    belief, evidence = believed(seen), list[Evidence]()
+    belief, evidence = initial_belief(seen), list[Evidence]()
     as_seen = belief if first_seen is None else replace(belief, goals=first_seen)
     known = set(assembly.fixed)
     for k, operation in enumerate(bare):
@@ -102,7 +102,7 @@ class _Candidate(NamedTuple):
     """(3, 6 n): derivative of its residual by body twists of all goals."""
     noise: Array
     """(3, 3): see `reality`."""
-    most: Allowed
+    most: PairThresholds
     distance: float
     """Squared Mahalanobis length of its residual."""
     gain: float
@@ -148,7 +148,7 @@ class _Around:
                 best = other
         return best
 
-    def evidence(self, found: _Found, as_seen: Standing) -> Iterator[Evidence]:
+    def evidence(self, found: _Found, as_seen: PartBeliefs) -> Iterator[Evidence]:
         """What speaks for the contacts, in the order of parts and faces."""
         for c in sorted(found.taken, key=lambda c: self._place(c.contact)):
             yield Evidence(
@@ -176,7 +176,7 @@ class _Around:
         have = {c.contact for c in taken}
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
-    def _pairs(self, now: Standing, taken: Collection[Contact]) -> Iterator[tuple[str, str, Facing]]:
+    def _pairs(self, now: PartBeliefs, taken: Collection[Contact]) -> Iterator[tuple[str, str, Facing]]:
         """Faces of moved parts and of those that stand there, within the bounds, with the names of the parts."""
         solids, rules = self.seen.assembly.solids, self.rules
         bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
@@ -186,7 +186,7 @@ class _Around:
                 for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
                     yield a, b, pair
 
-    def _judged(self, a: str, b: str, pair: Facing, now: Standing, belief: Belief) -> Iterator[_Candidate]:
+    def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[_Candidate]:
         """The pair as a candidate, if it is one."""
         slope = pair.slope @ (now.reach[a] - now.reach[b])
         if slope.reshape(3, -1, 6)[:, ~self.seen.seen].any():
@@ -194,7 +194,7 @@ class _Around:
         contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
         play_m = self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0
         C, noise = slope @ belief.covariance @ slope.T, reality(pair, play_m)
-        most = allowed(self.rules, C, slack(pair, play_m))
+        most = pair_thresholds(self.rules, C, slack(pair, play_m))
         if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:
             e = pair.residual
             distance = float(e @ np.linalg.solve(C + noise, e))
@@ -210,11 +210,11 @@ class _Around:
             for i in (parts.index(of.part), list(solids[of.part].faces).index(of.face))
         )
 
-    def _gap(self, contact: Contact, now: Standing) -> float:
+    def _gap(self, contact: Contact, now: PartBeliefs) -> float:
         """The gap of a contact at given poses: at the middle of the environment face where nothing overlaps."""
         a, b = contact
         face_a, face_b = self.seen.assembly.face(a), self.seen.assembly.face(b)
-        return gap(face_a, now.poses[a.part], face_b, now.poses[b.part])
+        return face_gap(face_a, now.poses[a.part], face_b, now.poses[b.part])
 
 
 def _gain(C: Array, noise: Array, rules: Rules) -> float:

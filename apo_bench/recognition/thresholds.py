@@ -47,20 +47,20 @@ class Rules:
         return float(_quantile(self.miss))
 
 
-NOISE = Rules()
+RULES_BY_NOISE = Rules()
 """Thresholds from the stated noise."""
-FIXED = Rules(gap_m=6e-3, angle_rad=math.radians(10.0), fixed=True)
+FIXED_RULES = Rules(gap_m=6e-3, angle_rad=math.radians(10.0), fixed=True)
 """The paper's: one number each, here what noise of 1 mm and 1 degree asks for."""
 
 
-class Allowed(NamedTuple):
+class PairThresholds(NamedTuple):
     """The thresholds of one pair of faces."""
 
     gap_m: float
     angle_rad: float
 
 
-def allowed(rules: Rules, covariance: Array, slack: Allowed) -> Allowed:
+def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds) -> PairThresholds:
     """The largest gap and angle that noise and play explain, within the bounds.
 
     The gap is Gaussian and may lie on either side; the angle is the length of two Gaussian tilts, at most as long as
@@ -71,16 +71,16 @@ def allowed(rules: Rules, covariance: Array, slack: Allowed) -> Allowed:
         slack: What play allows in addition.
     """
     if rules.fixed:
-        return Allowed(rules.gap_m, rules.angle_rad)
+        return PairThresholds(rules.gap_m, rules.angle_rad)
     gap = _two_sided(rules.miss) * math.sqrt(covariance[0, 0] + _SOFT_M**2)
     worst = float(np.linalg.eigvalsh(covariance[1:, 1:])[-1])
     angle = math.sqrt(-2.0 * math.log(rules.miss) * (max(worst, 0.0) + _SOFT_RAD**2))
-    return Allowed(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
+    return PairThresholds(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
 
 
-def slack(pair: Facing, play_m: float) -> Allowed:
+def slack(pair: Facing, play_m: float) -> PairThresholds:
     """How far off a contact with this play can be: from side to side, and tilted from corner to corner."""
-    return Allowed(play_m, 2.0 * play_m * math.hypot(*(0.5 / max(half, play_m, 1e-9) for half in pair.half_m)))
+    return PairThresholds(play_m, 2.0 * play_m * math.hypot(*(0.5 / max(half, play_m, 1e-9) for half in pair.half_m)))
 
 
 def reality(pair: Facing, play_m: float) -> Array:

@@ -14,7 +14,7 @@ import msgspec
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import CONTROL, clean
-from apo_bench.io.whole_json import HALF, HALF_BUT_OF_FILES, WHOLE_LETTERS, half_letter, is_whole, read_whole
+from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.records.fields import NEVER_NULL, REQUIRED, ROW_FIELDS, RUN_FIELDS, TIMING_FIELDS, Said
 from apo_bench.records.settings import RANGE, ROW
 from apo_bench.records.verdicts import MEANING
@@ -122,7 +122,7 @@ def unwritable(row: Mapping[str, Any]) -> str:
     """Why a row may not be written, since it could not be read again; empty if it may."""
     try:
         msgspec.convert(dict(row), _WRITTEN)
-        half = half_letter(dict(row), HALF)
+        half = half_letter(dict(row), HALF_LETTER)
         wrong = _fault(row) if half is None else (half, WHOLE_LETTERS)
     except msgspec.ValidationError as error:
         wrong = _said(error)
@@ -134,7 +134,7 @@ _UNREADABLE = (msgspec.DecodeError, msgspec.ValidationError, RecursionError, Val
 
 def _decoded(decoder: Any, line: bytes, where: str, none: str) -> dict[str, Any]:
     try:
-        return msgspec.structs.asdict(_parsed(decoder, line, where, HALF))
+        return msgspec.structs.asdict(_parsed(decoder, line, where, HALF_LETTER))
     except _UNREADABLE as error:
         _refuse(error, where, none)
 

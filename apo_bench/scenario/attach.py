@@ -11,14 +11,14 @@ from apo_bench.errors import InputError
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.line import Preference
 from apo_bench.insertion.operations import understand
-from apo_bench.scenario.nominal import waiting
+from apo_bench.scenario.nominal import nominal_start
 from apo_bench.scenario.scenario import Scenario
 
 _THROUGH = 1e-3
 """Cosine to the normal of a face above which a direction leads through it."""
 
 
-def with_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
+def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
     """The scenario with the line of attach of every operation.
 
     Args:
@@ -27,7 +27,7 @@ def with_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> S
     Raises:
         InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
     """
-    found = understand(scenario.assembly, waiting(scenario), scenario.goals, stated)
+    found = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
     for each, asked in zip(found, stated, strict=True):
         _check(each.after, asked, f"{file}, operation {each.operation + 1}, attach", each.main)
     return replace(scenario, attach=tuple(each.after.line for each in found))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Layout, Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -48,7 +48,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         InputError: The first thing found wrong.
     """
     for case in _cases(scenario):
-        stages = (case.layout.start, *placed(scenario.assembly, case.layout.start, case.layout.goals))
+        stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.goals))
         if not case.key:
             check_order(scenario.assembly, stages, file)
         _check_starts(scenario, file, case)

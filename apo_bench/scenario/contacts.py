@@ -15,7 +15,7 @@ from typing import get_args
 
 from apo_bench.assembly.topology import Contact, Gap, Kind, PartFace
 from apo_bench.geometry.solid import Solid
-from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_json import JsonNode
 from apo_bench.scenario.keys import LARGEST_MM, read_span, refuse, refuse_name
 
 Asked = Mapping[Contact, Gap]
@@ -26,7 +26,7 @@ _TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
 
 
 def read_contacts(
-    nodes: tuple[Node, ...], main: str, carries: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]
+    nodes: tuple[JsonNode, ...], main: str, carries: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]
 ) -> Asked:
     """The contacts that one operation makes.
 
@@ -44,7 +44,7 @@ def read_contacts(
     return found
 
 
-def check_kinds(node: Node, asked: Sequence[Asked]) -> None:
+def check_kinds(node: JsonNode, asked: Sequence[Asked]) -> None:
     """A contact that the last of some operations makes again is asked for in the same way as before."""
     for contact, gap in asked[-1].items():
         for k, earlier in enumerate(asked[:-1], start=1):
@@ -56,7 +56,7 @@ def check_kinds(node: Node, asked: Sequence[Asked]) -> None:
                 )
 
 
-def _contact(node: Node, main: str, solids: Mapping[str, Solid]) -> tuple[Contact, Gap]:
+def _contact(node: JsonNode, main: str, solids: Mapping[str, Solid]) -> tuple[Contact, Gap]:
     keys = node.fields(("faces",), ("kind", "gap_mm")) if isinstance(node.value, dict) else {"faces": node}
     pair = keys["faces"]
     if not isinstance(pair.value, list) or len(pair.value) != 2:
@@ -67,7 +67,7 @@ def _contact(node: Node, main: str, solids: Mapping[str, Solid]) -> tuple[Contac
     return contact, _gap(keys, node, contact, fits)
 
 
-def _gap(keys: Mapping[str, Node], node: Node, contact: Contact, fits: bool) -> Gap:
+def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: bool) -> Gap:
     kind = _kind(keys["kind"]) if "kind" in keys else Gap().kind
     if "gap_mm" not in keys:
         if kind == "clearance" and not fits:
@@ -83,14 +83,14 @@ def _gap(keys: Mapping[str, Node], node: Node, contact: Contact, fits: bool) -> 
     return Gap(kind, 1e-3 * low, 1e-3 * high)
 
 
-def _kind(node: Node) -> Kind:
+def _kind(node: JsonNode) -> Kind:
     for kind in _KINDS:
         if node.value == kind:
             return kind
     node.fail(f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
 
 
-def _check(contact: Contact, node: Node, moves: tuple[str, ...], there: set[str]) -> None:
+def _check(contact: Contact, node: JsonNode, moves: tuple[str, ...], there: set[str]) -> None:
     """The first face is of a part that moves, the second of one that rests where it was put."""
     above, below = node.child(None, "first"), node.child(None, "second")
     a, b = contact.manipulated.part, contact.environment.part
@@ -102,7 +102,7 @@ def _check(contact: Contact, node: Node, moves: tuple[str, ...], there: set[str]
         refuse(below, f"'{b}' is not there yet; name a fixed part or one that was moved before")
 
 
-def _face(node: Node, main: str | None, solids: Mapping[str, Solid]) -> PartFace:
+def _face(node: JsonNode, main: str | None, solids: Mapping[str, Solid]) -> PartFace:
     """`part.face`, or a face of the main part."""
     text = node.text()
     name, dot, face = text.rpartition(".")

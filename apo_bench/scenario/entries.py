@@ -15,9 +15,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Preference
-from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_json import JsonNode
 from apo_bench.parts import load_part, part_path
-from apo_bench.parts.allowed import NAME
+from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
 from apo_bench.scenario.scenario import Grasp, Shift
@@ -34,7 +34,7 @@ _LEVEL = 1e-6
 
 @final
 @dataclass(frozen=True, eq=False)
-class Part:
+class PartEntry:
     """One entry of [parts]."""
 
     path: Path
@@ -46,7 +46,7 @@ class Part:
     color: tuple[float, float, float] | None
 
 
-class Entry(NamedTuple):
+class OperationEntry(NamedTuple):
     """One entry of [[operations]]."""
 
     operation: Operation
@@ -58,7 +58,7 @@ class Entry(NamedTuple):
     shifts: tuple[Shift, ...]
 
 
-def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
+def read_parts(node: JsonNode, folder: Path) -> Mapping[str, PartEntry]:
     """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
     if not isinstance(node.value, dict) or not node.value:
         node.fail("at least one table [parts.NAME] is needed")
@@ -68,8 +68,8 @@ def read_parts(node: Node, folder: Path) -> Mapping[str, Part]:
     return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
 
 
-def _part(node: Node, name: str, folder: Path, solids: dict[Path, Solid]) -> Part:
-    if not NAME.fullmatch(name):
+def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid]) -> PartEntry:
+    if not FACE_OR_PART_NAME.fullmatch(name):
         refuse(node, f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores")
     if name == _ARM:
         refuse(node, f"a part cannot be called '{_ARM}', as the robot is; give it another name")
@@ -82,10 +82,10 @@ def _part(node: Node, name: str, folder: Path, solids: dict[Path, Solid]) -> Par
         refuse(node, "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }")
     path, solid = _solid(keys["file"], folder, solids)
     start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
-    return Part(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
+    return PartEntry(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
 
 
-def _solid(node: Node, folder: Path, solids: dict[Path, Solid]) -> tuple[Path, Solid]:
+def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid]) -> tuple[Path, Solid]:
     try:
         path = part_path(node.text())
         path = path if path.is_absolute() else folder / path
@@ -98,14 +98,14 @@ def _solid(node: Node, folder: Path, solids: dict[Path, Solid]) -> tuple[Path, S
     return path, solids[path]
 
 
-def _color(node: Node) -> tuple[float, float, float]:
+def _color(node: JsonNode) -> tuple[float, float, float]:
     r, g, b = node.numbers(3)
     if not (min(r, g, b) >= 0 and max(r, g, b) <= 1):
         node.fail("red, green and blue from 0 to 1 are needed")
     return float(r), float(g), float(b)
 
 
-def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
+def read_operations(node: JsonNode, parts: Mapping[str, PartEntry]) -> tuple[OperationEntry, ...]:
     """Every operation in order, with defaults filled in."""
     nodes = node.items("operation")
     if not nodes:
@@ -127,7 +127,9 @@ def read_operations(node: Node, parts: Mapping[str, Part]) -> tuple[Entry, ...]:
     return tuple(entries)
 
 
-def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Array], there: set[str]) -> Entry:
+def _entry(
+    node: JsonNode, k: int, parts: Mapping[str, PartEntry], poses: Mapping[str, Array], there: set[str]
+) -> OperationEntry:
     keys = node.fields(("move", "goal", "contacts"), ("carries", "attach", "grasp", "vary"))
     main = _movable(keys["move"], parts)
     carries = tuple(_movable(n, parts) for n in _items(keys["carries"], "entry")) if "carries" in keys else ()
@@ -146,7 +148,7 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
     asked = read_contacts(contacts, main, carries, solids, there)
     if not asked:
         refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
-    return Entry(
+    return OperationEntry(
         Operation(main, tuple(asked), carries),
         asked,
         goal,
@@ -156,12 +158,12 @@ def _entry(node: Node, k: int, parts: Mapping[str, Part], poses: Mapping[str, Ar
     )
 
 
-def _items(node: Node, name: str) -> tuple[Node, ...]:
+def _items(node: JsonNode, name: str) -> tuple[JsonNode, ...]:
     """The entries of a list within an operation, with the operation in their key."""
-    return tuple(Node(each.value, each.file, f"{node.key}, {each.key}") for each in node.items(name))
+    return tuple(JsonNode(each.value, each.file, f"{node.key}, {each.key}") for each in node.items(name))
 
 
-def _movable(node: Node, parts: Mapping[str, Part]) -> str:
+def _movable(node: JsonNode, parts: Mapping[str, PartEntry]) -> str:
     name = node.text()
     if name not in parts:
         refuse_name(node, "part", name, parts)
@@ -170,7 +172,7 @@ def _movable(node: Node, parts: Mapping[str, Part]) -> str:
     return name
 
 
-def _attach(node: Node) -> Preference:
+def _attach(node: JsonNode) -> Preference:
     """What is stated of the line to the goal."""
     keys = node.fields((), ("along", "travel_mm"))
     direction = read_axis(keys["along"]) if "along" in keys else None
@@ -180,7 +182,7 @@ def _attach(node: Node) -> Preference:
     return Preference(direction, travel_m)
 
 
-def _grasp(node: Node | None, entry: Node, solid: Solid, before: Array) -> Grasp:
+def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) -> Grasp:
     """The grasp; above the middle, across the narrower level axis unless the file says otherwise."""
     keys = node.fields((), ("at_mm", "across")) if node else {}
     low, high = solid.bounds
@@ -209,7 +211,7 @@ def _above_middle(solid: Solid, T: Array) -> Array:
     return np.clip(point, low, high)
 
 
-def _shifts(node: Node, operation: int) -> tuple[Shift, ...]:
+def _shifts(node: JsonNode, operation: int) -> tuple[Shift, ...]:
     many = node.items(node.key) if isinstance(node.value, list) else (node,)
     shifts = []
     for each in many:

@@ -14,13 +14,13 @@ from apo_bench.assembly.topology import Assembly, Gap
 from apo_bench.errors import InputError, unknown
 from apo_bench.insertion.line import Preference
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
 from apo_bench.records.thresholds import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
-from apo_bench.scenario.attach import with_lines
+from apo_bench.scenario.attach import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
-from apo_bench.scenario.entries import Entry, read_operations, read_parts
+from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
 from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_span, refuse
 from apo_bench.scenario.scenario import Carelessness, Scenario, Site
 
@@ -52,7 +52,7 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
         )
     scenario, stated = _scenario(document, path)
     check_scenario(scenario, str(path))
-    return with_lines(scenario, stated, str(path))
+    return with_attach_lines(scenario, stated, str(path))
 
 
 def _path(given: str | Path) -> Path:
@@ -65,7 +65,7 @@ def _path(given: str | Path) -> Path:
     return folder("scenarios") / f"{given}.toml"
 
 
-def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
+def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
     """The scenario without lines of attach, and what the file states of them."""
     schema = root.value.get("schema", _SCHEMA)
     if isinstance(schema, bool) or schema != _SCHEMA:
@@ -108,7 +108,7 @@ def _scenario(root: Node, path: Path) -> tuple[Scenario, tuple[Preference, ...]]
     return scenario, tuple(entry.attach for entry in entries)
 
 
-def _site(node: Node) -> Site:
+def _site(node: JsonNode) -> Site:
     keys = node.fields((), ("center_mm", "spread_mm", "yaw_deg"))
     center = _pair(keys["center_mm"], -LARGEST_MM) if "center_mm" in keys else (0.0, 0.0)
     spread = _pair(keys["spread_mm"], 0.0) if "spread_mm" in keys else (0.0, 0.0)
@@ -120,14 +120,14 @@ def _site(node: Node) -> Site:
     )
 
 
-def _pair(node: Node, low: float) -> tuple[float, float]:
+def _pair(node: JsonNode, low: float) -> tuple[float, float]:
     x, y = node.numbers(2)
     if not (low <= min(x, y) and max(x, y) <= LARGEST_MM):
         node.fail(f"two lengths from {low:g} to {LARGEST_MM:g} mm are needed")
     return float(x), float(y)
 
 
-def _careless(node: Node, entries: tuple[Entry, ...]) -> Carelessness:
+def _careless(node: JsonNode, entries: tuple[OperationEntry, ...]) -> Carelessness:
     keys = node.fields(("operation", "along", "size_mm"))
     number = keys["operation"].integer()
     if not 1 <= number <= len(entries):
@@ -139,7 +139,7 @@ def _careless(node: Node, entries: tuple[Entry, ...]) -> Carelessness:
     return Carelessness(number - 1, axis, 1e-3 * low, 1e-3 * high)
 
 
-def _judge(node: Node) -> tuple[Thresholds, Meaning]:
+def _judge(node: JsonNode) -> tuple[Thresholds, Meaning]:
     keys = dict(node.fields((), ("success", *(field.name for field in fields(Thresholds)))))
     means = keys.pop("success", None)
     if means is not None and means.value not in MEANINGS:
@@ -149,7 +149,7 @@ def _judge(node: Node) -> tuple[Thresholds, Meaning]:
     return thresholds, MEANINGS[0] if means is None else means.value
 
 
-def _number(node: Node, high: float, *, above: bool = False) -> float:
+def _number(node: JsonNode, high: float, *, above: bool = False) -> float:
     x = node.number(0.0, above=above)
     if x > high:
         node.fail(f"a number of at most {high:g} is needed")

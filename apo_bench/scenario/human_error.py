@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Layout, Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.scenario import Scenario
@@ -19,7 +19,7 @@ _Displaced = dict[str, Array]
 """Part -> how far it lies from its true place, (3,), world, [m]."""
 
 
-class Spread(NamedTuple):
+class ErrorSpread(NamedTuple):
     """Where an error goes."""
 
     offsets: Array
@@ -28,7 +28,7 @@ class Spread(NamedTuple):
     """Parts that the last operation would leave displaced, in the order in which they were put down."""
 
 
-def spread(scenario: Scenario, layout: Layout, offset: Array) -> Spread:
+def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpread:
     """Follow an error of the careless operation through the demonstration.
 
     A later part whose contact with a displaced one has a normal along the displacement goes along with it, by that
@@ -41,8 +41,8 @@ def spread(scenario: Scenario, layout: Layout, offset: Array) -> Spread:
     assembly = scenario.assembly
     offsets, displaced, left = np.zeros((len(assembly), 3)), _Displaced(), ()
     if scenario.careless is None or not offset.any():
-        return Spread(offsets, left)
-    stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        return ErrorSpread(offsets, left)
+    stages = (layout.start, *placements(assembly, layout.start, layout.goals))
     for k, operation in enumerate(assembly.operations):
         R = layout.goals[k][:3, :3]
         if k == scenario.careless.operation:
@@ -50,7 +50,7 @@ def spread(scenario: Scenario, layout: Layout, offset: Array) -> Spread:
         elif k < len(assembly) - 1:
             offsets[k] = R.T @ _guided(assembly, operation, stages[k + 1], displaced)
         displaced = _displaced(operation, R @ stages[k][operation.main][:3, :3].T, R @ offsets[k], displaced)
-    return Spread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
+    return ErrorSpread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
 
 
 def careless_covariance(scenario: Scenario, careless: float) -> Array:
@@ -58,7 +58,7 @@ def careless_covariance(scenario: Scenario, careless: float) -> Array:
     covariance = np.zeros((len(scenario.assembly), 6, 6))
     if scenario.careless is not None:
         rms = careless * scenario.careless.rms_m
-        way = spread(scenario, Layout(scenario.goals, scenario.start), scenario.careless.axis).offsets
+        way = spread_error(scenario, Layout(scenario.goals, scenario.start), scenario.careless.axis).offsets
         covariance[:, :3, :3] = rms**2 * np.einsum("ni,nj->nij", way, way)
     return covariance
 

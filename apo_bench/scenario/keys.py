@@ -10,24 +10,24 @@ import numpy as np
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_json import JsonNode
 
 LARGEST_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""
 _AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0)) for i in range(3)}
 
 
-def refuse(node: Node, sentence: str) -> NoReturn:
+def refuse(node: JsonNode, sentence: str) -> NoReturn:
     """Raise the error of a key."""
     place = f"{node.file}, {node.key}" if node.key else node.file
     raise InputError(f"{place}: {sentence}.")
 
 
-def refuse_name(node: Node, kind: str, given: str, allowed: Iterable[str]) -> NoReturn:
+def refuse_name(node: JsonNode, kind: str, given: str, allowed: Iterable[str]) -> NoReturn:
     raise InputError(f"{node.file}, {node.key}: {unknown(kind, given, allowed)}")
 
 
-def read_pose(node: Node) -> Array:
+def read_pose(node: JsonNode) -> Array:
     """`{ at_mm = [x, y, z], turn_deg = [rx, ry, rz] }` as (4, 4), [m]."""
     keys = node.fields(("at_mm",), ("turn_deg",))
     at, turn = keys["at_mm"].numbers(3), keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
@@ -38,7 +38,7 @@ def read_pose(node: Node) -> Array:
     return pose.at(1e-3 * at, turn)
 
 
-def read_axis(node: Node) -> Array:
+def read_axis(node: JsonNode) -> Array:
     """`"x"`, `"+x"`, `"-x"` ... or three numbers, as a unit vector (3,)."""
     if isinstance(node.value, str):
         if node.value not in _AXES:
@@ -51,7 +51,7 @@ def read_axis(node: Node) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def read_span(node: Node, low: float, high: float) -> tuple[float, float]:
+def read_span(node: JsonNode, low: float, high: float) -> tuple[float, float]:
     """`[lowest, highest]` within bounds."""
     a, b = node.numbers(2)
     if not low <= a <= b <= high:

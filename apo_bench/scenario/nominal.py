@@ -6,18 +6,18 @@ from functools import lru_cache
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
-from apo_bench.insertion.operations import Understood, understand
+from apo_bench.insertion.operations import OperationMacros, understand
 from apo_bench.scenario.scenario import Scenario
 
 
 @lru_cache(maxsize=32)
-def understood(scenario: Scenario) -> tuple[Understood, ...]:
+def nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
     """The operations of a scenario at its nominal goals."""
     lines = [attach.stated for attach in scenario.attach]
-    return understand(scenario.assembly, waiting(scenario), scenario.goals, lines)
+    return understand(scenario.assembly, nominal_start(scenario), scenario.goals, lines)
 
 
-def waiting(scenario: Scenario) -> Poses:
+def nominal_start(scenario: Scenario) -> Poses:
     """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
     (x, y), (low, high) = scenario.site.center_m, scenario.site.yaw_rad
     site = pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2])

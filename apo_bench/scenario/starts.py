@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry.drop import TOUCH_M, drop, lowered
+from apo_bench.geometry.drop import TOUCH_M, drop, drop_depths
 
 AIR_M = 1e-4
 """Lower above what is below it, a part settles within the first steps and is where it was said to be."""
@@ -23,7 +23,7 @@ def in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple
 def _supported(assembly: Assembly, start: Poses, part: str, most_m: float) -> bool:
     solid, T, way = assembly.solids[part], start[part], np.array([most_m])
     return any(
-        lowered(solid, T, way, other, start[name])[0] > TOUCH_M
+        drop_depths(solid, T, way, other, start[name])[0] > TOUCH_M
         for name, other in assembly.solids.items()
         if name != part
     )

@@ -11,21 +11,21 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.graph import arc_residuals, relation_graph
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import extent
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.explain_text import listed
+from apo_bench.show.explain_text import listed_words
 
 _WIDTH, _HEIGHT, _LINE_PX = 620, 480, 20
 _NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
 _MOST_LINES, _LETTERS = 6, 86
 
 
-class Belief(NamedTuple):
+class BeliefPanel(NamedTuple):
     """A panel: where the motion parameters put the parts, and which contacts are not right then."""
 
     title: str
@@ -39,7 +39,7 @@ class Belief(NamedTuple):
     """What else is wrong with it: what the test says, and the failure that is foretold."""
 
 
-def belief(title: str, seen: Observation, goals: Array, step: int, warning: str = "") -> Belief:
+def belief_panel(title: str, seen: Observation, goals: Array, step: int, warning: str = "") -> BeliefPanel:
     """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
     graph = relation_graph(seen.assembly, step)
     residuals = arc_residuals(seen.assembly, seen.start, goals, graph)
@@ -47,10 +47,10 @@ def belief(title: str, seen: Observation, goals: Array, step: int, warning: str 
     wrong = tuple(
         f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}" for e, arc in found if e > seen.gap_m
     )
-    poses = placed(seen.assembly.first(step), seen.start, goals[:step])[-1]
+    poses = placements(seen.assembly.first(step), seen.start, goals[:step])[-1]
     standing = [arc for arc in graph.arcs if arc.lost is None]
     beside = tuple(f"{arc}: beside it" for arc in standing if not _covered(seen.assembly, arc.contacts, poses))
-    return Belief(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
+    return BeliefPanel(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
 
 
 def _covered(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> bool:
@@ -59,7 +59,7 @@ def _covered(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> b
     return all(overlap(*a, *b).area > 0.0 for a, b in ends)
 
 
-def belief_lines(beliefs: Sequence[Belief]) -> list[str]:
+def belief_lines(beliefs: Sequence[BeliefPanel]) -> list[str]:
     """A sentence for each: `as seen: largest gap 4.71 mm; open: R3 stick -> castle1: 4.71 mm, ..`."""
     return [
         f"{b.title}: largest gap {1e3 * b.gap_m:.3f} mm; "
@@ -69,7 +69,7 @@ def belief_lines(beliefs: Sequence[Belief]) -> list[str]:
     ]
 
 
-def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: str | Path) -> None:
+def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], out: str | Path) -> None:
     """Write the panels beside each other, from one point of view, as PNG.
 
     Raises:
@@ -88,7 +88,7 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
     below, width = _LINE_PX * lines + 8, _WIDTH * len(beliefs)
     height = _HEIGHT + below + 56
     figure = Figure(figsize=(width / 100, height / 100))
-    what = listed([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"
+    what = listed_words([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"
     figure.text(0.5, 1 - 16 / height, f"{scenario.name}, believed after {'operation' if step == 1 else 'operations'} "
                 f"{what}", ha="center", va="center", fontsize=12)  # fmt: skip
     for i, one in enumerate(beliefs):
@@ -106,7 +106,7 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[Belief], out: 
         raise InputError(f"{out} cannot be written ({error.strerror}); choose another place.") from error
 
 
-def _below(one: Belief) -> list[str]:
+def _below(one: BeliefPanel) -> list[str]:
     """The lines below a panel."""
     warning = textwrap.wrap(one.warning, _LETTERS)
     if not one.open:

@@ -9,10 +9,10 @@ import numpy as np
 
 from apo_bench.assembly.goals import Layout
 from apo_bench.assembly.graph import Arc, Graph, relation_graph
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.finished import fixtures
-from apo_bench.scenario.human_error import NOTHING_M, spread
+from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario
 
 _OPPOSITE = 0.99
@@ -25,13 +25,13 @@ def cards(scenarios: Sequence[Scenario], command: str, picture: str) -> str:
     lines += [f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios]
     lines += ["", "What is asked for under *Success*: [the two verdicts](verdict.md)."]
     for s in scenarios:
-        head, _, rest = card(s, 2).partition("\n\n")
+        head, _, rest = scenario_card(s, 2).partition("\n\n")
         shown = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"
         lines += ["", f'<a id="{s.name}"></a>', "", head, "", shown, "", rest.rstrip("\n")]
     return "\n".join(lines) + "\n"
 
 
-def card(scenario: Scenario, level: int = 1) -> str:
+def scenario_card(scenario: Scenario, level: int = 1) -> str:
     """The card of a scenario under a heading of that level."""
     mark, graph = "#" * level, relation_graph(scenario.assembly)
     parts = [f"{mark} {scenario.name}: {scenario.title}"]
@@ -78,7 +78,7 @@ def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
 
 def _way(scenario: Scenario, arc: Arc) -> str:
     """`into` between faces that look at each other, `against` upright ones, `onto` others."""
-    poses = placed(scenario.assembly, scenario.start, scenario.goals)[arc.made]
+    poses = placements(scenario.assembly, scenario.start, scenario.goals)[arc.made]
     part = arc.manipulated.part
     N = np.array([scenario.assembly.face(c.manipulated).normal for c in arc.contacts]) @ poses[part][:3, :3].T
     if (N @ N.T).min() < -_OPPOSITE:
@@ -103,7 +103,7 @@ def _human(scenario: Scenario) -> Iterator[str]:
 
 def _followers(scenario: Scenario, how: Carelessness) -> str:
     """The operations that an error leads astray, being guided by a displaced face."""
-    offsets = spread(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
+    offsets = spread_error(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
     led = [k for k in np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M) if k != how.operation]
     words = [f"{scenario.assembly.operations[k].main} (operation {k + 1})" for k in led]
     return f"; {_and(words)} {'follow' if len(words) > 1 else 'follows'}" if words else ""

@@ -9,12 +9,12 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.directions import Direction
-from apo_bench.correction.explanation import Determined, Explanation
+from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, extent
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.explain_text import listed, size, the
+from apo_bench.show.explain_text import listed_words, size, with_article
 
 _WIDTH, _HEIGHT = 900, 540
 _LINE_PX = 21
@@ -34,7 +34,7 @@ class _Drawn(NamedTuple):
     solid: Solid
     pose: Array
     color: tuple[float, float, float]
-    operation: Determined
+    operation: OperationExplanation
 
 
 def draw_explanation(scenario: Scenario, seen: Observation, found: Explanation, out: str | Path) -> None:
@@ -95,7 +95,7 @@ def _marks(one: _Drawn, toward: Array) -> list[Any]:
 
 def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
     """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
-    from apo_bench.simulation.scene.marks import Shift, Turn
+    from apo_bench.simulation.scene.marks import ShiftArrows, TurnRing
 
     R, middle = one.pose[:3, :3], one.solid.bounds.mean(axis=0)
     r, g, b = one.color
@@ -104,13 +104,13 @@ def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
     if not direction.turns:
         reach = extent(one.solid.boxes, direction.axis)[1] - direction.axis @ middle
         center = R @ middle + one.pose[:3, 3]
-        return Shift(center, axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, color, str(direction))
+        return ShiftArrows(center, axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, color, str(direction))
     low, high = extent(one.solid.boxes, direction.axis)
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
     across = _across(direction.axis)
     ends = np.array([extent(one.solid.boxes, v) for v in across]) - (across @ about)[:, None]
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
-    return Turn(R @ about + one.pose[:3, 3], axis, toward, radius, color, str(direction))
+    return TurnRing(R @ about + one.pose[:3, 3], axis, toward, radius, color, str(direction))
 
 
 def _across(axis: Array) -> Array:
@@ -149,13 +149,13 @@ def _name(figure: Any, name: str, x: float, y: float, color: tuple[float, float,
     )  # fmt: skip
 
 
-def _line(found: Explanation, o: Determined) -> str:
+def _line(found: Explanation, o: OperationExplanation) -> str:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
     together: dict[tuple[int, ...], list[str]] = {}
     for free in o.free:
         together.setdefault(free.along, []).append(f"{free.direction} ({size(free)})")
     said = []
     for along, words in together.items():
-        others = dict.fromkeys(the(found.operations[j].part) for j in along)
-        said.append(f"{listed(words)} free{f' with {listed(others)}' if others else ''}")
-    return f"{o.part}: {'; '.join([*said, f'{listed(o.fixed)} fixed'] if o.fixed else said)}"
+        others = dict.fromkeys(with_article(found.operations[j].part) for j in along)
+        said.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
+    return f"{o.part}: {'; '.join([*said, f'{listed_words(o.fixed)} fixed'] if o.fixed else said)}"

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.topology import spelled
-from apo_bench.correction.directions import SHIFTS, TURNS
-from apo_bench.correction.explanation import Determined, Explanation, Free, Standing
+from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES
+from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.holding import Hold
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -43,7 +43,7 @@ def explanation_tables(found: Explanation) -> list[Any]:
         free = "\n".join(map(_free, o.free)) or "-"
         operations.add_row(str(o.operation + 1), o.part, f"{o.rank} of 6", free, through, agreeing)
     parts = Table("at the end", "pose", "fixed", box=None, pad_edge=False)
-    for name in (*(f"{name} mm" for name in SHIFTS), *(f"{name} deg" for name in TURNS)):
+    for name in (*(f"{name} mm" for name in SHIFT_NAMES), *(f"{name} deg" for name in TURN_NAMES)):
         parts.add_column(name, justify="right")
     for part in found.parts:
         deviations = [f"{x:.2f}" for x in part.deviations * _TO_MM_DEG]
@@ -65,18 +65,18 @@ def explanation_form(scenario: str, found: Explanation) -> dict[str, Any]:
     }
 
 
-def the(part: str) -> str:
+def with_article(part: str) -> str:
     """`the stick`, but `castle2` and `A`."""
     return part if part[-1].isdigit() or part[0].isupper() else f"the {part}"
 
 
-def listed(words: Iterable[str]) -> str:
+def listed_words(words: Iterable[str]) -> str:
     """`x`, `x and y`, `x, y and yaw`."""
     *most, last = words
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def size(free: Free) -> str:
+def size(free: FreeDirection) -> str:
     """`1.00 mm` or `0.58 deg`."""
     return f"{_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
 
@@ -86,36 +86,36 @@ def covariance_form(C: Array) -> list[list[float]]:
     return (C * np.outer(_TO_MM_DEG, _TO_MM_DEG)).tolist()
 
 
-def _fixed(o: Determined) -> str:
+def _fixed(o: OperationExplanation) -> str:
     if not o.through:
         return "nothing is fixed by contacts"
     others = dict.fromkeys(part for hold in o.through for part in sorted(hold.parts) if part != o.part)
     names = [hold.relation + ("" if hold.lost is None else f" until operation {hold.lost + 1}") for hold in o.through]
     agreeing = [hold.relation for hold in o.agreeing]
-    agrees = f"; {listed(agreeing)} agree{'s' * (len(agreeing) == 1)}" if agreeing else ""
-    return f"{', '.join(o.fixed)} fixed by {listed(map(the, others))} ({', '.join(names)}{agrees})"
+    agrees = f"; {listed_words(agreeing)} agree{'s' * (len(agreeing) == 1)}" if agreeing else ""
+    return f"{', '.join(o.fixed)} fixed by {listed_words(map(with_article, others))} ({', '.join(names)}{agrees})"
 
 
-def _loose(found: Explanation, free: Sequence[Free]) -> str:
+def _loose(found: Explanation, free: Sequence[FreeDirection]) -> str:
     """Free directions, those that go together in one breath."""
     if not free:
         return "nothing is free"
-    together: dict[tuple[int, ...], list[Free]] = {}
+    together: dict[tuple[int, ...], list[FreeDirection]] = {}
     for one in free:
         together.setdefault(one.along, []).append(one)
     return "; ".join(_group(found, along, some) for along, some in together.items())
 
 
-def _group(found: Explanation, along: tuple[int, ...], some: list[Free]) -> str:
+def _group(found: Explanation, along: tuple[int, ...], some: list[FreeDirection]) -> str:
     sizes = ", ".join(map(size, some))
     names = ", ".join(f"{one.direction}{_about(one)}" for one in some)
     if not along:
         return f"{names} free, kept as seen, {sizes}"
     others = dict.fromkeys(found.operations[j].part for j in along)
-    return f"{names} free together with {listed(map(the, others))}, {sizes}"
+    return f"{names} free together with {listed_words(map(with_article, others))}, {sizes}"
 
 
-def _about(free: Free) -> str:
+def _about(free: FreeDirection) -> str:
     """The point of a turn, if it is not the origin of the part."""
     point = free.direction.point
     if not free.direction.turns or np.abs(point).max() < _OFF_M:
@@ -123,8 +123,8 @@ def _about(free: Free) -> str:
     return f" about ({', '.join(f'{x * 1e3:.0f}' for x in point)}) mm"
 
 
-def _free(free: Free) -> str:
-    goes = f", with {listed(f'T{j + 1}' for j in free.along)}" if free.along else ""
+def _free(free: FreeDirection) -> str:
+    goes = f", with {listed_words(f'T{j + 1}' for j in free.along)}" if free.along else ""
     return f"{free.direction}{_about(free)} {size(free)}{goes}"
 
 
@@ -133,11 +133,11 @@ def _hold(hold: Hold) -> str:
     return f"{hold.relation} {hold.parts[0]} on {hold.parts[1]}, {spelled(hold.word)}{lost}"
 
 
-def _deviation(free: Free) -> float:
+def _deviation(free: FreeDirection) -> float:
     return float(free.deviation * _TO_MM_DEG[3 if free.direction.turns else 0])
 
 
-def _operation_form(found: Explanation, o: Determined) -> dict[str, Any]:
+def _operation_form(found: Explanation, o: OperationExplanation) -> dict[str, Any]:
     return {
         "operation": o.operation + 1,
         "part": o.part,
@@ -150,7 +150,7 @@ def _operation_form(found: Explanation, o: Determined) -> dict[str, Any]:
     }
 
 
-def _part_form(part: Standing) -> dict[str, Any]:
+def _part_form(part: PartExplanation) -> dict[str, Any]:
     packed = pose.pack(part.pose)
     deviations = part.deviations * _TO_MM_DEG
     return {
@@ -168,7 +168,7 @@ def _part_form(part: Standing) -> dict[str, Any]:
     }
 
 
-def _free_forms(free: Sequence[Free], T: Array) -> Iterator[dict[str, Any]]:
+def _free_forms(free: Sequence[FreeDirection], T: Array) -> Iterator[dict[str, Any]]:
     """Twists per mm of a shift and per degree of a turn; axes in the frame of the part and in the world."""
     for one in free:
         d = one.direction

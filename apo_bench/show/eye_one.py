@@ -12,25 +12,25 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.records.settings import RANGE, check_careless, check_level, check_seed
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.simulation.sensor.watch import Watched
+from apo_bench.simulation.sensor.watch import DemonstrationImages
 from apo_bench.trial.stages import OBSERVATION, Shown, misshown, show, stream, through
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Seen:
+class SensorRun:
     """A demonstration, what was measured of it, and what was made of that."""
 
     name: str
     """Of the scenario."""
     shown: Shown
-    watched: Watched
+    watched: DemonstrationImages
     images: tuple[Array, ...]
     """Measured range images, (views, height, width) each, [m]."""
     events: tuple[Event, ...]
 
 
-def see_once(scenario: str, level_mm: float, seed: int, careless: float) -> Seen:
+def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> SensorRun:
     """Let the human demonstrate, and watch: the same images and poses as in a trial with these settings.
 
     Raises:
@@ -47,7 +47,7 @@ def see_once(scenario: str, level_mm: float, seed: int, careless: float) -> Seen
     assert shown.watched is not None
     eye = through(scene, shown, level_mm)
     images = tuple(eye.sensed(stream(seed, OBSERVATION)))
-    return Seen(scene.scenario.name, shown, shown.watched, images, eye.events(shown.demonstration, images))
+    return SensorRun(scene.scenario.name, shown, shown.watched, images, eye.events(shown.demonstration, images))
 
 
 def checked_view(view: int) -> int:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.topology import Assembly
-from apo_bench.depth_camera.distance import struck
+from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.view import View
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.show.eye_one import Seen
-from apo_bench.simulation.sensor.watch import Watched
+from apo_bench.show.eye_one import SensorRun
+from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 _TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
 _APPEARED, _VANISHED, _OUTLINE = "#1b7837", "#b2182b", "#d95f02"
@@ -25,7 +25,7 @@ _AROUND = 20
 _LARGEST_MM, _RESIDUAL_MM = 60.0, 5.0
 
 
-def draw_eye(seen: Seen, out: Path, view: int = 0) -> None:
+def draw_eye(seen: SensorRun, out: Path, view: int = 0) -> None:
     """Draw every operation that was noticed, in one view of the range finder."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -68,7 +68,7 @@ def _crop(axes: Any, events: Sequence[Event], view: int) -> None:
         axes.set_ylim(v.max() + _AROUND, v.min() - _AROUND)
 
 
-def _draw_row(row: Any, watched: Watched, images: Sequence[Array], event: Event, view: int) -> None:
+def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], event: Event, view: int) -> None:
     before, after, regions = images[event.first][view], images[event.last][view], event.regions[view]
     row[0].imshow(watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
     row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
@@ -95,7 +95,7 @@ def _expected(view: View, event: Event) -> Array:
     assert event.shape is not None
     T = event.found.T
     origin = pose.apply(pose.inverse(T), view.origin[None])[0]
-    distance, _ = struck(event.shape, origin, view.rays @ T[:3, :3])
+    distance, _ = strike_distances(event.shape, origin, view.rays @ T[:3, :3])
     return distance.reshape(view.height, view.width)
 
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose
-from apo_bench.show.eye_one import Seen
+from apo_bench.show.eye_one import SensorRun
 
 _FORM = "apo-bench/eye/1"
 
 
-def eye_form(seen: Seen, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
+def eye_form(seen: SensorRun, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
     """Everything that `apo-bench eye` says, operations from 1; the error is that of the eye, not the human's."""
     of = {event.operation: event for event in seen.events if event.operation is not None}
     return {
@@ -30,7 +30,7 @@ def eye_form(seen: Seen, level_mm: float, seed: int, careless: float) -> dict[st
     }
 
 
-def _one(event: Event | None, seen: Seen, k: int) -> dict[str, Any]:
+def _one(event: Event | None, seen: SensorRun, k: int) -> dict[str, Any]:
     if event is None or event.found is None:
         return {"found": False}
     deviation = np.sqrt(np.diag(event.found.covariance))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.fitted import Measured
+from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import Residuals
 
 _SEEN, _FITTED = "#9fb8d1", "#a6341b"
@@ -17,7 +17,7 @@ _BINS, _SHOWN = 40, 0.995
 """Bins of a histogram, and up to which quantile it is drawn."""
 
 
-def draw_fit(residuals: Residuals, measured: Measured, path: Path) -> None:
+def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     """Write the picture as PNG: across the ray, along it, turns; above, histograms; below, quantiles."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -9,14 +9,14 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.fitting.fit import PERCENTILES, Figures
-from apo_bench.observation.models.fitted import Measured
+from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.tails import Split
 
 _SCHEMA = "apo-bench/noise-fit/1"
 
 
-def fit_form(residuals: Residuals, measured: Measured, figures: Sequence[Figures]) -> dict[str, Any]:
+def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> dict[str, Any]:
     """Everything that was counted and fitted: mm and degrees; degrees of freedom are null for a Gaussian."""
     inlier = residuals.inlier
     mean, error = _bias(residuals)
@@ -55,7 +55,7 @@ def fit_form(residuals: Residuals, measured: Measured, figures: Sequence[Figures
     }
 
 
-def fit_lines(residuals: Residuals, measured: Measured, figures: Sequence[Figures]) -> list[str]:
+def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> list[str]:
     """The same in words."""
     n, found, inlier = len(residuals.where), int(residuals.found.sum()), int(residuals.inlier.sum())
     turned, (mean, error) = inlier - int(residuals.upright.sum()), _bias(residuals)

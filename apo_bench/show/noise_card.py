@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.names import resolve
@@ -23,8 +23,8 @@ from apo_bench.scenario.file import load_scenario
 SCENARIO = "stick_in_tower"
 _DRAWS = 1000
 """Observations of that scenario, three operations each, behind a histogram."""
-COLUMNS = ("across the ray", "along the ray", "tilt", "about the ray")
-UNITS = ("mm", "mm", "deg", "deg")
+PANELS = ("across the ray", "along the ray", "tilt", "about the ray")
+PANEL_UNITS = ("mm", "mm", "deg", "deg")
 _BINS, _WIDTH = 17, 14
 """Bins of a histogram in text, the outermost with all that is beyond, and the length of its longest bar."""
 
@@ -40,7 +40,7 @@ class Drawn(NamedTuple):
     """Share of operations that were not seen."""
 
 
-def listed() -> Mapping[str, str]:
+def listed_models() -> Mapping[str, str]:
     """Name -> what it is, of every model that has a name."""
     return {name: facts(name).title for name in NOISES} | {
         name: f"measured: {read_noise(path)[0].source.split(':')[0]}" for name, path in presets().items()
@@ -63,9 +63,9 @@ def _model(given: Any) -> Any:
     return measured or resolve(given, NOISES, "noise model")
 
 
-def draw(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
+def draw_errors(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     """Errors of many observations of the nominal example 5.1; operations that were not seen have none."""
-    noise, shown, camera, rng = make_noise(given, level), demonstrated(), Camera(), np.random.default_rng(0)
+    noise, shown, camera, rng = make_noise(given, level), nominal_demonstration(), Camera(), np.random.default_rng(0)
     errors, variances, missed = [], [], 0
     for _ in range(draws):
         seen = observe(shown, noise, rng)
@@ -82,25 +82,25 @@ def draw(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     return Drawn(some, rms, missed / (draws * len(shown.goals)))
 
 
-def demonstrated() -> Demonstration:
+def nominal_demonstration() -> Demonstration:
     """What a careful human shows: the nominal goals of example 5.1, in the middle of where they may stand."""
     scenario = load_scenario(SCENARIO)
     T = pose.at(np.append(scenario.site.center_m, 0.0))
     goals = T @ scenario.goals
-    final = placed(scenario.assembly, scenario.start, goals)[-1]
+    final = placements(scenario.assembly, scenario.start, goals)[-1]
     return Demonstration(scenario.assembly, scenario.start, goals, final, np.zeros((len(goals), 6, 6)))
 
 
 def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
-    """The card of a model in Markdown, with a histogram in text of what was drawn, which `draw` does if nothing was."""
-    drawn = drawn or draw(given, level)
+    """The card of a model in Markdown, with a histogram in text of `drawn` (none: of what `draw_errors` draws)."""
+    drawn = drawn or draw_errors(given, level)
     if not len(drawn.errors):
-        return f"{described(given)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
+        return f"{model_description(given)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
     bars = "\n".join(f"    {line}".rstrip() for line in _histogram(drawn))
-    return f"{described(given)}\n{measured(given, drawn, level)}:\n\n{bars}\n"
+    return f"{model_description(given)}\n{drawn_sentence(given, drawn, level)}:\n\n{bars}\n"
 
 
-def described(given: Any, heading: int = 1) -> str:
+def model_description(given: Any, heading: int = 1) -> str:
     """What a model says of itself, without a histogram."""
     said, name = facts(given), given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
     parts = [f"{'#' * heading} {name}: {said.title}"]
@@ -115,7 +115,7 @@ def described(given: Any, heading: int = 1) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def measured(given: Any, drawn: Drawn, level: Level) -> str:
+def drawn_sentence(given: Any, drawn: Drawn, level: Level) -> str:
     """One sentence on what was drawn, without its full stop."""
     if facts(given).measured:
         apart = f" in mm and {level.deg:g} times in deg" if level.deg != level.mm else ""
@@ -135,7 +135,7 @@ def _histogram(drawn: Drawn) -> list[str]:
     edges = 0.5 * (np.arange(_BINS - 1) - (_BINS - 2) / 2)
     counts = np.array([np.bincount(np.digitize(column, edges), minlength=_BINS) for column in unit.T])
     longest = max(1, int(counts.max()))
-    lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name in COLUMNS)]
+    lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name in PANELS)]
     for i in range(_BINS):
         low, high = (edges[i - 1] if i else None), (edges[i] if i < _BINS - 1 else None)
         if low is None:
@@ -151,6 +151,6 @@ def _histogram(drawn: Drawn) -> list[str]:
         ("stated", drawn.stated),
     ):
         lines.append(
-            word.rjust(12) + "".join(f"  {f'{v:.3g} {u}':{_WIDTH}}" for v, u in zip(values, UNITS, strict=True))
+            word.rjust(12) + "".join(f"  {f'{v:.3g} {u}':{_WIDTH}}" for v, u in zip(values, PANEL_UNITS, strict=True))
         )
     return lines

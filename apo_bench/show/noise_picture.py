@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.show.noise_card import COLUMNS, UNITS, Drawn
+from apo_bench.show.noise_card import PANEL_UNITS, PANELS, Drawn
 
 _SIZE_INCH, _BINS = (9.0, 2.3), 49
 _REACH = 6.0
@@ -23,8 +23,8 @@ def draw_histogram(drawn: Drawn, path: Path) -> None:
 
     figure = Figure(figsize=_SIZE_INCH, layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1, len(COLUMNS))
-    for i, (axis, name, unit) in enumerate(zip(axes, COLUMNS, UNITS, strict=True)):
+    axes = figure.subplots(1, len(PANELS))
+    for i, (axis, name, unit) in enumerate(zip(axes, PANELS, PANEL_UNITS, strict=True)):
         _panel(axis, drawn.errors[:, i], float(drawn.stated[i]))
         axis.set_xlabel(f"{name} [{unit}]", fontsize=9)
     axes[0].set_ylabel("density", fontsize=9)

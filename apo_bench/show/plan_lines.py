@@ -9,18 +9,18 @@ from apo_bench.assembly.topology import spelled
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.macros import Macro
-from apo_bench.insertion.operations import Understood
-from apo_bench.scenario.nominal import understood
+from apo_bench.insertion.operations import OperationMacros
+from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Grasp, Scenario
 
 
-class Line(NamedTuple):
+class PlanLine(NamedTuple):
     """One step of the schedule."""
 
     operation: int
     """Counted from 0."""
     undo: bool
-    what: Understood
+    what: OperationMacros
     leaves: Arrival
     comes: Arrival
     came_from: str
@@ -45,9 +45,9 @@ class Line(NamedTuple):
         return "" if self.comes.free else "no free way in was found"
 
 
-def plan_lines(plan: Plan, scenario: Scenario) -> tuple[Line, ...]:
+def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     """What the robot is asked to do, step by step."""
-    everything, odls, arcs = understood(scenario), plan.assembly.odls(), plan.assembly.arcs()
+    everything, odls, arcs = nominal_operations(scenario), plan.assembly.odls(), plan.assembly.arcs()
     made_by = [plan.assembly.relations()[arc[0]].made for arc in arcs]
     lost_at = [plan.assembly.relations()[arc[0]].lost for arc in arcs]
     lines = []
@@ -57,7 +57,7 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[Line, ...]:
         leaves, comes = (what.after, what.before) if undo else (what.before, what.after)
         mine = [i for i in range(len(arcs)) if (lost_at[i] if undo else made_by[i]) == k]
         lines.append(
-            Line(
+            PlanLine(
                 operation=k,
                 undo=undo,
                 what=what,

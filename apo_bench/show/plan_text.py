@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.insertion.arrival import Arrival, turning
+from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
-from apo_bench.scenario.nominal import waiting
+from apo_bench.scenario.nominal import nominal_start
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.plan_lines import Line
+from apo_bench.show.plan_lines import PlanLine
 
 _MACROS = "apo-bench/macros/1"
 _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
 
 
-def plan_text(lines: Sequence[Line]) -> list[str]:
+def plan_text(lines: Sequence[PlanLine]) -> list[str]:
     """A table of text, then what is wrong with single operations."""
     table = [_HEADS, *(_cells(line) for line in lines)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
@@ -33,18 +33,18 @@ def plan_text(lines: Sequence[Line]) -> list[str]:
     return [*rows, *([""] if wrong else []), *wrong]
 
 
-def plan_form(lines: Sequence[Line], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
+def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:
     """What `json` can write: mm, degrees, operations from 1.
 
     Args:
         notes: What is to be said with it: what was assumed, and what speaks against the plan.
     """
-    start = waiting(scenario)
-    stages = (start, *placed(scenario.assembly, start, scenario.goals))
+    start = nominal_start(scenario)
+    stages = (start, *placements(scenario.assembly, start, scenario.goals))
     forms = []
     for line in lines:
         poses = stages[line.operation if line.undo else line.operation + 1]
-        screw = turning(scenario.assembly, line.comes, poses)
+        screw = turning_state(scenario.assembly, line.comes, poses)
         position, felt, across = line.comes.axes
         forms.append(
             {
@@ -81,7 +81,7 @@ def direction(v: Array) -> str:
     return f"({', '.join(f'{x + 0.0:.3g}' for x in np.round(v, 3))})"
 
 
-def _cells(line: Line) -> tuple[str, ...]:
+def _cells(line: PlanLine) -> tuple[str, ...]:
     position, felt, across = line.comes.axes
     name = " with ".join((line.what.main, *filter(None, [" and ".join(line.what.carries)])))
     return (
@@ -98,14 +98,14 @@ def _cells(line: Line) -> tuple[str, ...]:
     )
 
 
-def _chain(line: Line) -> Iterator[str]:
+def _chain(line: PlanLine) -> Iterator[str]:
     """`depart +x`, `insert-into +x 140 mm`: how far only where that is known before."""
     for macro in line.macros:
         far = "" if macro.length_m is None else f" {1e3 * macro.length_m:.4g} mm"
         yield f"{macro.name} {direction(macro.direction)}{far}"
 
 
-def _until(line: Line) -> str:
+def _until(line: PlanLine) -> str:
     if line.goal is None:
         return f"back at {line.back_to}"
     numbers = np.round([*(1e3 * line.goal[:3, 3]), *_turns(line.goal)], 3) + 0.0

@@ -24,7 +24,7 @@ from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import Solid
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.scene.physics import Physics, physics
-from apo_bench.simulation.scene.world import World, fresh, part_pose, place, unstable, world
+from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
 
 LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned by `python benchmarks/tune.py`."""
@@ -55,11 +55,11 @@ def settle(seen: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
     if not len(goals):
         return goals
     scene = _world(seen)
-    data = fresh(scene, seen.start)
+    data = initial_state(scene, seen.start)
     for k, operation in enumerate(seen.assembly.operations):
         _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ seen.goals[k])
         _rest(scene, data)
-        if unstable(data):
+        if has_failed(data):
             break
         goals[k] = part_pose(scene, data, operation.main)
     return goals
@@ -78,7 +78,7 @@ def _rest(scene: World, data: mujoco.MjData) -> None:
     dof = np.array(list(scene.dof.values()))[:, None] + np.arange(6)
     mujoco.mj_forward(model, data)
     inertia = np.array([[model.body_mass[b]] * 3 + [*model.body_inertia[b]] for b in map(scene.body.get, scene.free)])
-    while data.time - began < _LONGEST_S and quiet < _REST_S and not unstable(data):
+    while data.time - began < _LONGEST_S and quiet < _REST_S and not has_failed(data):
         soft = data.time - began < SOFT_S
         model.dof_damping[dof] = _SYRUP * inertia if soft else 0.0
         mujoco.mj_step(model, data)

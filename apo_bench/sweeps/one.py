@@ -12,7 +12,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.files.json_forms import observation_form, write_form
-from apo_bench.files.observation import observed, read_stated
+from apo_bench.files.observation import read_observation_file, read_stated
 from apo_bench.io.reading import read_text
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
 from apo_bench.records.method import parsed
@@ -139,7 +139,7 @@ def looked_at(
     if observation is None:
         return watched(Request(scenario=scenario, **asked)), False
     stated = {name: value for name, value in deviations.items() if value is not None}
-    seen, _, assumed = observed(observation, scenario, **stated)
+    seen, _, assumed = read_observation_file(observation, scenario, **stated)
     return seen, assumed
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.io.strict_json import Node
+from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
 from apo_bench.records.settings import LARGEST_CARELESS, LARGEST_CLEARANCE_MM, LARGEST_LEVEL, LARGEST_SEED
 from apo_bench.sweeps.grid import LARGEST_TRIALS, SweepSpec
@@ -66,7 +66,7 @@ def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
     )
 
 
-def _tables(node: Node) -> Sequence[Node]:
+def _tables(node: JsonNode) -> Sequence[JsonNode]:
     if not isinstance(node.value, list) or not all(isinstance(entry, dict) for entry in node.value):
         raise InputError(f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.")
     return _few(node.items("also"), node)
@@ -81,26 +81,28 @@ def _grid(name: str, said: Mapping[str, Any]) -> SweepSpec:
         raise InputError(f"{name}: {error}") from error
 
 
-def _value(key: str, node: Node) -> Any:
+def _value(key: str, node: JsonNode) -> Any:
     if key in TEXTS:
         return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
     if key in NUMBERS:
-        read = _level if key == "levels" else partial(Node.number, low=0.0, high=NUMBERS[key])
+        read = _level if key == "levels" else partial(JsonNode.number, low=0.0, high=NUMBERS[key])
         return tuple(read(entry) for entry in _entries(node, key, "numbers"))
     if key in COUNTS:
         return _count(node, *COUNTS[key])
     return node.number(0.0, above=True) if key == "timestep_ms" else node.text()
 
 
-def _entries(node: Node, key: str, of: str) -> Sequence[Node]:
+def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
     if not isinstance(node.value, list):
         node.fail(f"a list of {of} is needed", f"write {key} = [...]")
     if not node.value:
         node.fail(f"a list of {of} is needed", "an empty grid has no trials, so name at least one or leave the key out")
-    return _few([Node(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)], node)
+    return _few(
+        [JsonNode(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)], node
+    )
 
 
-def _few(entries: Sequence[Node], node: Node) -> Sequence[Node]:
+def _few(entries: Sequence[JsonNode], node: JsonNode) -> Sequence[JsonNode]:
     if len(entries) > MOST_ENTRIES:
         raise InputError(
             f"{node.file}, {node.key}: at most {MOST_ENTRIES} entries are allowed, {len(entries)} were given."
@@ -108,7 +110,7 @@ def _few(entries: Sequence[Node], node: Node) -> Sequence[Node]:
     return entries
 
 
-def _level(node: Node) -> float | tuple[float, float]:
+def _level(node: JsonNode) -> float | tuple[float, float]:
     """A number, or a pair of mm and degrees."""
     if not isinstance(node.value, list):
         return node.number(0.0, LARGEST_LEVEL)
@@ -116,7 +118,7 @@ def _level(node: Node) -> float | tuple[float, float]:
     return mm, deg
 
 
-def _count(node: Node, low: int, high: int) -> int:
+def _count(node: JsonNode, low: int, high: int) -> int:
     if not isinstance(node.value, int) or isinstance(node.value, bool) or not low <= node.value <= high:
         node.fail(f"a whole number from {low} to {high} is needed")
     return int(node.value)

@@ -10,8 +10,8 @@ from functools import partial
 from typing import Any, final
 
 from apo_bench.assembly.goals import Observation
-from apo_bench.correction.correctors import Misbehaved
-from apo_bench.correction.own_code.own import Lost, OwnCorrectors
+from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.records.checked import unwritable
 from apo_bench.records.key import KEY
@@ -20,7 +20,7 @@ from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import Row
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.execution.replay_cache import Branches
+from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
@@ -73,7 +73,7 @@ class Worker:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
         """
         demonstrations: dict[tuple[float, str], Shown] = {}
-        branches = Branches()
+        branches = ReplayCache()
         for spec in unit.trials:
             if stopped():
                 return
@@ -99,7 +99,7 @@ class Worker:
         try:
             return self._own.find(name)
         except InputError as error:
-            return partial(_raise, Misbehaved(str(error)))
+            return partial(_raise, CorrectorMisbehaved(str(error)))
 
     def _scene(self, spec: TrialSettings) -> tuple[Scene, str]:
         key = (spec.scenario, spec.clearance_mm, spec.grasp)
@@ -132,9 +132,9 @@ def row_of(spec: TrialSettings, scene: Scene, shown: Shown, content: str, **more
         row = run_trial(spec, scene, shown=shown, content=content, **more)
         wrong = unwritable(row) if ":" in spec.method else ""
         said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
-    except Lost as error:
+    except CorrectorLost as error:
         return lost(spec, content, error.code, "corrector")
-    except Misbehaved as error:
+    except CorrectorMisbehaved as error:
         wrong = said = str(error)
     return misbehaved(spec, content, shown.demonstration.code, said) if wrong else row
 

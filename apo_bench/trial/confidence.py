@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from apo_bench.assembly.goals import Correction, Observation, Plan
-from apo_bench.correction.posterior import inside
+from apo_bench.correction.posterior import contains_truth
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit
 from apo_bench.trial.planning import Planned
@@ -58,7 +58,7 @@ def _truth(planned: Planned, told: Observation, truth: Array | None) -> dict[str
     if truth is None:
         return {}
     made = planned.correction
-    covered = None if made is None or not made.ok else inside(told, made, truth)
+    covered = None if made is None or not made.ok else contains_truth(told, made, truth)
     fixed, free = (None, None) if planned.plan is None else _errors(planned.plan, truth)
     return {
         "inside_95": covered,

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.assembly.equations import gap
+from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Correction, Observation, Plan, Try
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
@@ -69,7 +69,7 @@ def refusal(made: Correction) -> Ending:
 
 
 def _as_it_is(seen: Observation, goals: Array, refused: Ending | None) -> Planned:
-    open_m = gap(seen.assembly, seen.start, goals)
+    open_m = largest_gap(seen.assembly, seen.start, goals)
     if refused:
         return Planned(None, refused, (), (), open_m, math.nan)
     return Planned(Plan(seen.assembly, seen.start, goals), None, (), (), open_m, open_m)

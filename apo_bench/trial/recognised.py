@@ -20,7 +20,7 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.contacts import Recognised, recognise
-from apo_bench.recognition.thresholds import FIXED
+from apo_bench.recognition.thresholds import FIXED_RULES
 
 UNCOUNTED: Mapping[str, Any] = MappingProxyType(
     {"contacts_right": None, "contacts_missed": None, "contacts_false": None}
@@ -31,7 +31,7 @@ UNCOUNTED: Mapping[str, Any] = MappingProxyType(
 def recognised(seen: Observation, kind: str = "recognised") -> Recognised:
     """The contacts of an observation, found in one of the ways of `RECOGNISED`; its own are not looked at."""
     if kind == "recognised-fixed":
-        return recognise(seen, FIXED)
+        return recognise(seen, FIXED_RULES)
     first = recognise(seen)
     return first if kind == "recognised" else _again(seen, first)
 

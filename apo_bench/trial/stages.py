@@ -9,23 +9,23 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Layout, Observation, Plan, ReplayResult
-from apo_bench.depth_camera.range_eye import RangeEye
+from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
-from apo_bench.observation.relations import Relations, told
+from apo_bench.observation.relations import Relations, with_relations
 from apo_bench.prediction.failure import predict
 from apo_bench.records.outcomes import sentence
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.execution.replay_cache import Branches
+from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.sensor.watch import Watched, Watcher
+from apo_bench.simulation.sensor.watch import DemonstrationCamera, DemonstrationImages
 
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV = range(6)
 """Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
@@ -38,7 +38,7 @@ class Shown:
 
     layout: Layout
     demonstration: Demonstration
-    watched: Watched | None = None
+    watched: DemonstrationImages | None = None
     """What the range finder saw of it; None if only poses are asked for."""
 
 
@@ -73,18 +73,18 @@ def stream(seed: int, which: int, salt: Salt | None = None) -> np.random.Generat
 def show(scene: Scene, careless: float, seed: int, eye: str = "noise", salt: Salt | None = None) -> Shown:
     """Draw the truth of a trial and let the human demonstrate it; with the eye `range` it is watched meanwhile."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, salt), scene.clearance_mm)
-    watcher = Watcher(scene.shown, stream(seed, TV, salt)) if eye == RANGE else None
+    watcher = DemonstrationCamera(scene.shown, stream(seed, TV, salt)) if eye == RANGE else None
     demonstration = demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION, salt), watcher)
     return Shown(layout, demonstration, watcher.watched() if watcher else None)
 
 
-def through(scene: Scene, shown: Shown, level_mm: float) -> RangeEye:
+def through(scene: Scene, shown: Shown, level_mm: float) -> RangeSensor:
     """The range finder that watched a demonstration, to be passed to `see`; `level_mm` is the noise of a ray."""
     assert shown.watched is not None, "watch the demonstration: show(..., eye='range')"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
     seen = shown.watched
-    return RangeEye(seen.finder, seen.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
+    return RangeSensor(seen.finder, seen.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
 
 
 def see(scene: Scene, shown: Shown, noise: Noise, seed: int, salt: Salt | None = None) -> Observation:
@@ -98,7 +98,7 @@ def tell(
     seen: Observation, relations: Relations | None, truth: Array, seed: int, salt: Salt | None = None
 ) -> Observation:
     """The observation of a trial as a corrector gets it: with relations that may be wrong."""
-    return told(seen, relations, truth, stream(seed, RELATIONS, salt))
+    return with_relations(seen, relations, truth, stream(seed, RELATIONS, salt))
 
 
 def misshown(shown: Demonstration) -> Ending:
@@ -128,7 +128,7 @@ def attempt(
     reference: Array,
     watch: Any = None,
     fidelity: str = "full",
-    branches: Branches | None = None,
+    branches: ReplayCache | None = None,
     searches: bool = False,
     most_s: float = math.inf,
 ) -> Tried:

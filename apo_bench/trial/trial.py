@@ -18,7 +18,7 @@ from apo_bench.records.method import knows_relations, knows_truth, parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row, finite
 from apo_bench.records.settings import RANGE, TrialSettings
-from apo_bench.simulation.execution.replay_cache import Branches
+from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.confidence import confidence
 from apo_bench.trial.fingerprint import content_hash, spec_hash
@@ -40,7 +40,7 @@ def run_trial(
     content: str | None = None,
     method: Any = None,
     watch: Any = None,
-    branches: Branches | None = None,
+    branches: ReplayCache | None = None,
 ) -> Row:
     """Run one trial.
 
@@ -137,7 +137,7 @@ def _carry_out(
     truth: Array | None,
     watch: Any,
     spec: TrialSettings,
-    branches: Branches | None,
+    branches: ReplayCache | None,
 ) -> Row:
     said = _correction(planned)
     if planned.plan is None:

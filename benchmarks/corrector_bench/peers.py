@@ -46,7 +46,7 @@ def peers() -> dict[str, Peer]:
 
 def newton(task: Task) -> Run:
     """Section 3.3's Newton with minimum-norm steps, as `paper` uses it."""
-    from apo_bench.correction.solvers.newton import solve
+    from apo_bench.correction.solvers.newton import solve_newton
 
     free = range(len(task.seen))
-    return lambda: solve(task.system, task.seen, free).goals
+    return lambda: solve_newton(task.system, task.seen, free).goals

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
-from apo_bench.correction.posterior import inside
+from apo_bench.correction.posterior import contains_truth
 from apo_bench.geometry.arrays import Array
 from benchmarks.corrector_bench.draws import Draw, draw, factors
 from benchmarks.corrector_bench.measures import free_basis, lengths, spread
@@ -38,7 +38,7 @@ def _rows(name: str, per_part: bool, draws: int) -> list[Row]:
         made = corrected(seen)
         refused += not made.ok
         alarms += made.test is None or made.test.p_value < LEVEL
-        said += bool(inside(seen, made, given.truth, REGION))
+        said += bool(contains_truth(seen, made, given.truth, REGION))
         found += spread(of, given, made.goals) <= bound
         fixed_mm.append(1e3 * _across_m(of, given, made.goals))
     share = 100.0 / draws

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.equations import equations, gap
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.equations import equations, largest_gap
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
-from apo_bench.correction.solvers.newton import CUT_OFF, LENGTH_M, displacement, least_step
+from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
@@ -102,7 +102,7 @@ def test_long_words_are_long() -> None:
 @pytest.mark.parametrize("build", scenes.ALL.values())
 def test_no_gap_at_the_truth(build) -> None:
     scene = build()
-    assert gap(scene.assembly, scene.start, scene.goals) < 1e-15
+    assert largest_gap(scene.assembly, scene.start, scene.goals) < 1e-15
 
 
 @given(st.integers(0, 10**6))
@@ -110,7 +110,7 @@ def test_no_gap_at_the_truth(build) -> None:
 def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) -> None:
     scene = random_scene(seed)
     e = equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
-    history, row = placed(scene.assembly, scene.start, scene.goals), 0
+    history, row = placements(scene.assembly, scene.start, scene.goals), 0
     for contact, made, _ in scene.assembly.relations():
         m, b = contact
         T, n = history[made][m.part], scene.assembly.face(m).plane
@@ -210,7 +210,7 @@ def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) 
     e, J = equations(scene.assembly, scene.start, scene.goals, free).linearised(scene.goals)
     chosen = J.reshape(len(e), -1, 6)[:, list(columns)].reshape(len(e), -1)
     scaled = chosen / np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(columns))
-    assert [least_step(scaled, e, cut)[1] for cut in (CUT_OFF, 1e-7)] == [rank, rank]
+    assert [least_step(scaled, e, cut)[1] for cut in (SINGULAR_CUT_OFF, 1e-7)] == [rank, rank]
 
 
 @given(st.integers(0, 10**6))

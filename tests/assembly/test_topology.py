@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation, Term, inverted, product, simplified, spelled
 from apo_bench.geometry import pose
 from tests import scenes
@@ -102,7 +102,7 @@ def test_odls_stand_for_the_poses_that_walking_the_operations_gives() -> None:
     for build in scenes.ALL.values():
         scene = build()
         goals = scenes.noisy(scene.goals, np.random.default_rng(1), 20.0, 20.0)
-        for odls, poses in zip(scene.assembly.odls(), placed(scene.assembly, scene.start, goals), strict=True):
+        for odls, poses in zip(scene.assembly.odls(), placements(scene.assembly, scene.start, goals), strict=True):
             for part, odl in odls.items():
                 assert_allclose(poses[part], product(odl, goals), atol=1e-12)
             for part in set(poses) - set(odls):

@@ -39,14 +39,14 @@ def test_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_card_of_a_scenario_is_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     from apo_bench.resources import folder
-    from apo_bench.show.card import card
+    from apo_bench.show.card import scenario_card
 
     loaded = load_scenario("vanished_fixture")
-    assert run(capsys, "scenarios", "vanished_fixture") == (0, card(loaded), "")
+    assert run(capsys, "scenarios", "vanished_fixture") == (0, scenario_card(loaded), "")
     path = tmp_path / "mine.toml"
     path.write_text((folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8"), encoding="utf-8")
     _, out, _ = run(capsys, "scenarios", str(path))
-    assert out == card(loaded).replace("vanished_fixture:", "mine:")
+    assert out == scenario_card(loaded).replace("vanished_fixture:", "mine:")
 
 
 def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) -> None:

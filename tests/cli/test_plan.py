@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Plan, Step
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.insertion.arrival import turning
+from apo_bench.insertion.arrival import turning_state
 from apo_bench.insertion.operations import understand
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.scenario.nominal import understood, waiting
+from apo_bench.scenario.nominal import nominal_operations, nominal_start
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.plan_lines import plan_lines
-from apo_bench.show.plan_text import direction, plan_form, plan_text
+from apo_bench.show.plan_text import direction, plan_lines_form, plan_text
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.scene.scene import build_scene
 from tests import scenes
@@ -82,7 +82,7 @@ def nominal(scenario: Scenario) -> Plan:
 
 def unstated(scenario: Scenario) -> list[tuple[str, list[str]]]:
     """States and macros found without any stated line of attach."""
-    found = understand(scenario.assembly, waiting(scenario), scenario.goals)
+    found = understand(scenario.assembly, nominal_start(scenario), scenario.goals)
     return [
         (
             f"{each.before.state.letter} -> {each.after.state.letter}",
@@ -99,7 +99,7 @@ def test_the_table_covers_every_scenario() -> None:
 @pytest.mark.parametrize("name", TABLE)
 def test_states_and_macros_of_every_operation(name: str) -> None:
     scenario = load_scenario(name)
-    form = plan_form(plan_lines(nominal(scenario), scenario), scenario)
+    form = plan_lines_form(plan_lines(nominal(scenario), scenario), scenario)
     found = [
         (
             f"{step['before']['letter']} -> {step['after']['letter']}",
@@ -301,8 +301,8 @@ def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
     scenario = load_scenario(name)
     layout = draw_layout(scenario, np.random.default_rng([5, 0]))
     done = moves(Plan(scenario.assembly, layout.start, layout.goals), build_scene(scenario))
-    stages = placed(scenario.assembly, layout.start, layout.goals)
-    for move, what in zip(done, understood(scenario), strict=True):
+    stages = placements(scenario.assembly, layout.start, layout.goals)
+    for move, what in zip(done, nominal_operations(scenario), strict=True):
         t, T = move.transfer, stages[what.operation][what.main]
         assert [motion.name for motion in t.macros] == [macro.name for macro in what.after.macros]
         assert len(t.departs) == len(what.before.departs)
@@ -313,10 +313,10 @@ def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
 @pytest.mark.parametrize("name", TABLE)
 def test_rotation_never_adds_freedom_that_translation_lacks(name: str) -> None:
     scenario = load_scenario(name)
-    start = waiting(scenario)
-    stages = (start, *placed(scenario.assembly, start, scenario.goals))
-    for what in understood(scenario):
+    start = nominal_start(scenario)
+    stages = (start, *placements(scenario.assembly, start, scenario.goals))
+    for what in nominal_operations(scenario):
         for found, poses in ((what.before, stages[what.operation]), (what.after, stages[what.operation + 1])):
-            screw = turning(scenario.assembly, found, poses)
+            screw = turning_state(scenario.assembly, found, poses)
             assert screw.translation == found.state
             assert min(*screw.all, *screw.rotation) >= 0

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Correction, Observation, Try
-from apo_bench.assembly.placement import placed
-from apo_bench.correction.baselines.ablations import MOST, last_only, minimal, no_disappeared, smallest
+from apo_bench.assembly.placement import placements
+from apo_bench.correction.baselines.ablations import MOST_SETS, last_only, minimal, no_disappeared, smallest
 from apo_bench.correction.baselines.no_history import no_history
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import paper_track
@@ -94,8 +94,8 @@ def test_a_set_without_the_newest_has_to_mend_what_it_makes() -> None:
 def test_sets_by_size_then_by_recency_and_no_more_than_that() -> None:
     assert list(smallest((5, 3, 1))) == [(5,), (3,), (1,), (5, 3), (5, 1), (3, 1), (5, 3, 1)]
     few, many = tuple(range(8)), tuple(range(30))
-    assert len(list(smallest(few))) == len(set(smallest(few))) == MOST
-    assert len(list(smallest(many))) == MOST + 1
+    assert len(list(smallest(few))) == len(set(smallest(few))) == MOST_SETS
+    assert len(list(smallest(many))) == MOST_SETS + 1
     assert list(smallest(many))[-1] == many
 
 
@@ -124,7 +124,7 @@ def relative(poses: dict[str, Array], a: str, b: str) -> Array:
 
 def test_without_history_the_stick_of_example_5_2_stays_as_crooked_in_the_cube_as_it_was_seen() -> None:
     given = seen("subassembly_on_castles", level=1.0)
-    after = [dict(placed(given.assembly, given.start, g)[-1]) for g in (given.goals, no_history(given).goals)]
+    after = [dict(placements(given.assembly, given.start, g)[-1]) for g in (given.goals, no_history(given).goals)]
     assert_allclose(relative(after[1], "cube", "stick"), relative(after[0], "cube", "stick"), atol=1e-12)
     assert no_history(given).gap_after_m > 1e-3 > paper(given).gap_after_m
 

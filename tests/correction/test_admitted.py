@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.assembly.equations import gap
+from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.correction.contact import contact
 from apo_bench.correction.correctors import correct
@@ -105,7 +105,7 @@ def lying(seen: Observation, **changed: Any) -> Correction:
 
 def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
     one = seen()
-    open_m = gap(one.assembly, one.start, one.goals)
+    open_m = largest_gap(one.assembly, one.start, one.goals)
     assert open_m > 1e-3
     for claimed in (0.0, float("nan"), -1.0):
         made = correct(one, lambda seen, claimed=claimed: lying(seen, gap_after_m=claimed))

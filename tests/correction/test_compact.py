@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import product
-from apo_bench.correction.solvers.compact import Compact, compact, moments
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes
@@ -25,12 +25,12 @@ pytestmark = pytest.mark.numeric
 SEEDS = st.integers(0, 10**6)
 
 
-def both(scene: scenes.Scene) -> tuple[Equations, Compact]:
+def both(scene: scenes.Scene) -> tuple[Equations, CompactEquations]:
     system = equations(scene.assembly, scene.start, scene.goals)
-    return system, compact(system, len(scene.goals))
+    return system, compact_equations(system, len(scene.goals))
 
 
-def dense(system: Compact, T: Array) -> tuple[Array, Array]:
+def dense(system: CompactEquations, T: Array) -> tuple[Array, Array]:
     """e, (3 c,), and the Jacobian by body twists, (3 c, 6 n)."""
     e, blocks = system.blocks(T, np.broadcast_to(np.eye(6), (*T.shape[:-2], 6, 6)))
     return e, np.swapaxes(system.gathered(blocks), -1, -2)
@@ -116,7 +116,7 @@ def test_own_points_of_each_observation() -> None:
     """Points with a leading axis belong to the observations; `only` takes those that are asked for."""
     scene, rng = scenes.stick_on_castles(), np.random.default_rng(2)
     T = np.array([scenes.noisy(scene.goals, rng, 3.0, 3.0) for _ in range(3)])
-    each = [compact(equations(scene.assembly, scene.start, goals), len(goals)) for goals in T]
+    each = [compact_equations(equations(scene.assembly, scene.start, goals), len(goals)) for goals in T]
     together = replace(each[0], points=np.array([one.points for one in each]))
     e = together.residual(T)
     for i, one in enumerate(each):
@@ -147,7 +147,7 @@ def test_words_are_relative_poses(seed: int) -> None:
     scene = random_scene(seed)
     _, small = both(scene)
     assume(len(small))
-    history = placed(scene.assembly, scene.start, scene.goals)
+    history = placements(scene.assembly, scene.start, scene.goals)
     for (contact, made, _), word in zip(scene.assembly.relations(), small.words(scene.goals), strict=True):
         a, b = (history[made][end.part] for end in contact)
         assert_allclose(word, pose.inverse(a) @ b, rtol=0, atol=1e-12)
@@ -178,5 +178,5 @@ def test_no_contacts_and_no_operations() -> None:
     none = small.among(np.zeros(len(small), dtype=np.bool_))
     e, J = dense(none, scene.goals)
     assert (e.shape, J.shape) == ((0,), (0, 18))
-    still = compact(equations(scene.assembly.first(0), scene.start, np.zeros((0, 4, 4))), 0)
+    still = compact_equations(equations(scene.assembly.first(0), scene.start, np.zeros((0, 4, 4))), 0)
     assert (len(still), still.residual(np.zeros((0, 4, 4))).shape) == (0, (0,))

@@ -15,8 +15,8 @@ from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.solvers import compiled, loops, manifold
-from apo_bench.correction.solvers.compact import Compact, compact
-from apo_bench.correction.solvers.manifold import Nearest
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.manifold import NearestGoals
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -30,7 +30,7 @@ LEVELS = {(2.0, 1.0): 1e-12, (10.0, 8.0): 1e-9}
 solver differs from itself by up to 2e-10 m when the contacts come in another order."""
 
 
-def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[Compact, Array, Array]:
+def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[CompactEquations, Array, Array]:
     """Equations, goals that were seen, and L, a different one for every operation."""
     rng = np.random.default_rng(seed)
     given = load_scenario(name)
@@ -38,10 +38,10 @@ def drawn(name: str, mm: float, degrees: float, seed: int) -> tuple[Compact, Arr
     twisted = np.tril(rng.normal(scale=0.2, size=(len(given.assembly), 6, 6)), -1) + np.eye(6)
     L = sigma[:, :, None] * twisted
     goals = given.goals @ pose.exp((L @ rng.standard_normal((*L.shape[:2], 1)))[..., 0])
-    return compact(equations(given.assembly, given.start, goals), len(goals)), goals, L
+    return compact_equations(equations(given.assembly, given.start, goals), len(goals)), goals, L
 
 
-def alike(expected: Nearest, actual: Nearest, within_m: float) -> None:
+def alike(expected: NearestGoals, actual: NearestGoals, within_m: float) -> None:
     assert len(expected.trace) == len(actual.trace)
     assert np.array_equal(expected.at_rest, actual.at_rest)
     assert np.array_equal(expected.finite, actual.finite)
@@ -63,7 +63,7 @@ def _numba() -> None:
 def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
     for seed in range(6):
         given = drawn(name, *level, seed)
-        alike(manifold.nearest(*given), compiled.nearest(*given), LEVELS[level])
+        alike(manifold.nearest_goals(*given), compiled.nearest_goals_compiled(*given), LEVELS[level])
 
 
 @pytest.mark.numeric
@@ -72,7 +72,11 @@ def test_soft_contacts_are_the_same_too(name: str) -> None:
     for seed in range(3):
         system, goals, L = drawn(name, 2.0, 1.0, seed)
         soft_m = np.repeat(np.arange(len(system)) % 2 * 5e-5, 3)
-        alike(manifold.nearest(system, goals, L, soft_m), compiled.nearest(system, goals, L, soft_m), 1e-12)
+        alike(
+            manifold.nearest_goals(system, goals, L, soft_m),
+            compiled.nearest_goals_compiled(system, goals, L, soft_m),
+            1e-12,
+        )
 
 
 @pytest.mark.numeric
@@ -86,7 +90,7 @@ def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> N
         system = replace(system, points=points)
         goals = goals.reshape(6, -1, 4, 4)
     L = L.reshape(*goals.shape[:-3], -1, 6, 6)
-    alike(manifold.nearest(system, goals, L), compiled.nearest(system, goals, L), 1e-11)
+    alike(manifold.nearest_goals(system, goals, L), compiled.nearest_goals_compiled(system, goals, L), 1e-11)
 
 
 @pytest.mark.numeric
@@ -96,7 +100,7 @@ def test_the_compact_equations_are_the_same(name: str) -> None:
     goals = given.goals @ pose.exp(np.random.default_rng(0).normal(scale=0.01, size=(len(given.assembly), 6)))
     system = equations(given.assembly, given.start, goals)
     for some in (system, system.among(np.zeros(len(system.letters), dtype=np.bool_))):
-        expected, actual = compact(some, len(goals)), compiled.compact(some, len(goals))
+        expected, actual = compact_equations(some, len(goals)), compiled.compact_equations_compiled(some, len(goals))
         for field in ("start", "letters", "columns", "inverse", "plane"):
             assert np.array_equal(getattr(expected, field), getattr(actual, field))
         v, w = (np.swapaxes(K.points, 1, 2) @ K.points for K in (expected, actual))
@@ -108,21 +112,21 @@ def test_what_is_not_finite_is_said_and_left_alone() -> None:
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     three = np.array([goals, goals, goals])
     three[1, 0, 0, 3] = np.nan
-    found = compiled.nearest(system, three, np.array([L, L, L]))
+    found = compiled.nearest_goals_compiled(system, three, np.array([L, L, L]))
     assert found.finite.tolist() == [True, False, True]
     assert np.array_equal(found.goals[1], three[1], equal_nan=True)
     assert not found.z[1].any()
-    assert np.array_equal(found.goals[0], compiled.nearest(system, goals, L).goals)
+    assert np.array_equal(found.goals[0], compiled.nearest_goals_compiled(system, goals, L).goals)
     endless = goals.copy()
     endless[1, 1, 3] = np.inf
-    assert not compiled.nearest(system, endless, L).finite
+    assert not compiled.nearest_goals_compiled(system, endless, L).finite
 
 
 def test_no_contacts_ask_for_nothing() -> None:
     system, goals, L = drawn("bridge_cycle", 2.0, 1.0, 0)
     none = system.among(np.zeros(len(system), dtype=np.bool_))
-    found = compiled.nearest(none, goals, L)
-    alike(manifold.nearest(none, goals, L), found, 0.0)
+    found = compiled.nearest_goals_compiled(none, goals, L)
+    alike(manifold.nearest_goals(none, goals, L), found, 0.0)
     assert np.array_equal(found.goals, goals)
 
 
@@ -142,7 +146,7 @@ def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
     system, goals, L = drawn("stick_on_castles", 2.0, 1.0, seed)
     plane = system.plane.copy()
     plane[-1, 3] += 3e-3
-    for nearest in (manifold.nearest, compiled.nearest):
+    for nearest in (manifold.nearest_goals, compiled.nearest_goals_compiled):
         found = nearest(replace(system, plane=plane), goals, L)
         assert bool(found.finite)
         assert np.abs(found.e).max() > 1e-4
@@ -155,7 +159,7 @@ def test_the_corrector_by_name_is_contact_with_another_solver() -> None:
     plain, fast = correct(seen, "contact"), correct(seen, "contact-fast")
     assert (plain.status, plain.sentence, plain.rank) == (fast.status, fast.sentence, fast.rank)
     np.testing.assert_allclose(fast.goals, plain.goals, rtol=0, atol=1e-12)
-    assert np.array_equal(ContactCorrector(solver=compiled.nearest)(seen).goals, fast.goals)
+    assert np.array_equal(ContactCorrector(solver=compiled.nearest_goals_compiled)(seen).goals, fast.goals)
 
 
 def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> None:
@@ -165,9 +169,9 @@ def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> Non
     seen = [replace(first, goals=goals) for goals in drawn_ones]
     calls = list[int]()
 
-    def counting(system: Compact, goals: Array, L: Array) -> Nearest:
+    def counting(system: CompactEquations, goals: Array, L: Array) -> NearestGoals:
         calls.append(len(goals))
-        return compiled.nearest(system, goals, L)
+        return compiled.nearest_goals_compiled(system, goals, L)
 
     for one, other in zip(correct_many(seen), correct_many(seen, ContactCorrector(solver=counting)), strict=True):
         assert (one.status, one.rank) == (other.status, other.rank)
@@ -179,12 +183,12 @@ def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> No
     compiled._compiled.cache_clear()
     monkeypatch.setitem(sys.modules, "numba", None)
     with pytest.raises(InputError, match=r"pip install 'apo_bench\[fast\]'"):
-        compiled.nearest(*drawn("bridge_cycle", 2.0, 1.0, 0))
+        compiled.nearest_goals_compiled(*drawn("bridge_cycle", 2.0, 1.0, 0))
 
 
 def test_every_loop_is_handed_to_the_compiler() -> None:
     written = {f for f in vars(loops).values() if getattr(f, "__module__", "") == loops.__name__ and callable(f)}
-    assert written == {loops.solve, loops.summarised, *compiled.HELPERS}
+    assert written == {loops.solve_each, loops.summarised, *compiled.HELPERS}
 
 
 @pytest.mark.numeric
@@ -197,7 +201,7 @@ def test_exp_and_its_derivative_in_three_by_three(turn: float) -> None:
     seen, L = pose.exp(rng.standard_normal(6)), rng.standard_normal((6, 6))
     T, B = np.eye(4), np.zeros((6, 6))
     z = np.asarray(np.linalg.solve(L, xi), dtype=np.float64)
-    loops.moved(seen, L, z, SERIES, T, B)
+    loops.displaced(seen, L, z, SERIES, T, B)
     D, Jr = exp_and_jacobian(L @ z)
     T[3] = seen[3]
     np.testing.assert_allclose(T, seen @ D, rtol=0, atol=1e-13)

@@ -12,7 +12,7 @@ from scipy.stats import kstest
 
 from apo_bench.assembly.goals import Consistency, Correction, Observation
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.correction.consistency import MOST, p_value
+from apo_bench.correction.consistency import MOST_SUSPECTS, p_value
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
@@ -191,9 +191,9 @@ def test_four_wrong_relations_are_too_many_to_leave_out() -> None:
 
 def test_of_very_many_relations_the_likeliest_are_tried() -> None:
     scene = fence(40)
-    assert len(scene.assembly.arcs()) > MOST
+    assert len(scene.assembly.arcs()) > MOST_SUSPECTS
     test = consistency_of(correct(look(scene, 0, {"b20.nx on b19.px": 10.0}), "contact"))
-    assert len(test.suspects) == MOST
+    assert len(test.suspects) == MOST_SUSPECTS
     assert test.suspects[0].relation == "R41"
     assert [suspect.relation for suspect in test.ambiguous] == ["R41"]
 

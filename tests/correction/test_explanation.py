@@ -10,12 +10,12 @@ import pytest
 
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Gap
 from apo_bench.correction.contact import contact
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.explanation import Explanation, explain
-from apo_bench.correction.solvers.newton import solve
+from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -48,7 +48,7 @@ def gap_m(seen: Observation, k: int, twist: Array, adapting: Iterable[int]) -> f
     free = tuple(adapting)
     if not free:
         return float(np.abs(system.residual(goals)).max())
-    moved = solve(system, goals, free, cut_off=1e-6)
+    moved = solve_newton(system, goals, free, cut_off=1e-6)
     return float(np.abs(system.residual(moved.goals)).max())
 
 
@@ -216,7 +216,7 @@ def test_the_posterior_of_parts_is_that_of_draws() -> None:
     for _ in range(200):
         xi = 1e-6 * rng.standard_normal((len(seen.goals), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
         made = contact(replace(seen, goals=seen.goals @ pose.exp(xi)))
-        at = placed(seen.assembly, seen.start, made.goals)[-1]
+        at = placements(seen.assembly, seen.start, made.goals)[-1]
         drawn.append([pose.log(pose.inverse(part.pose) @ at[part.part]) for part in found.parts])
     spread = np.sqrt(np.mean(np.square(drawn), axis=0))
     stated = np.array([part.deviations for part in found.parts])

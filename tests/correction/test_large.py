@@ -16,9 +16,9 @@ from apo_bench.correction import posterior
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers import sparse
-from apo_bench.correction.solvers.compact import Compact
-from apo_bench.correction.solvers.large import nearest_large
-from apo_bench.correction.solvers.manifold import nearest
+from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.large import nearest_goals_sparse
+from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from benchmarks.corrector_bench.draws import draw
@@ -84,7 +84,7 @@ SMALL: dict[str, tuple[Callable[[], scenes.Scene], int]] = {
 """Scenes, and the rank of their contacts by hand (chains 10 K - 7, grids 16 G^2 - 12 G - 1)."""
 
 
-def drawn(name: str, seed: int = 0) -> tuple[Compact, Array, Array]:
+def drawn(name: str, seed: int = 0) -> tuple[CompactEquations, Array, Array]:
     scene, rng = SMALL[name][0](), np.random.default_rng(seed)
     L = crooked(len(scene.goals), rng)
     seen = twisted(scene.goals, L, rng)
@@ -104,7 +104,7 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.mark.parametrize("name", SMALL)
 def test_sparse_is_dense(name: str, way: str) -> None:
     system, seen, L = drawn(name)
-    large, small = nearest_large(system, seen, L), nearest(system, seen[None], L)
+    large, small = nearest_goals_sparse(system, seen, L), nearest_goals(system, seen[None], L)
     assert large.at_rest
     assert small.at_rest.all()
     assert_allclose(large.goals, small.goals[0], rtol=0, atol=1e-9)
@@ -119,7 +119,7 @@ def test_sparse_is_dense_for_soft_contacts(name: str, way: str) -> None:
     system, seen, L = drawn(name)
     soft_m = np.random.default_rng(1).uniform(0.1e-3, 1e-3, 3 * len(system))
     soft_m[:3] = 0.0
-    large, small = nearest_large(system, seen, L, soft_m), nearest(system, seen[None], L, soft_m)
+    large, small = nearest_goals_sparse(system, seen, L, soft_m), nearest_goals(system, seen[None], L, soft_m)
     assert large.at_rest
     assert_allclose(large.z, small.z[0], rtol=0, atol=1e-5)
     assert_allclose(large.e, small.e[0], rtol=0, atol=1e-9)
@@ -135,7 +135,7 @@ def test_one_step_is_the_shortest_solution(name: str, way: str) -> None:
     J, rng = system.gathered(every).T, np.random.default_rng(2)
     added, right = rng.uniform(1e-6, 1e-5, len(J)), rng.standard_normal(len(J))
     expected = J.T @ np.linalg.solve(J @ J.T + np.diag(added), right)
-    found = sparse.solver(where)(added, chosen, right)
+    found = sparse.sparse_solver(where)(added, chosen, right)
     assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
@@ -157,13 +157,13 @@ def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeyp
     monkeypatch.setattr(sparse, "FEW", few)
     for seed in range(4):
         system, seen, L = drawn(name, seed)
-        Jt = nearest(system, seen[None], L).Jt[0]
-        assert sparse.rank(csr_array(Jt)) == posterior.rank(Jt) == SMALL[name][1]
+        Jt = nearest_goals(system, seen[None], L).Jt[0]
+        assert sparse.sparse_rank(csr_array(Jt)) == posterior.jacobian_rank(Jt) == SMALL[name][1]
 
 
 def test_rank_of_nothing() -> None:
     for shape in ((0, 0), (6, 0), (12, 3)):
-        assert sparse.rank(csr_array(shape)) == posterior.rank(np.zeros(shape)) == 0
+        assert sparse.sparse_rank(csr_array(shape)) == posterior.jacobian_rank(np.zeros(shape)) == 0
 
 
 @pytest.mark.parametrize("build", [row, tower, hub])
@@ -171,10 +171,10 @@ def test_three_thousand_blocks(build: Callable[[int], scenes.Scene]) -> None:
     n = 3000
     scene, L = build(n), scales(n, 0.5, 0.02)
     seen = twisted(scene.goals, L, np.random.default_rng(0))
-    found = nearest(system_of(scene, seen), seen, L)
+    found = nearest_goals(system_of(scene, seen), seen, L)
     assert found.at_rest
     assert np.abs(found.e).max() <= 1e-9
-    assert posterior.rank(found.Jt) == 3 * n
+    assert posterior.jacobian_rank(found.Jt) == 3 * n
     truth = correction(seen, scene.goals, L)
     assert found.z @ found.z <= truth @ truth
 
@@ -197,7 +197,7 @@ def test_numbers_that_are_not_finite() -> None:
     seen = np.array(seen)
     seen[5, 0, 3] = np.nan
     with np.errstate(invalid="ignore"):
-        found: Any = nearest_large(system, seen, L)
+        found: Any = nearest_goals_sparse(system, seen, L)
     assert not found.finite
     assert not found.at_rest
     assert_array_equal(found.goals, seen)
@@ -212,7 +212,7 @@ def test_rounding_does_not_stop_the_banded_solver() -> None:
     _, every = system.blocks(scene.goals, np.tile(np.eye(6), (len(scene.goals), 1, 1)))
     found = every[where.contact, where.letter]
     right = where.times(found, np.random.default_rng(0).standard_normal(6 * len(scene.goals)))
-    z = sparse.solver(where)(np.zeros(len(right)), found, right)
+    z = sparse.sparse_solver(where)(np.zeros(len(right)), found, right)
     assert_allclose(where.times(found, z), right, rtol=0, atol=1e-6 * np.abs(right).max())
 
 

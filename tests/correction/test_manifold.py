@@ -11,9 +11,9 @@ from scipy.optimize import least_squares, minimize
 
 from apo_bench.assembly.equations import Equations, equations
 from apo_bench.assembly.topology import Operation
-from apo_bench.correction.posterior import rank
-from apo_bench.correction.solvers.compact import Compact, compact
-from apo_bench.correction.solvers.manifold import STEP, Nearest, nearest
+from apo_bench.correction.posterior import jacobian_rank
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.manifold import STEP, NearestGoals, nearest_goals
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes
@@ -36,8 +36,8 @@ def crooked(n: int, rng: np.random.Generator, mm: float = 2.0, deg: float = 1.0)
     return scales(n, mm, deg) @ turn @ (np.exp(rng.uniform(-1.5, 1.5, (n, 6)))[:, :, None] * np.eye(6))
 
 
-def system_of(scene: scenes.Scene, goals: Array) -> Compact:
-    return compact(equations(scene.assembly, scene.start, goals), len(goals))
+def system_of(scene: scenes.Scene, goals: Array) -> CompactEquations:
+    return compact_equations(equations(scene.assembly, scene.start, goals), len(goals))
 
 
 def twisted(goals: Array, L: Array, rng: np.random.Generator) -> Array:
@@ -49,7 +49,7 @@ def correction(seen: Array, goals: Array, L: Array) -> Array:
     return np.asarray(np.linalg.solve(L, pose.log(pose.inverse(seen) @ goals)[..., None]).reshape(-1))
 
 
-def jacobian(system: Compact, found: Nearest) -> Array:
+def jacobian(system: CompactEquations, found: NearestGoals) -> Array:
     """The derivative of e by z where the solver ended, (3 c, 6 n)."""
     return np.asarray(system.gathered(system.blocks(found.goals, found.B)[1]).T)
 
@@ -67,12 +67,12 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
     for seed in range(10):
         seen = twisted(scene.goals, L, np.random.default_rng(seed))
         system = system_of(scene, seen)
-        found = nearest(system, seen, L)
+        found = nearest_goals(system, seen, L)
         assert found.at_rest
         assert found.finite
         assert np.abs(equations(scene.assembly, scene.start, seen).residual(found.goals)).max() <= 1e-12
         J = jacobian(system, found)
-        assert rank(J.T) == rank(found.Jt) == RANKS[name]
+        assert jacobian_rank(J.T) == jacobian_rank(found.Jt) == RANKS[name]
         assert drift(J, found.z, RANKS[name]) <= 1e-6
         assert_allclose(found.goals, seen @ pose.exp((L @ found.z.reshape(n, 6, 1))[..., 0]), rtol=0, atol=1e-14)
         truth = correction(seen, scene.goals, L)
@@ -86,7 +86,7 @@ def test_correlated_noise_too(name: str) -> None:
         L = crooked(len(scene.goals), rng)
         seen = twisted(scene.goals, L, rng)
         system = system_of(scene, seen)
-        found = nearest(system, seen, L)
+        found = nearest_goals(system, seen, L)
         assert found.at_rest
         assert np.abs(found.e).max() <= 1e-12
         assert drift(jacobian(system, found), found.z, RANKS[name]) <= 1e-6
@@ -100,7 +100,7 @@ def test_consistent_goals_stay(name: str) -> None:
     n = len(scene.goals)
     for world in (np.eye(4), pose.at((0.2, -0.3, 0.0), (0.0, 0.0, 33.0))):
         moved = scenes.turned(scene, world)
-        found = nearest(system_of(moved, moved.goals), moved.goals, scales(n, 2.0, 1.0))
+        found = nearest_goals(system_of(moved, moved.goals), moved.goals, scales(n, 2.0, 1.0))
         assert found.at_rest
         assert_allclose(found.goals, moved.goals, rtol=0, atol=1e-15)
 
@@ -111,7 +111,7 @@ def test_the_derivative_is_one() -> None:
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found, by = nearest(system, seen, L), 1e-4
+    found, by = nearest_goals(system, seen, L), 1e-4
     e = [
         [system.residual(seen @ pose.exp((L @ (found.z + sign * step).reshape(3, 6, 1))[..., 0])) for sign in (1, -1)]
         for step in by * np.eye(18)
@@ -127,8 +127,8 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
     scene, L = scenes.stick_in_tower(), crooked(3, rng)
     seen, world = twisted(scene.goals, L, rng), pose.exp(rng.standard_normal(6))
     moved = scenes.turned(scenes.Scene(scene.assembly, scene.start, seen), world)
-    a = nearest(system_of(scene, seen), seen, L)
-    b = nearest(system_of(moved, moved.goals), moved.goals, L)
+    a = nearest_goals(system_of(scene, seen), seen, L)
+    b = nearest_goals(system_of(moved, moved.goals), moved.goals, L)
     assert_allclose(b.goals, world @ a.goals, rtol=0, atol=1e-9)
     assert_allclose(b.z, a.z, rtol=0, atol=1e-6)
 
@@ -139,7 +139,7 @@ def test_only_the_shape_of_the_noise_matters(seed: int, factor: float) -> None:
     rng = np.random.default_rng(seed)
     scene, L = scenes.stick_on_castles(), crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
-    a, b = (nearest(system_of(scene, seen), seen, scale) for scale in (L, factor * L))
+    a, b = (nearest_goals(system_of(scene, seen), seen, scale) for scale in (L, factor * L))
     resting = 10.0 * STEP * max(1.0, factor)  # the solver rests within `STEP` of the noise that it was told
     assert_allclose(factor * b.z, a.z, rtol=0, atol=resting)
     assert_allclose(b.goals, a.goals, rtol=0, atol=resting * np.abs(L).max())
@@ -152,7 +152,7 @@ def test_any_root_of_the_covariance_will_do(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scene, L = scenes.bridge(), crooked(3, rng)
     seen, Q = twisted(scene.goals, L, rng), np.linalg.qr(rng.standard_normal((3, 6, 6)))[0]
-    a, b = (nearest(system_of(scene, seen), seen, scale) for scale in (L, L @ Q))
+    a, b = (nearest_goals(system_of(scene, seen), seen, scale) for scale in (L, L @ Q))
     assert_allclose(b.goals, a.goals, rtol=0, atol=1e-8)
     assert_allclose((Q @ b.z.reshape(3, 6, 1)).ravel(), a.z, rtol=0, atol=1e-5)
 
@@ -176,7 +176,7 @@ def test_slsqp_finds_the_same_where_nothing_is_redundant() -> None:
                 1e3 * plain.residual(seen @ pose.exp((L @ z.reshape(2, 6, 1))[..., 0]))[[0, 1, 2, 4, 5, 6]]
             )
 
-        found = nearest(system_of(scene, seen), seen, L)
+        found = nearest_goals(system_of(scene, seen), seen, L)
         other = minimize(
             lambda z: float(z @ z),
             np.zeros(12),
@@ -204,7 +204,7 @@ def test_ever_stiffer_springs_lead_to_the_same(name: str) -> None:
     z = np.zeros(6 * n)
     for soft_m in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
         z = least_squares(pulls, z, args=(soft_m,), xtol=1e-15, ftol=1e-15, gtol=1e-12).x
-    found = nearest(system_of(scene, seen), seen, L)
+    found = nearest_goals(system_of(scene, seen), seen, L)
     assert found.z @ found.z == pytest.approx(z @ z, rel=1e-5)
     assert_allclose(found.z, z, rtol=0, atol=1e-3)
 
@@ -218,17 +218,17 @@ def test_many_at_once_are_one_after_the_other(name: str) -> None:
     seen = np.array([twisted(scene.goals, scale, rng) for scale in L])
     seen[3] = scene.goals
     for lead in ((6,), (2, 3), (3, 1, 2)):
-        found = nearest(system, seen.reshape(*lead, n, 4, 4), L.reshape(*lead, n, 6, 6))
+        found = nearest_goals(system, seen.reshape(*lead, n, 4, 4), L.reshape(*lead, n, 6, 6))
         assert found.at_rest.shape == lead
         for i, at in enumerate(np.ndindex(lead)):
-            one = nearest(system, seen[i], L[i])
+            one = nearest_goals(system, seen[i], L[i])
             assert_allclose(found.goals[at], one.goals, rtol=0, atol=1e-10)
             assert_allclose(found.z[at], one.z, rtol=0, atol=1e-6)
             assert found.at_rest[at]
             assert found.finite[at]
             assert one.at_rest
-    shared = nearest(system, seen, L[0])
-    assert_allclose(shared.goals[1], nearest(system, seen[1], L[0]).goals, rtol=0, atol=1e-10)
+    shared = nearest_goals(system, seen, L[0])
+    assert_allclose(shared.goals[1], nearest_goals(system, seen[1], L[0]).goals, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
@@ -237,10 +237,10 @@ def test_numbers_that_are_not_finite_are_left_alone(wrong: float) -> None:
     L = scales(3, 2.0, 1.0)
     seen = np.array([twisted(scene.goals, L, rng) for _ in range(3)])
     system = system_of(scene, scene.goals)
-    good = nearest(system, seen, L)
+    good = nearest_goals(system, seen, L)
     seen[1, 2, 0, 3] = wrong
     with np.errstate(invalid="ignore"):
-        found, alone = nearest(system, seen, L), nearest(system, seen[1], L)
+        found, alone = nearest_goals(system, seen, L), nearest_goals(system, seen[1], L)
     assert found.finite.tolist() == [True, False, True]
     assert found.at_rest.tolist() == [True, False, True]
     assert_array_equal(found.goals[1], seen[1])
@@ -256,7 +256,7 @@ def test_without_contacts_nothing_changes() -> None:
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
     for some in (seen, seen[None], np.array([seen, scene.goals])):
-        found = nearest(system.among(np.zeros(len(system), dtype=np.bool_)), some, L)
+        found = nearest_goals(system.among(np.zeros(len(system), dtype=np.bool_)), some, L)
         assert found.at_rest.all()
         assert_array_equal(found.goals, some)
         assert not found.z.any()
@@ -265,9 +265,11 @@ def test_without_contacts_nothing_changes() -> None:
 def test_no_operations_and_no_observations() -> None:
     scene = scenes.stick_on_castles()
     none = np.zeros((0, 4, 4))
-    found = nearest(compact(equations(scene.assembly.first(0), scene.start, none), 0), none, np.zeros((0, 6, 6)))
+    found = nearest_goals(
+        compact_equations(equations(scene.assembly.first(0), scene.start, none), 0), none, np.zeros((0, 6, 6))
+    )
     assert (found.goals.shape, found.z.shape, bool(found.at_rest)) == ((0, 4, 4), (0,), True)
-    nobody = nearest(system_of(scene, scene.goals), np.zeros((2, 0, 3, 4, 4)), scales(3, 1.0, 1.0))
+    nobody = nearest_goals(system_of(scene, scene.goals), np.zeros((2, 0, 3, 4, 4)), scales(3, 1.0, 1.0))
     assert (nobody.goals.shape, nobody.z.shape, nobody.at_rest.shape) == ((2, 0, 3, 4, 4), (2, 0, 18), (2, 0))
 
 
@@ -282,13 +284,13 @@ def test_soft_contacts_balance_the_noise(name: str) -> None:
         system = system_of(scene, seen)
         hard = np.repeat(rng.random(len(system)) < demanded, 3)
         soft_m = np.where(hard, 0.0, rng.uniform(0.1e-3, 2e-3, len(hard)))
-        found = nearest(system, seen, L, soft_m)
+        found = nearest_goals(system, seen, L, soft_m)
         assert found.at_rest
         assert np.abs(found.e[hard]).max(initial=0.0) <= 1e-11
         assert np.abs(found.e[~hard]).max() > 1e-6
         J = jacobian(system, found)
         gradient = found.z + J[~hard].T @ (found.e[~hard] / soft_m[~hard] ** 2)
-        free = np.linalg.svd(J[hard])[2][rank(J[hard].T) :] if hard.any() else np.eye(6 * n)
+        free = np.linalg.svd(J[hard])[2][jacobian_rank(J[hard].T) :] if hard.any() else np.eye(6 * n)
         assert np.linalg.norm(free @ gradient) <= 1e-4 * np.linalg.norm(found.z)
 
 
@@ -297,8 +299,8 @@ def test_softer_contacts_are_followed_less() -> None:
     L = scales(3, 2.0, 1.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = [nearest(system, seen, L, np.full(3 * len(system), soft)) for soft in (1e-2, 1e-3, 1e-4, 1e-6)]
-    lengths = [float(one.z @ one.z) for one in found] + [float(np.sum(nearest(system, seen, L).z ** 2))]
+    found = [nearest_goals(system, seen, L, np.full(3 * len(system), soft)) for soft in (1e-2, 1e-3, 1e-4, 1e-6)]
+    lengths = [float(one.z @ one.z) for one in found] + [float(np.sum(nearest_goals(system, seen, L).z ** 2))]
     left = [float(np.abs(one.e).max()) for one in found]
     assert lengths == sorted(lengths)
     assert left == sorted(left, reverse=True)

@@ -13,8 +13,8 @@ from apo_bench.assembly.equations import equations, lies_on
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.many import CHUNK, compact_many, correct_many
-from apo_bench.correction.solvers.compact import compact
+from apo_bench.correction.many import BATCH, compact_many, correct_many
+from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from tests import scenes
@@ -71,7 +71,7 @@ def test_vertices_of_either_face(name: str) -> None:
     pattern = equations(scene.assembly, scene.start, goals[0])
     together = compact_many(scene.assembly, pattern, goals)
     for i, each in enumerate(goals):
-        one = compact(equations(scene.assembly, scene.start, each), len(each))
+        one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
         e, blocks = together.only(np.arange(5) == i).blocks(
             each[None], np.broadcast_to(np.eye(6), (1, len(each), 6, 6))
         )
@@ -88,17 +88,17 @@ def test_vertices_of_random_assemblies(seed: int) -> None:
     together = compact_many(scene.assembly, equations(scene.assembly, scene.start, goals[0]), goals)
     e = together.residual(goals).reshape(3, -1, 3)
     for i, each in enumerate(goals):
-        one = compact(equations(scene.assembly, scene.start, each), len(each))
+        one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
         expected = (one.residual(each).reshape(-1, 3) ** 2).sum(axis=1)
         assert_allclose((e[i] ** 2).sum(axis=1), expected, rtol=1e-9, atol=1e-15)
 
 
 def test_more_than_fit_into_a_chunk() -> None:
-    seen = draws(scenes.bridge(), 2 * CHUNK + 3)
+    seen = draws(scenes.bridge(), 2 * BATCH + 3)
     many = correct_many(seen)
     assert len(many) == len(seen)
     corrector = ContactCorrector()
-    for i in (0, CHUNK - 1, CHUNK, 2 * CHUNK - 1, 2 * CHUNK, 2 * CHUNK + 2):
+    for i in (0, BATCH - 1, BATCH, 2 * BATCH - 1, 2 * BATCH, 2 * BATCH + 2):
         assert_allclose(many[i].goals, corrector(seen[i]).goals, rtol=0, atol=1e-9)
 
 

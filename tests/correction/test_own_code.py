@@ -20,17 +20,17 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Correction, Layout, Observation
-from apo_bench.correction.correctors import Misbehaved, correct
+from apo_bench.correction.correctors import CorrectorMisbehaved, correct
 from apo_bench.correction.own_code import own
 from apo_bench.correction.own_code import process as own_process
 from apo_bench.correction.own_code.forms import (
     correction_message,
     observation_message,
-    read_correction,
-    read_observation,
+    parse_correction,
+    parse_observation,
 )
-from apo_bench.correction.own_code.message import HEAD, Garbled, receive, send
-from apo_bench.correction.own_code.own import Lost, OwnCorrectors
+from apo_bench.correction.own_code.message import HEADER, GarbledMessage, receive, send
+from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.io.processes import descendants
@@ -251,7 +251,7 @@ ENDS = {
 @pytest.mark.parametrize("name", ENDS)
 def test_whatever_it_does_is_one_sentence(name: str, found: OwnCorrectors) -> None:
     code, words = ENDS[name]
-    with pytest.raises(Misbehaved, match=words) as raised:
+    with pytest.raises(CorrectorMisbehaved, match=words) as raised:
         correct(SEEN, found.find(f"hostile:{name}"))
     assert getattr(raised.value, "code", None) == code
     assert str(raised.value).isprintable()
@@ -260,7 +260,10 @@ def test_whatever_it_does_is_one_sentence(name: str, found: OwnCorrectors) -> No
 
 def test_an_endless_loop_ends_at_its_limit(folder: Path) -> None:
     began = time.monotonic()
-    with OwnCorrectors(limit_s=0.5) as correctors, pytest.raises(Lost, match=r"took longer than 0\.5 s") as raised:
+    with (
+        OwnCorrectors(limit_s=0.5) as correctors,
+        pytest.raises(CorrectorLost, match=r"took longer than 0\.5 s") as raised,
+    ):
         correct(SEEN, correctors.find("hostile:hangs"))
     assert raised.value.code == "time_limit"
     assert time.monotonic() - began > 0.5
@@ -280,7 +283,7 @@ def test_the_import_of_a_module_has_a_limit(folder: Path, monkeypatch: pytest.Mo
 
 def test_nothing_is_remembered_from_one_correction_to_the_next(found: OwnCorrectors) -> None:
     for _ in range(3):
-        with pytest.raises(Misbehaved, match="kept 1;"):
+        with pytest.raises(CorrectorMisbehaved, match="kept 1;"):
             correct(SEEN, found.find("hostile:remembers"))
 
 
@@ -332,7 +335,7 @@ def _alive(processes: list[int]) -> list[int]:
 
 
 def suppressed(function: Any, *given: Any) -> None:
-    with suppress(Misbehaved):
+    with suppress(CorrectorMisbehaved):
         function(*given)
 
 
@@ -347,7 +350,7 @@ def test_a_request_without_fork_has_a_process_of_its_own(folder: Path, monkeypat
     monkeypatch.setattr(own_process, "can_fork", lambda: False)
     with OwnCorrectors() as correctors:
         for _ in range(2):
-            with pytest.raises(Misbehaved, match="kept 1;"):
+            with pytest.raises(CorrectorMisbehaved, match="kept 1;"):
                 correct(SEEN, correctors.find("hostile:remembers"))
 
 
@@ -367,7 +370,7 @@ def test_a_request_without_fork_has_a_process_of_its_own(folder: Path, monkeypat
 def test_what_cannot_be_had_is_refused(name: str, words: str, folder: Path) -> None:
     with OwnCorrectors() as correctors, pytest.raises(InputError, match=words) as raised:
         correctors.find(name)
-    assert not isinstance(raised.value, Misbehaved)
+    assert not isinstance(raised.value, CorrectorMisbehaved)
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf")])
@@ -408,7 +411,7 @@ def test_neither_truth_nor_seed_is_there(worker: Worker) -> None:
         """In this process, where code is trusted, the same search finds it."""
         raise ValueError(f"found {any(isinstance(one, Layout) for one in gc.get_objects())}")
 
-    with pytest.raises(Misbehaved, match="found True"):
+    with pytest.raises(CorrectorMisbehaved, match="found True"):
         run_trial(TrialSettings("block_on_block", careless=0.0, method="contact", seed=1), scene, method=layouts)
 
 
@@ -423,7 +426,7 @@ def test_a_corrector_that_patches_the_judge_changes_no_other_row(worker: Worker)
 
 def test_messages_come_back_as_they_were() -> None:
     form, arrays = observation_message(SEEN)
-    again = read_observation(json.loads(json.dumps(form)), arrays)
+    again = parse_observation(json.loads(json.dumps(form)), arrays)
     assert observation_message(again)[0] == form
     assert [again.assembly.solids[part].faces.keys() for part in again.assembly.solids] == [
         solid.faces.keys() for solid in SEEN.assembly.solids.values()
@@ -435,7 +438,7 @@ def test_messages_come_back_as_they_were() -> None:
     there, here = socket.socketpair()
     with there, here:
         send(there, *correction_message(made))
-        back = read_correction(*receive(here))
+        back = parse_correction(*receive(here))
     assert back.goals.tobytes() == made.goals.tobytes()
     assert replace(back, goals=made.goals).sentence == made.sentence
 
@@ -465,8 +468,8 @@ def test_what_is_no_correction_is_garbled(key: str, value: Any) -> None:
             del changed[key]
     else:
         form[key] = value
-    with pytest.raises(Garbled):
-        read_correction(form, changed)
+    with pytest.raises(GarbledMessage):
+        parse_correction(form, changed)
 
 
 @pytest.mark.parametrize(
@@ -474,14 +477,14 @@ def test_what_is_no_correction_is_garbled(key: str, value: Any) -> None:
     [
         b"",
         b"\x00",
-        HEAD.pack(1 << 31, 0),
-        HEAD.pack(2, 1 << 31),
-        HEAD.pack(2, 0) + b"[]",
-        HEAD.pack(2, 0) + b"{}",
-        HEAD.pack(4, 0) + b"\xff\xfe{}",
-        HEAD.pack(100_000, 0) + b"[" * 100_000,
+        HEADER.pack(1 << 31, 0),
+        HEADER.pack(2, 1 << 31),
+        HEADER.pack(2, 0) + b"[]",
+        HEADER.pack(2, 0) + b"{}",
+        HEADER.pack(4, 0) + b"\xff\xfe{}",
+        HEADER.pack(100_000, 0) + b"[" * 100_000,
         *(
-            HEAD.pack(len(text), 8) + text + bytes(8)
+            HEADER.pack(len(text), 8) + text + bytes(8)
             for text in (
                 b'{"arrays": {"x": ["object", [1]]}}',
                 b'{"arrays": {"x": ["float64", [-1]]}}',
@@ -499,7 +502,7 @@ def test_what_is_no_message_is_garbled(raw: bytes) -> None:
     with here:
         with there:
             there.sendall(raw)
-        with pytest.raises((Garbled, EOFError)):
+        with pytest.raises((GarbledMessage, EOFError)):
             receive(here)
 
 
@@ -509,5 +512,5 @@ def test_a_correction_is_checked_when_it_comes_back(monkeypatch: pytest.MonkeyPa
     def moved(seen: Observation) -> Correction:
         return Correction(seen.goals * 2.0, "converged", "fine", (), 0.0, 0.0, 0)
 
-    with pytest.raises(Misbehaved, match="is not a rigid pose"):
+    with pytest.raises(CorrectorMisbehaved, match="is not a rigid pose"):
         correct(SEEN, moved)

@@ -13,16 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.equations import Equations, equations, gap
+from apo_bench.assembly.equations import Equations, equations, largest_gap
 from apo_bench.assembly.goals import Correction, Observation, Step, Try
-from apo_bench.correction.baselines.own_contacts import settled
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.solvers.newton import CUT_OFF, LENGTH_M, Solution, descend, least_step, solve
+from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, Solution, descend, least_step, solve_newton
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import rigid
+from apo_bench.geometry.rigid import is_rigid
 from apo_bench.records.outcomes import CODES
 from tests import scenes
 
@@ -57,7 +57,7 @@ def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Col
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
-    return solve(equations(scene.assembly, scene.start, goals, freed), goals, freed).gap_m * 1e3
+    return solve_newton(equations(scene.assembly, scene.start, goals, freed), goals, freed).gap_m * 1e3
 
 
 # Freed sets of the paper, most recent first. A set is too small where something remains. Where the size of a remainder
@@ -107,9 +107,9 @@ def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int, le
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
         assert found.ok
         assert found.gap_after_m < NOTHING_M
-        assert found.gap_before_m == gap(seen.assembly, seen.start, seen.goals) > 3e-4
-        assert gap(seen.assembly, seen.start, found.goals) < NOTHING_M
-        assert rigid(found.goals).all()
+        assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.goals) > 3e-4
+        assert largest_gap(seen.assembly, seen.start, found.goals) < NOTHING_M
+        assert is_rigid(found.goals).all()
 
 
 def test_the_trace_ends_at_rest() -> None:
@@ -137,7 +137,7 @@ def test_the_world_frame_does_not_matter() -> None:
     assert_allclose(there.goals, W @ paper(scenes.seen(scene, goals)).goals, atol=1e-9)
 
 
-def drift(scene: scenes.Scene, seen: Array, how: Callable[..., Solution] = solve) -> float:
+def drift(scene: scenes.Scene, seen: Array, how: Callable[..., Solution] = solve_newton) -> float:
     """How far the solver moved what no contact fixes, over 2 mm; rotations as the way of a point 40 mm away."""
     n = len(seen)
     system = equations(scene.assembly, scene.start, seen)
@@ -163,7 +163,7 @@ def test_the_rank_counts_where_the_solver_rests_not_where_it_begins() -> None:
     ranks = []
     for goals in seen:
         e, J = equations(scene.assembly, scene.start, goals).linearised(goals)
-        ranks.append(least_step(J / units, e, CUT_OFF)[1])
+        ranks.append(least_step(J / units, e, SINGULAR_CUT_OFF)[1])
     assert max(ranks) > 13
     misled = [goals for goals, rank in zip(seen, ranks, strict=True) if rank > 13]
     assert max(drift(scene, goals, descend) for goals in misled) > 1.0
@@ -183,8 +183,8 @@ def test_metres_and_radians_without_scale_fail() -> None:
     scene = scenes.stick_on_castles()
     goals = scenes.noisy(scene.goals, np.random.default_rng(0), 1.0, 1.0)
     system = equations(scene.assembly, scene.start, goals)
-    assert solve(system, goals, range(3), length_m=LENGTH_M).gap_m < NOTHING_M
-    assert solve(system, goals, range(3), length_m=1e-3).gap_m > 1e-4
+    assert solve_newton(system, goals, range(3), length_m=LENGTH_M).gap_m < NOTHING_M
+    assert solve_newton(system, goals, range(3), length_m=1e-3).gap_m > 1e-4
 
 
 def contradiction() -> Observation:
@@ -219,12 +219,12 @@ def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
     found = paper(replace(scenes.seen(scene, goals), seen=np.array([True, False, True])))
     assert (found.status, found.sentence, found.freed) == ("not_seen", "operation 2 was not seen", ())
     assert_array_equal(found.goals, goals)
-    assert found.gap_before_m == found.gap_after_m == gap(scene.assembly, scene.start, goals)
+    assert found.gap_before_m == found.gap_after_m == largest_gap(scene.assembly, scene.start, goals)
 
 
 def test_a_solver_that_runs_out_of_turns_has_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     def hurried(system: Equations, goals: Array, free: Collection[int]) -> Solution:
-        return solve(system, goals, free, turns=1)
+        return solve_newton(system, goals, free, turns=1)
 
     monkeypatch.setattr("apo_bench.correction.baselines.paper.solve", hurried)
     scene = scenes.stick_on_castles()
@@ -323,8 +323,8 @@ def test_what_settling_would_open_stays_as_it_is() -> None:
     goals[:, 2, 3] += 9e-5
     goals[2, 2, 3] += 5e-5
     system = equations(scene.assembly, scene.start, goals)
-    assert_array_equal(settled(system, goals, 0, 1e-4), goals)
-    lower = settled(system, goals, 2, 1e-4)
+    assert_array_equal(solve_own_contacts(system, goals, 0, 1e-4), goals)
+    lower = solve_own_contacts(system, goals, 2, 1e-4)
     assert_allclose(lower[2, 2, 3] - goals[2, 2, 3], -5e-5, atol=1e-12)
     assert_array_equal(lower[:2], goals[:2])
 
@@ -349,7 +349,7 @@ def test_bare_goals_are_measured_and_wrapped() -> None:
     goals = paper(seen).goals
     found = correct(seen, lambda observation: goals)
     assert (found.status, found.freed, found.rank) == ("converged", (2, 1, 0), 13)
-    assert found.gap_before_m == gap(seen.assembly, seen.start, seen.goals)
+    assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.goals)
     assert found.gap_after_m < NOTHING_M
     assert correct(seen, lambda observation: observation.goals).freed == ()
 

@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap, Operation
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.posterior import freedom, inside, marginals, rank
-from apo_bench.correction.solvers.manifold import nearest
+from apo_bench.correction.posterior import contains_truth, freedom, jacobian_rank, marginals
+from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes
@@ -33,10 +33,10 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     n, L = len(scene.goals), crooked(len(scene.goals), rng, 5.0, 3.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found = nearest(system, seen, L)
+    found = nearest_goals(system, seen, L)
     known = freedom(found.Jt)
     assert known is not None
-    assert known.rank == rank(found.Jt) == RANKS[name]
+    assert known.rank == jacobian_rank(found.Jt) == RANKS[name]
     assert known.free.shape == (6 * n, 6 * n - RANKS[name])
     assert known.redundant == 3 * len(system) - RANKS[name]
     assert known.spectral_gap > 1e5
@@ -64,7 +64,7 @@ def test_every_row_that_counts_leaves_no_gap() -> None:
 def test_without_contacts_it_is_the_noise_that_is_left() -> None:
     scene, L = scenes.stick_in_tower(), crooked(3, np.random.default_rng(0))
     system = system_of(scene, scene.goals)
-    found = nearest(system.among(np.zeros(len(system), dtype=np.bool_)), scene.goals, L)
+    found = nearest_goals(system.among(np.zeros(len(system), dtype=np.bool_)), scene.goals, L)
     assert_allclose(marginals(found, np.eye(18)), L @ np.swapaxes(L, 1, 2), rtol=1e-12, atol=1e-20)
 
 
@@ -109,7 +109,7 @@ def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, h
     held = []
     for seed in range(300):
         seen = look(scene, L, seed)
-        held.append(inside(seen, correct(seen, "contact"), scene.goals, level))
+        held.append(contains_truth(seen, correct(seen, "contact"), scene.goals, level))
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high
 
@@ -120,7 +120,7 @@ def test_regions_of_noise_that_is_stated_too_small_do_not() -> None:
     for seed in range(60):
         seen = look(scene, L, seed)
         seen = replace(seen, covariance=seen.covariance / 4.0)
-        held.append(inside(seen, correct(seen, "contact"), scene.goals))
+        held.append(contains_truth(seen, correct(seen, "contact"), scene.goals))
     assert np.mean(np.array(held, dtype=float)) < 0.5
 
 
@@ -129,14 +129,14 @@ def test_only_free_directions_count() -> None:
     scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     made = correct(seen, "contact")
-    assert inside(seen, made, made.goals)
+    assert contains_truth(seen, made, made.goals)
     for mm, expected in ((1.0, True), (12.0, False), (-12.0, False)):
         aside = np.array(made.goals)
         aside[2] = aside[2] @ scenes.mm(mm, 0, 0)
-        assert inside(seen, made, aside) is expected
+        assert contains_truth(seen, made, aside) is expected
     lifted = np.array(made.goals)
     lifted[:, 2, 3] += 0.012
-    assert inside(seen, made, lifted)
+    assert contains_truth(seen, made, lifted)
 
 
 def test_what_was_left_out_no_longer_fixes_anything() -> None:
@@ -147,7 +147,7 @@ def test_what_was_left_out_no_longer_fixes_anything() -> None:
     lifted = np.array(made.goals)
     lifted[2] = lifted[2] @ scenes.mm(0, 0, 12)
     for dropped, expected in (((), True), (("R3",), True), (("R3", "R4"), False)):
-        assert inside(seen, replace(made, dropped=dropped), lifted) is expected
+        assert contains_truth(seen, replace(made, dropped=dropped), lifted) is expected
 
 
 def pocketed() -> scenes.Scene:
@@ -160,12 +160,12 @@ def pocketed() -> scenes.Scene:
 def test_where_there_is_no_region_there_is_no_answer() -> None:
     scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
-    assert inside(seen, correct(seen, "paper"), scene.goals) is None
+    assert contains_truth(seen, correct(seen, "paper"), scene.goals) is None
     unseen = replace(seen, seen=np.array([True, True, False]))
-    assert inside(unseen, correct(unseen, "contact"), scene.goals) is None
+    assert contains_truth(unseen, correct(unseen, "contact"), scene.goals) is None
     made = correct(seen, "contact")
-    assert inside(seen, replace(made, status="doubtful"), scene.goals) is None
-    assert inside(seen, replace(made, covariance=None), scene.goals) is None
+    assert contains_truth(seen, replace(made, status="doubtful"), scene.goals) is None
+    assert contains_truth(seen, replace(made, covariance=None), scene.goals) is None
 
 
 def test_where_nothing_is_free_the_covariance_is_zero_and_there_is_no_region() -> None:
@@ -176,7 +176,7 @@ def test_where_nothing_is_free_the_covariance_is_zero_and_there_is_no_region() -
     assert_allclose(made.goals, scene.goals, rtol=0, atol=1e-12)
     assert made.covariance is not None
     assert np.abs(made.covariance).max() <= 1e-20
-    assert inside(seen, made, scene.goals) is None
+    assert contains_truth(seen, made, scene.goals) is None
 
 
 def test_walls_fix_nothing() -> None:
@@ -188,4 +188,4 @@ def test_walls_fix_nothing() -> None:
     assert (made.ok, made.rank) == (True, 3)
     assert made.covariance is not None
     assert np.linalg.matrix_rank(made.covariance[0], tol=1e-12) == 3
-    assert inside(seen, made, scene.goals) is True
+    assert contains_truth(seen, made, scene.goals) is True

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from apo_bench.assembly.equations import gap
+from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Correction, Observation, once_each
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import nested, paper_track, reached_back
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import rigid
+from apo_bench.geometry.rigid import is_rigid
 from apo_bench.records.outcomes import CODES
 from tests import scenes
 from tests.correction.test_paper import contradiction
@@ -71,7 +71,7 @@ def test_the_sets_of_the_paper_whatever_the_size_of_the_error(name: str, size: f
 def test_the_oldest_goals_stay_and_all_contacts_hold(name: str) -> None:
     scene, goals = scenes.careless(name, 3.0)
     found = paper_track(scenes.seen(scene, goals))
-    assert gap(scene.assembly, scene.start, found.goals) < 1e-8
+    assert largest_gap(scene.assembly, scene.start, found.goals) < 1e-8
     assert found.gap_before_m == pytest.approx(3e-3)
     kept = [k for k in range(len(goals)) if k not in found.freed]
     assert_array_equal(found.goals[kept], goals[kept])
@@ -101,7 +101,7 @@ def test_the_schedule_ends_at_the_goals(name: str, level: float) -> None:
         done = walked(found)
         assert sorted(done) == list(range(len(goals)))
         assert_array_equal(np.array([done[k] for k in sorted(done)]), found.goals)
-        assert rigid(found.goals).all()
+        assert is_rigid(found.goals).all()
 
 
 def test_before_an_operation_is_seen_it_changes_nothing() -> None:
@@ -135,7 +135,7 @@ def test_a_goal_below_the_threshold_is_settled_and_that_is_no_trial() -> None:
     found = paper_track(scenes.seen(scene, goals))
     assert (found.tried, found.freed) == ((), ())
     assert found.gap_before_m > 5e-5
-    assert gap(scene.assembly, scene.start, found.goals) < 1e-9
+    assert largest_gap(scene.assembly, scene.start, found.goals) < 1e-9
 
 
 SUCCEEDING = {
@@ -214,5 +214,5 @@ def test_both_modes_end_with_contacts_that_hold(name: str) -> None:
         seen = scenes.seen(scene, scenes.noisy(goals, np.random.default_rng(seed), 1.0, 1.0))
         for found in both(seen):
             assert found.ok
-            assert gap(seen.assembly, seen.start, found.goals) <= seen.gap_m
+            assert largest_gap(seen.assembly, seen.start, found.goals) <= seen.gap_m
     assert paper(seen).tried == ()

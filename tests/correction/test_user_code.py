@@ -17,7 +17,7 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError, failed
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
-from apo_bench.observation.relations import told
+from apo_bench.observation.relations import with_relations
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -146,7 +146,7 @@ def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
     with pytest.raises(InputError) as by_noise:
         observe(scenes.shown(TOWER), make_noise(_raising(error), LEVEL), rng)
     with pytest.raises(InputError) as by_relations:
-        told(seen, _raising(error), TOWER.goals, rng)
+        with_relations(seen, _raising(error), TOWER.goals, rng)
     for raised in (by_noise, by_relations):
         assert words in str(raised.value)
         assert "\n" not in str(raised.value)
@@ -165,7 +165,7 @@ def test_relations_name_faces_that_there_are() -> None:
         return replace(assembly, operations=(replace(first, contacts=(made,)), *others))
 
     with pytest.raises(InputError, match=r"'invents' returned a contact of table\.cellar, which is no face"):
-        told(scenes.seen(TOWER, TOWER.goals), invents, TOWER.goals, np.random.default_rng(0))
+        with_relations(scenes.seen(TOWER, TOWER.goals), invents, TOWER.goals, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("given", ["users_code:nope", "users_code:Pathh", "users_code:annotation", "users_code:maths"])

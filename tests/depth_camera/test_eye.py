@@ -16,14 +16,14 @@ from matplotlib.text import Text
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.cli.app import main
-from apo_bench.depth_camera.distance import joined, shape_of, struck
-from apo_bench.depth_camera.range_eye import RangeEye
+from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.range_finder import RangeFinder
-from apo_bench.depth_camera.symmetry import symmetries
+from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.symmetry import symmetries
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.human.hands import Hands
@@ -77,9 +77,9 @@ def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
     sight.look(hands.data.qpos)
     image = sight.range_image(finder)
     solids, play = built.scenario.assembly.solids, 1e-3 * built.clearance_mm
-    whole = joined(shape_of(physical_boxes(solids[part], play), start[part]) for part in solids)
+    whole = join_shapes(shape_of(physical_boxes(solids[part], play), start[part]) for part in solids)
     for view, distance in zip(finder.views, image.distance, strict=True):
-        expected = struck(whole, view.origin, view.rays)[0].reshape(distance.shape)
+        expected = strike_distances(whole, view.origin, view.rays)[0].reshape(distance.shape)
         both = np.isfinite(expected)
         assert (np.isfinite(distance) == both).mean() > 0.9999
         both &= np.isfinite(distance)
@@ -171,10 +171,10 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
 def test_an_operation_that_no_image_shows_is_not_seen() -> None:
     shown = watched("stick_in_tower")
     eye = through(scene("stick_in_tower"), shown, 1.0)
-    blind = RangeEye(eye.finder, eye.images[:2], eye.level_m, eye.turns, eye.play_m)
+    blind = RangeSensor(eye.finder, eye.images[:2], eye.level_m, eye.turns, eye.play_m)
     seen = see(scene("stick_in_tower"), shown, blind, 3)
     assert seen.seen.tolist() == [True, False, False]
-    none = RangeEye(eye.finder, eye.images[:1], eye.level_m, eye.turns, eye.play_m)
+    none = RangeSensor(eye.finder, eye.images[:1], eye.level_m, eye.turns, eye.play_m)
     assert not see(scene("stick_in_tower"), shown, none, 3).seen.any()
 
 

@@ -8,17 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.depth_camera.distance import Shape, joined, shape_of, signed_distance, struck
-from apo_bench.depth_camera.explained import explained
-from apo_bench.depth_camera.fit import PRIOR, Points, covariance, refined
-from apo_bench.depth_camera.follow import Expected, follow
+from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, signed_distance, strike_distances
+from apo_bench.depth_camera.explained import share_explained
+from apo_bench.depth_camera.fit import PRIOR, Points, covariance, refine
+from apo_bench.depth_camera.follow import Expected, follow_demonstration
 from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
-from apo_bench.depth_camera.regions import large, regions, smoothed
+from apo_bench.depth_camera.regions import median_filtered, regions, without_small
 from apo_bench.depth_camera.starts import distinct, starts
-from apo_bench.depth_camera.symmetry import nearest, quarter_turns, symmetries
-from apo_bench.depth_camera.view import View, looking
+from apo_bench.depth_camera.view import View, look_at
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.symmetry import nearest_symmetric_pose, quarter_turns, symmetries
 from tests.scenes import block, castle, cube, mm, stick
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -30,7 +30,7 @@ STANDING = pose.at((0.05, 0.02, 0.0), (0.0, 0.0, 25.0))
 def range_of(shape: Shape, view: View) -> Array:
     """True distances of a shape in the world, and of a table, (height, width)."""
     table = Shape(np.array([[0.0, 0.0, -0.01]]), np.array([[0.6, 0.6, 0.01]]), np.eye(3)[None])
-    distance, _ = struck(joined([shape, table]), view.origin, view.rays)
+    distance, _ = strike_distances(join_shapes([shape, table]), view.origin, view.rays)
     return np.minimum(distance, 3.0).reshape(view.height, view.width)
 
 
@@ -42,7 +42,7 @@ def points_on(shape: Shape, T: Array, views: tuple[View, ...] | None = None) -> 
     """What the views of the range finder see of a shape at T, without any error."""
     at, rays, number = [], [], []
     for v, view in enumerate(views or RangeFinder().views):
-        distance, _ = struck(posed(shape, T), view.origin, view.rays)
+        distance, _ = strike_distances(posed(shape, T), view.origin, view.rays)
         hit = np.isfinite(distance)
         at.append(view.origin + distance[hit, None] * view.rays[hit])
         rays.append(view.rays[hit])
@@ -58,7 +58,7 @@ def test_rays_end_on_the_surface_and_meet_nothing_before(seed: int, name: str) -
     origin *= 0.6 / np.linalg.norm(origin)
     rays = -origin + 0.08 * rng.standard_normal((40, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    distance, box = struck(shape, origin, rays)
+    distance, box = strike_distances(shape, origin, rays)
     hit = np.isfinite(distance)
     assert (hit == (box >= 0)).all()
     ends = origin + distance[hit, None] * rays[hit]
@@ -104,7 +104,7 @@ def test_of_poses_that_look_the_same_the_expected_turn_is_reported() -> None:
     same = symmetries(SOLIDS["stick"])
     T = pose.at((0.1, 0.2, 0.3), (180.0, 0.0, 0.0)) @ pose.at((0, 0, 0), (0, 0, 143.0))
     T[:3, :3] = expected @ same[5][:3, :3]
-    found = nearest(T, same, expected)
+    found = nearest_symmetric_pose(T, same, expected)
     assert np.allclose(found[:3, :3], expected)
     assert np.allclose(found[:3, 3], T[:3, 3])
 
@@ -131,11 +131,11 @@ def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool
     finder, rng = RangeFinder(), np.random.default_rng(0)
     images = []
     for poses in after:
-        scene = joined(posed(SHAPES[name], T) for name, T in poses.items())
+        scene = join_shapes(posed(SHAPES[name], T) for name, T in poses.items())
         true = np.stack([range_of(scene, view) for view in finder.views])
         images.append(finder.sense(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
     turns = np.array([T[:3, :3] for T in [halfway] * moved_twice + [goal, last]])
-    events = follow(images, finder, 0.5e-3, Expected(assembly, start, turns))
+    events = follow_demonstration(images, finder, 0.5e-3, Expected(assembly, start, turns))
     assert [event.operation for event in events] == [int(moved_twice), 1 + moved_twice]
     for event, T in zip(events, (goal, last), strict=True):
         assert event.found is not None
@@ -167,11 +167,11 @@ def test_a_part_that_is_carried_away_appears_and_vanishes() -> None:
 def test_small_regions_are_dropped_and_smoothing_keeps_edges() -> None:
     mask = np.zeros((30, 30), dtype=np.bool_)
     mask[2:4, 2:4] = mask[10:20, 10:20] = mask[24:28, 2:28] = True
-    assert large(mask).sum() == 100
+    assert without_small(mask).sum() == 100
     step = np.repeat([[0.0, 1.0]], 20, axis=0).repeat(10, axis=1)
-    assert np.array_equal(smoothed(step), step)
+    assert np.array_equal(median_filtered(step), step)
     noise = np.random.default_rng(2).standard_normal((200, 200))
-    assert 0.40 < smoothed(noise).std() < 0.48
+    assert 0.40 < median_filtered(noise).std() < 0.48
 
 
 @pytest.mark.parametrize("name", sorted(SHAPES))
@@ -180,8 +180,8 @@ def test_exact_points_are_fitted_exactly_from_some_start(name: str) -> None:
     points = points_on(SHAPES[name], T)
     same = symmetries(SOLIDS[name])
     begun = starts(SHAPES[name], points.at, same)
-    fits = refined(SHAPES[name], points.thinned(600), begun, 0.012, 15)
-    fits = refined(SHAPES[name], points.thinned(600), fits.T, 0.0015, 40)
+    fits = refine(SHAPES[name], points.thinned(600), begun, 0.012, 15)
+    fits = refine(SHAPES[name], points.thinned(600), fits.T, 0.0015, 40)
     best = fits.T[fits.cost.argmin()]
     off = [pose.log(pose.inverse(T) @ best @ S) for S in same]
     assert min(np.abs(xi).max() for xi in off) < 1e-6
@@ -196,7 +196,7 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
         common = bias * rng.standard_normal(2)[exact.view]
         error = noise * rng.standard_normal(len(exact)) + common
         seen = Points(exact.at + error[:, None] * exact.ray, exact.ray, exact.view)
-        found = refined(shape, seen, T[None], 3e-3, 15).T[0]
+        found = refine(shape, seen, T[None], 3e-3, 15).T[0]
         xi[i] = pose.log(pose.inverse(T) @ found)
         z[i] = xi[i] @ np.linalg.solve(covariance(shape, seen, found, 3e-3, noise, bias), xi[i])
     assert np.abs(xi[:, :3].mean(axis=0)).max() < 1e-4
@@ -222,11 +222,12 @@ def test_wrong_models_and_wrong_poses_explain_less() -> None:
     scene = posed(SHAPES["castle"], STANDING)
     images = np.array([range_of(scene, view) for view in finder.views])
     masks = [
-        np.isfinite(struck(scene, view.origin, view.rays)[0]).reshape(view.height, view.width) for view in finder.views
+        np.isfinite(strike_distances(scene, view.origin, view.rays)[0]).reshape(view.height, view.width)
+        for view in finder.views
     ]
 
     def share(name: str, T: Array) -> float:
-        return explained(SHAPES[name], T, finder.views, images, masks, 1e-3)
+        return share_explained(SHAPES[name], T, finder.views, images, masks, 1e-3)
 
     right = share("castle", STANDING)
     assert right > 0.99
@@ -251,7 +252,7 @@ def test_levels_scale_one_draw_and_level_zero_is_exact() -> None:
 
 
 def test_views_look_where_they_say() -> None:
-    view = View(looking((1.0, 0.5, 0.8), (0.1, 0.0, 0.0)), 41, 31, 40.0)
+    view = View(look_at((1.0, 0.5, 0.8), (0.1, 0.0, 0.0)), 41, 31, 40.0)
     to = np.array([0.1, 0.0, 0.0]) - view.origin
     assert view.rays[15 * 41 + 20] == pytest.approx(to / np.linalg.norm(to))
     assert view.rays[0] @ view.T_world_view[:3, 0] < 0.0

@@ -17,7 +17,7 @@ from apo_bench.files import bop, bop_truth
 from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth
 from apo_bench.observation.models import residuals
-from apo_bench.observation.models.residuals import compare
+from apo_bench.observation.models.residuals import match_residuals
 from tests import bop_made as made_of
 from tests.bop_made import HEADER, Known, Made
 
@@ -56,7 +56,7 @@ def test_planted_errors_come_back(tmp_path: Path, made: Made) -> None:
     order = np.random.default_rng(0).permutation(len(lines) - 1)
     estimates.write_text("\n".join([lines[0], *(lines[1 + i] for i in order)]), encoding="utf-8")
     seen = read_results(estimates)
-    found = compare(seen, read_truth(truth, seen))
+    found = match_residuals(seen, read_truth(truth, seen))
     assert_array_equal(found.found, made.found)
     assert_allclose(found.shift_mm[made.found], made.shift[made.found], atol=1e-4)
     assert_allclose(found.turn_deg[made.found], made.turn[made.found], atol=1e-4)
@@ -112,8 +112,8 @@ def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
     where = np.ones((3, 3), dtype=int)
     estimates = read_results(made_of.results(tmp_path / "e.csv", where, R, seen))
     truth = read_results(made_of.results(tmp_path / "t.csv", where[:2], R[:2], at))
-    assert_array_equal(residuals.matched(estimates, truth), [2, 0])
-    assert compare(estimates, truth).surplus == 1
+    assert_array_equal(residuals.match_rows(estimates, truth), [2, 0])
+    assert match_residuals(estimates, truth).surplus == 1
 
 
 def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path
     seen = Rotation.from_euler("z", 3.0, degrees=True).as_matrix() @ R
     where, t = np.ones((1, 3), dtype=int), np.array([[0.0, 0.0, 900.0]])
     estimates = read_results(made_of.results(tmp_path / "e.csv", where, seen, t))
-    found = compare(estimates, read_results(made_of.results(tmp_path / "t.csv", where, 1.004 * R, t)))
+    found = match_residuals(estimates, read_results(made_of.results(tmp_path / "t.csv", where, 1.004 * R, t)))
     assert found.angle_deg[0] == pytest.approx(3.0, abs=1e-5)
     assert found.trace_deg[0] == 0.0
 
@@ -188,7 +188,7 @@ def test_too_many_estimates_of_one_object_are_refused(tmp_path: Path, monkeypatc
     rows = [ROW.replace("10 20", f"{i} 20") for i in range(4)]
     estimates = read_results(written(tmp_path, HEADER, *rows))
     with pytest.raises(InputError, match=r"estimates.csv, line 2: at most 3000 .*, 4 were given"):
-        compare(estimates, read_results(written(tmp_path, HEADER, ROW, name="truth.csv")))
+        match_residuals(estimates, read_results(written(tmp_path, HEADER, ROW, name="truth.csv")))
 
 
 ENTRY = {"obj_id": 3, "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [10, 20, 900]}
@@ -224,7 +224,7 @@ def test_truth_that_is_too_large_or_no_json(tmp_path: Path, monkeypatch: pytest.
     path.write_text('{"7": [\n', encoding="utf-8")
     with pytest.raises(InputError, match=r"scene_gt.json, line 2: this is not JSON"):
         read_truth(path, estimates)
-    monkeypatch.setattr(bop_truth, "LARGEST_BYTES", 3)
+    monkeypatch.setattr(bop_truth, "LARGEST_TRUTH_BYTES", 3)
     with pytest.raises(InputError, match="the file is larger than"):
         read_truth(path, estimates)
 

@@ -12,7 +12,7 @@ import apo_bench
 from apo_bench.errors import InputError
 from apo_bench.files import json_forms as files
 from apo_bench.files.csv_form import read_table, table
-from apo_bench.files.observation import observed, read_stated
+from apo_bench.files.observation import read_observation_file, read_stated
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 
@@ -71,7 +71,7 @@ def test_a_table_comes_back_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
-    seen = observed(written(tmp_path, *ROWS), "stick_in_tower").observation
+    seen = read_observation_file(written(tmp_path, *ROWS), "stick_in_tower").observation
     path = tmp_path / "seen.json"
     files.write_form(files.observation_form(seen, "stick_in_tower"), path)
     again = apo_bench.read_observation(path, SCENARIO)
@@ -82,7 +82,9 @@ def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
 
 
 def test_json_far_beyond_everything_is_refused(tmp_path: Path) -> None:
-    form = files.observation_form(observed(written(tmp_path, *ROWS), "stick_in_tower").observation, "stick_in_tower")
+    form = files.observation_form(
+        read_observation_file(written(tmp_path, *ROWS), "stick_in_tower").observation, "stick_in_tower"
+    )
     form["operations"][1]["position_mm"][2] = 1e200
     path = tmp_path / "far.json"
     files.write_form(form, path)

@@ -47,7 +47,7 @@ def form() -> dict[str, Any]:
 def read(tmp_path: Path, document: Any, scenario: Scenario | None = SCENARIO) -> Observation:
     path = tmp_path / "seen.json"
     path.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
-    return files.read_observation(path, scenario)
+    return files.read_json_observation(path, scenario)
 
 
 @QUICK
@@ -181,9 +181,9 @@ def test_a_scenario_file_is_found_beside_the_observation(tmp_path: Path) -> None
 def test_the_scenario_must_be_the_one_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "seen.json"
     path.write_text(json.dumps(form()))
-    assert files.read_observation(path, SCENARIO).assembly is SCENARIO.assembly
+    assert files.read_json_observation(path, SCENARIO).assembly is SCENARIO.assembly
     with pytest.raises(InputError, match=r"scenario: .*stick_on_castles.*was given"):
-        files.read_observation(path, load_scenario("stick_on_castles"))
+        files.read_json_observation(path, load_scenario("stick_on_castles"))
 
 
 def test_a_scenario_by_name_is_loaded(tmp_path: Path) -> None:
@@ -297,13 +297,13 @@ def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
     second["deviation_mm"] = 3.0
     path = tmp_path / "some.json"
     path.write_text(json.dumps(document), encoding="utf-8-sig")
-    seen, assumed = files.read_observed(path, SCENARIO, (2.0, 0.5))
+    seen, assumed = files.read_json_observed(path, SCENARIO, (2.0, 0.5))
     assert assumed
     found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
     np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.5)]])
     np.testing.assert_allclose(found[1, 0], 1e-3 * np.sqrt(first["covariance_mm_deg"][0][0]))
     with pytest.raises(InputError, match="operation 1: state either"):
-        files.read_observation(path, SCENARIO)
+        files.read_json_observation(path, SCENARIO)
     second["deviation_deg"] = 200.0
     with pytest.raises(InputError, match=r"a standard deviation from 0.0001 to 180 is needed"):
         read(tmp_path, document | {"operations": [*form()["operations"][:2], second]})
@@ -311,12 +311,12 @@ def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.json: the JSON file cannot be read"):
-        files.read_observation(tmp_path / "none.json")
+        files.read_json_observation(tmp_path / "none.json")
     with pytest.raises(InputError, match="a folder was given"):
-        files.read_observation(tmp_path)
+        files.read_json_observation(tmp_path)
     (tmp_path / "latin.json").write_bytes(b"\xe4")
     with pytest.raises(InputError, match="not UTF-8"):
-        files.read_observation(tmp_path / "latin.json")
+        files.read_json_observation(tmp_path / "latin.json")
     with pytest.raises(InputError, match="cannot be written"):
         files.write_form({}, tmp_path / "no" / "where.json")
 

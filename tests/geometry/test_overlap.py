@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import area, overlap
+from apo_bench.geometry.overlap import face_area, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.parts import load_part
 
@@ -111,7 +111,7 @@ def test_faces_in_one_plane_overlap_each_other_equally(T_face: Array):
     there = overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE)
     back = overlap(ring(0.04, 0.012), EYE, U_SHAPE, T_face @ OVER)
     assert back.area == pytest.approx(there.area, abs=1e-12)
-    assert there.area <= min(area(U_SHAPE), area(ring(0.04, 0.012))) + 1e-12
+    assert there.area <= min(face_area(U_SHAPE), face_area(ring(0.04, 0.012))) + 1e-12
 
 
 @given(st.floats(-80, 80), st.floats(-80, 80))
@@ -119,7 +119,7 @@ def test_faces_in_one_plane_overlap_each_other_equally(T_face: Array):
 def test_the_shadow_of_a_tilted_face_shrinks_with_the_cosine(rx: float, ry: float):
     T = pose.at((0, 0, 0.01), (rx, ry, 0))
     cosine = abs(T[2, 2])
-    assert overlap(U_SHAPE, T, rectangle(0.2, 0.2), EYE).area == pytest.approx(cosine * area(U_SHAPE), abs=1e-12)
+    assert overlap(U_SHAPE, T, rectangle(0.2, 0.2), EYE).area == pytest.approx(cosine * face_area(U_SHAPE), abs=1e-12)
 
 
 @given(flat_poses)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import rigid
+from apo_bench.geometry.rigid import is_rigid
 
 pytestmark = pytest.mark.numeric
 
@@ -50,7 +50,7 @@ def test_group_laws(seed: int, a: float, b: float) -> None:
     assert_allclose(A @ pose.inverse(A), np.eye(4), atol=1e-12)
     assert_allclose(pose.inverse(A @ B), pose.inverse(B) @ pose.inverse(A), atol=1e-12)
     assert_allclose(pose.exp(-twists((), a, seed)), pose.inverse(A), atol=1e-12)
-    assert rigid((A @ B)[None]).all()
+    assert is_rigid((A @ B)[None]).all()
 
 
 @given(st.integers(0, 10**6))
@@ -137,4 +137,4 @@ def test_apply_moves_points() -> None:
     ],
 )
 def test_what_is_not_rigid(T: Array) -> None:
-    assert not rigid(T[None]).any()
+    assert not is_rigid(T[None]).any()

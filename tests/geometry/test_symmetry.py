@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box, Solid
-from apo_bench.geometry.symmetry import folds, nearest, quarter_turns, symmetries
+from apo_bench.geometry.symmetry import folds, nearest_symmetry, quarter_turns, symmetries
 from apo_bench.scenario.file import load_scenario
 from tests import scenes
 
@@ -109,9 +109,9 @@ def test_the_nearest_is_the_one_that_undoes_a_symmetry() -> None:
     group = symmetries(scenes.block())
     rng = np.random.default_rng(1)
     small = pose.exp(np.concatenate([np.zeros((24, 3)), 0.2 * rng.uniform(-1, 1, (24, 3))], axis=1))
-    undone = nearest(group, small @ group)
+    undone = nearest_symmetry(group, small @ group)
     assert_allclose(group @ undone, np.tile(np.eye(4), (24, 1, 1)), atol=1e-12)
-    assert_allclose(nearest(group, np.eye(4)[None])[0], np.eye(4))
+    assert_allclose(nearest_symmetry(group, np.eye(4)[None])[0], np.eye(4))
 
 
 def test_no_turn_is_farther_than_half_the_way_to_an_equal_pose() -> None:
@@ -119,8 +119,8 @@ def test_no_turn_is_farther_than_half_the_way_to_an_equal_pose() -> None:
     group, rng = symmetries(scenes.stick()), np.random.default_rng(2)
     w = rng.standard_normal((500, 3)) * 2.0
     off = pose.exp(np.concatenate([np.zeros((500, 3)), w], axis=1))
-    left = np.degrees(np.linalg.norm(pose.log(off @ nearest(group, off))[:, 3:], axis=1))
+    left = np.degrees(np.linalg.norm(pose.log(off @ nearest_symmetry(group, off))[:, 3:], axis=1))
     every = [np.degrees(np.linalg.norm(pose.log(off @ g)[:, 3:], axis=1)) for g in group]
     assert_allclose(left, np.min(every, axis=0), atol=1e-6)
     roll = pose.exp(np.array([[0.0, 0.0, 0.0, angle, 0.0, 0.0] for angle in np.radians(np.arange(0.0, 360.0, 7.0))]))
-    assert np.degrees(np.abs(pose.log(roll @ nearest(group, roll))[:, 3])).max() <= 45.0 + 1e-9
+    assert np.degrees(np.abs(pose.log(roll @ nearest_symmetry(group, roll))[:, 3])).max() <= 45.0 + 1e-9

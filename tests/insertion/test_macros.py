@@ -12,14 +12,14 @@ from scipy.spatial.transform import Rotation
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import depths
+from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid
 from apo_bench.insertion.arrival import Arrival, arrive
 from apo_bench.insertion.line import Preference
-from apo_bench.insertion.macros import Chain, Way, chain, departs
+from apo_bench.insertion.macros import Chain, Way, chain, departure
 from apo_bench.insertion.peeling import peel
 from apo_bench.insertion.states import State
-from apo_bench.insertion.swept import Posed, exit_after, free, meetings
+from apo_bench.insertion.swept import Posed, exit_distance, is_way_free, overlap_intervals
 from tests import scenes
 
 X, Y, Z = np.eye(3)
@@ -81,13 +81,13 @@ def test_what_carries_is_met_first_and_from_above() -> None:
 
 def test_a_part_leaves_the_way_it_came() -> None:
     """Sides first, then out of walls; from supports alone it is just lifted."""
-    assert departs(made(Z), (0,)) == ()
-    (off,) = departs(made(Z, X), (0,))
+    assert departure(made(Z), (0,)) == ()
+    (off,) = departure(made(Z, X), (0,))
     assert (off.name, off.direction.tolist(), off.makes) == ("depart", [1.0, 0.0, 0.0], (1,))
-    (pulled,) = departs(made(Y, -Y, Z, -Z), (2,))
+    (pulled,) = departure(made(Y, -Y, Z, -Z), (2,))
     assert pulled.length_m == 0.1
     assert abs(pulled.direction[0]) == pytest.approx(1.0)
-    back = departs(made(X, Y, -Y, Z), (3,))
+    back = departure(made(X, Y, -Y, Z), (3,))
     assert back[0].makes == (0,), "off the end of the slot first"
 
 
@@ -124,8 +124,8 @@ def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
         way = rng.standard_normal(3) if rng.integers(2) else np.eye(3)[rng.integers(3)]
         way = way / np.linalg.norm(way)
         s = np.linspace(-0.3, 0.3, 301)
-        deep = depths(a.boxes, a.T[:3, :3], a.T[:3, 3] + np.outer(s, way), b.boxes, b.T) - slack
-        spans = meetings(a, way, b, slack)
+        deep = intrusion_depths(a.boxes, a.T[:3, :3], a.T[:3, 3] + np.outer(s, way), b.boxes, b.T) - slack
+        spans = overlap_intervals(a, way, b, slack)
         inside = ((s[:, None] > spans[:, 0]) & (s[:, None] < spans[:, 1])).any(axis=1)
         clear = np.abs(deep) > 1e-9
         np.testing.assert_array_equal(inside[clear], deep[clear] > 0.0)
@@ -141,7 +141,7 @@ def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
         a, b = Posed(a.boxes[:1], a.T), Posed(b.boxes[:1], b.T)
         way = (b.T - a.T)[:3, 3] + rng.uniform(-0.02, 0.02, 3)
         way = way / np.linalg.norm(way)
-        spans = meetings(a, way, b, 0.0)
+        spans = overlap_intervals(a, way, b, 0.0)
         for s in rng.uniform(0.0, 0.3, 4):
             moved = Posed(a.boxes, pose.at(s * way) @ a.T)
             if np.abs(spans - s).min(initial=1.0) > 1e-6:
@@ -168,18 +168,18 @@ def posed(solid: Solid, T: Array) -> Posed:
 
 def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
     stick, cube = posed(scenes.stick(), scenes.mm(0, 0, 25)), posed(scenes.cube(), scenes.mm(0, 0, 25))
-    assert free([stick], X, 0.5, [cube])
-    assert free([stick], -X, 0.5, [cube])
-    assert not free([stick], Z, 0.05, [cube])
-    assert not free([stick], (X + 0.01 * Y) / np.linalg.norm(X + 0.01 * Y), 0.5, [cube])
-    assert exit_after([stick], X, [cube]) == pytest.approx(0.135, abs=1e-9)
-    assert exit_after([stick], X, []) == 0.0
+    assert is_way_free([stick], X, 0.5, [cube])
+    assert is_way_free([stick], -X, 0.5, [cube])
+    assert not is_way_free([stick], Z, 0.05, [cube])
+    assert not is_way_free([stick], (X + 0.01 * Y) / np.linalg.norm(X + 0.01 * Y), 0.5, [cube])
+    assert exit_distance([stick], X, [cube]) == pytest.approx(0.135, abs=1e-9)
+    assert exit_distance([stick], X, []) == 0.0
     second = posed(scenes.cube(), scenes.mm(60, 0, 25))
-    assert exit_after([stick], X, [cube, second]) == pytest.approx(0.195, abs=1e-9)
-    assert exit_after([stick], -X, [cube, second]) == pytest.approx(0.135, abs=1e-9)
+    assert exit_distance([stick], X, [cube, second]) == pytest.approx(0.195, abs=1e-9)
+    assert exit_distance([stick], -X, [cube, second]) == pytest.approx(0.135, abs=1e-9)
     beyond = posed(scenes.block(), scenes.mm(300, 0, 25))
-    assert free([stick], X, 0.1649, [cube, beyond])
-    assert not free([stick], X, 0.1652, [cube, beyond])
+    assert is_way_free([stick], X, 0.1649, [cube, beyond])
+    assert not is_way_free([stick], X, 0.1652, [cube, beyond])
 
 
 def assembly(contacts: dict[str, Sequence[str]], **parts: tuple[Solid, Array]) -> tuple[Assembly, dict[str, Array]]:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.screw import screw_state
-from apo_bench.insertion.states import LETTERS, State, classify, null_space, rank, snapped
+from apo_bench.insertion.states import STATE_LETTERS, State, classify, null_space, row_rank, snap_normals
 
 X, Y, Z = np.eye(3)
 TEN = {
@@ -38,7 +38,7 @@ def test_each_of_the_ten_states(letter: str) -> None:
     found = classify(rows(TEN[letter]))
     assert found.state.letter == letter
     assert sum(found.state) == 3
-    assert LETTERS[tuple(found.state)] == letter
+    assert STATE_LETTERS[tuple(found.state)] == letter
 
 
 @pytest.mark.parametrize("letter", TEN)
@@ -144,8 +144,8 @@ def test_the_programme_agrees_with_the_corners_of_the_cone() -> None:
     for _ in range(400):
         normals = random_contacts(rng)
         found = classify(normals)
-        spanned = rank(corners_of_cone(normals))
-        m = 3 - rank(normals)
+        spanned = row_rank(corners_of_cone(normals))
+        m = 3 - row_rank(normals)
         assert found.state == State(m, spanned - m, 3 - spanned)
         assert found.admits(found.direction, 1e-9)
         assert (normals[found.detachable] @ found.direction > 0.0).all()
@@ -160,7 +160,7 @@ def test_walls_that_are_seen_askew_are_still_walls() -> None:
         turns = Rotation.from_rotvec(np.radians(1.5) * rng.standard_normal((3, 3)))
         askew = turns.apply(rows(TEN["D"]))
         raw.add(classify(askew).state.letter)
-        kept.add(classify(snapped(askew, np.radians(10.0))).state.letter)
+        kept.add(classify(snap_normals(askew, np.radians(10.0))).state.letter)
     assert kept == {"D"}
     assert raw != {"D"}
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.assembly.goals import Reached
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import FAULTS
@@ -321,7 +321,7 @@ def test_clearance_and_thresholds_count() -> None:
 
 def test_poses_that_are_not_finite_fail_without_a_crash() -> None:
     scene = scenes.turned(TOWER(), LAYOUT)
-    poses = placed(scene.assembly, scene.start, scene.goals)
+    poses = placements(scene.assembly, scene.start, scene.goals)
     good = [snapshot(dict(state)) for state in poses]
     broken = snapshot(dict(poses[-1]))
     object.__setattr__(broken, "poses", {**poses[-1], "stick": np.full((4, 4), np.nan)})
@@ -374,7 +374,7 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
     numbers = []
     for W in (np.eye(4), pose.exp(rng.standard_normal(6))):
         there = scenes.turned(scene, W)
-        states = [snapshot(dict(p)) for p in placed(there.assembly, there.start, W @ goals)]
+        states = [snapshot(dict(p)) for p in placements(there.assembly, there.start, W @ goals)]
         both = judge(there.assembly, Reached(tuple(states), states[-1]), there.goals, Thresholds(), CLEARANCE_MM)
         found = (both.demonstrated, both.finished)
         numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.pushed_mm)])
@@ -423,7 +423,7 @@ def test_a_part_that_keeps_a_contact_is_no_fixture() -> None:
 
 def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:
     scene = FIXTURE()
-    poses = placed(scene.assembly, scene.start, scene.goals)
+    poses = placements(scene.assembly, scene.start, scene.goals)
     off = [dict(state) for state in poses]
     off[2]["castle2"] = off[2]["castle2"] @ scenes.mm(0, -0.9, 0)
     reached = Reached(tuple(map(snapshot, off)), snapshot(dict(poses[-1])))

@@ -15,10 +15,10 @@ from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth
-from apo_bench.observation.fitting.fit import compared, fit, fit_split
+from apo_bench.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit
 from apo_bench.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, split_of_quantiles
-from apo_bench.observation.models.fitted import Measured
-from apo_bench.observation.models.residuals import Residuals, compare
+from apo_bench.observation.models.fitted import MeasuredNoise
+from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.show.fit_picture import draw_fit
@@ -35,7 +35,7 @@ SPLITS = (
 
 def compared_files(estimates: Path, truth: Path) -> Residuals:
     seen = read_results(estimates)
-    return compare(seen, read_truth(truth, seen))
+    return match_residuals(seen, read_truth(truth, seen))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def known_file(tmp_path_factory: pytest.TempPathFactory) -> Residuals:
 
 
 def test_known_parameters_are_recovered_within_five_percent(known_file: Residuals) -> None:
-    known, measured = Known(), fit(known_file, "made")
+    known, measured = Known(), fit_noise(known_file, "made")
     for split, tails in ((measured.shift_mm, known.shift), (measured.turn_deg, known.turn)):
         assert_allclose([*split.across, *split.along], tails, rtol=0.05)
     assert_allclose([measured.missed, measured.outliers], [known.missed, known.outliers], rtol=0.05)
@@ -55,14 +55,16 @@ def test_known_parameters_are_recovered_within_five_percent(known_file: Residual
 
 def test_a_right_fit_is_close_everywhere(known_file: Residuals) -> None:
     """The largest difference is what chance makes of so many (1.95 / sqrt(n): one in a thousand)."""
-    for figures in compared(known_file, fit(known_file, "made")):
+    for figures in goodness_of_fit(known_file, fit_noise(known_file, "made")):
         assert figures.distance < 1.95 / np.sqrt(known_file.upright.sum())
         assert_allclose(figures.fitted, figures.observed, rtol=0.05)
 
 
 def test_a_wrong_fit_is_told(known_file: Residuals) -> None:
-    wrong = Measured("wrong", Split(Tail(4.0, 4.0), Tail(8.0, 3.0), 50.0), fit(known_file, "").turn_deg, 0.1, 0.1, 800)
-    across, along, turn = compared(known_file, wrong)
+    wrong = MeasuredNoise(
+        "wrong", Split(Tail(4.0, 4.0), Tail(8.0, 3.0), 50.0), fit_noise(known_file, "").turn_deg, 0.1, 0.1, 800
+    )
+    across, along, turn = goodness_of_fit(known_file, wrong)
     assert across.distance > 0.2
     assert max(along.distance, turn.distance) < 0.03
 
@@ -96,13 +98,13 @@ def test_too_few_estimates_and_perfect_ones_are_refused(tmp_path: Path) -> None:
     made = made_of.draw(100, Known(missed=0.0, outliers=0.0), np.random.default_rng(0))
     truth = made_of.results(tmp_path / "truth.csv", made.where, made.R, made.t)
     with pytest.raises(InputError, match="the places that were estimated are the true ones, or nearly"):
-        fit(compared_files(truth, truth), "")
+        fit_noise(compared_files(truth, truth), "")
     unturned = made_of.results(tmp_path / "unturned.csv", made.where, made.R, made.t_seen)
     with pytest.raises(InputError, match="the rotations that were estimated are the true ones, or nearly"):
-        fit(compared_files(unturned, truth), "")
+        fit_noise(compared_files(unturned, truth), "")
     few = made_of.results(tmp_path / "few.csv", made.where[:20], made.R_seen[:20], made.t_seen[:20])
     with pytest.raises(InputError, match="20 of 100 parts have an estimate within 50 mm; at least 30 are needed"):
-        fit(compared_files(few, truth), "")
+        fit_noise(compared_files(few, truth), "")
 
 
 def test_errors_in_one_direction_only_can_be_fitted_read_and_drawn(tmp_path: Path) -> None:
@@ -111,7 +113,7 @@ def test_errors_in_one_direction_only_can_be_fitted_read_and_drawn(tmp_path: Pat
     shift = made.shift * [0.0, 0.0, 1.0]
     t = made.t + np.einsum("nij,nj->ni", made_of.ray_frames(made.t), shift)
     found = compared_files(*made_of.files(tmp_path, made._replace(t_seen=t)))
-    measured = fit(found, "")
+    measured = fit_noise(found, "")
     assert measured.shift_mm.across.scale < 0.006
     path = tmp_path / "noise.toml"
     path.write_text(noise_text(measured), encoding="utf-8")
@@ -131,8 +133,8 @@ def lmo(request: pytest.FixtureRequest) -> Residuals:
 def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> None:
     """Median and more of MegaPose on LM-O. Angles by the trace of matrices as written are what was published of it;
     the truth is scaled by up to half a percent, so nearest rotations are farther apart in the lower quartile."""
-    measured = fit(lmo, "LM-O")
-    form = fit_form(lmo, measured, compared(lmo, measured))
+    measured = fit_noise(lmo, "LM-O")
+    form = fit_form(lmo, measured, goodness_of_fit(lmo, measured))
     assert (form["found"], form["parts"]) == (1205, 1445)
     assert form["inliers"] / form["found"] == pytest.approx(0.82, rel=0.01)
     assert_allclose(form["inlier_across_mm"][1:4], [4.2, 6.5, 9.4], rtol=0.1)
@@ -145,7 +147,7 @@ def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> 
 
 
 def test_the_preset_is_the_fit(lmo: Residuals) -> None:
-    shipped, measured = read_noise(presets()["megapose-lmo"])[0], fit(lmo, "")
+    shipped, measured = read_noise(presets()["megapose-lmo"])[0], fit_noise(lmo, "")
     for mine, made in ((shipped.shift_mm, measured.shift_mm), (shipped.turn_deg, measured.turn_deg)):
         assert_allclose([*mine.across, *mine.along, mine.limit], [*made.across, *made.along, made.limit], rtol=1e-3)
     assert_allclose(
@@ -197,8 +199,8 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureF
     assert main([*asked, *written, "--json"]) == 0
     form = json.loads(capsys.readouterr().out)
     found = compared_files(estimates, truth)
-    measured = fit(found, 'a "new" one')
-    assert form == json.loads(json.dumps(fit_form(found, measured, compared(found, measured))))
+    measured = fit_noise(found, 'a "new" one')
+    assert form == json.loads(json.dumps(fit_form(found, measured, goodness_of_fit(found, measured))))
     assert out.read_text(encoding="utf-8") == noise_text(measured)
     read, _ = read_noise(out)
     assert read.source == 'a "new" one'
@@ -207,8 +209,8 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureF
     assert len(samples.read_text(encoding="utf-8").splitlines()) == 1001
     assert main([*asked, "--scene-id", "1"]) == 0
     said = capsys.readouterr().out
-    measured = fit(found, "estimates.csv against truth.csv")
-    assert said == "\n".join(fit_lines(found, measured, compared(found, measured))) + "\n"
+    measured = fit_noise(found, "estimates.csv against truth.csv")
+    assert said == "\n".join(fit_lines(found, measured, goodness_of_fit(found, measured))) + "\n"
     assert main([*asked, "--scene-id", "2"]) == 2
     assert "no image of scene 2 has an estimate" in capsys.readouterr().err
     for option, name in (("--out", "noise.csv"), ("--picture", "no/fit.png"), ("--residuals", "truth.csv")):

@@ -16,10 +16,10 @@ from apo_bench.geometry.symmetry import symmetries
 from apo_bench.observation.models.anisotropic import line_of_sight
 from apo_bench.observation.models.bias import Bias
 from apo_bench.observation.models.bias_view import BiasView
-from apo_bench.observation.models.camera import DISTANCE_M, MIDDLE_M, Camera
+from apo_bench.observation.models.camera import DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
 from apo_bench.observation.models.correlated import CORRELATION, Correlated
 from apo_bench.observation.models.heavy_tailed import FREEDOM, HeavyTailed
-from apo_bench.observation.models.outliers import MISSES, OUTLIERS, TIMES, UNKNOWN, Outliers, last_seen
+from apo_bench.observation.models.outliers import MISSES, OUTLIERS, TIMES, UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.sighted import Sighted
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
@@ -44,7 +44,7 @@ def test_the_default_camera_looks_at_the_middle_as_anisotropic_does() -> None:
     T = Camera().T_world_camera
     assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-15)
     assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
-    assert_allclose(T[:3, 3] + DISTANCE_M * T[:3, 2], MIDDLE_M, atol=1e-15)
+    assert_allclose(T[:3, 3] + DISTANCE_M * T[:3, 2], WORKSPACE_MIDDLE_M, atol=1e-15)
     assert_allclose(T[:3, 2], line_of_sight(), atol=1e-15)
     assert T[2, 0] == 0.0
     assert T[2, 1] < 0.0  # y points down
@@ -153,7 +153,7 @@ def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
     there = see(Outliers(LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
     assert here.goals.tobytes() == there.goals.tobytes()
     assert_array_equal(here.covariance, there.covariance)
-    assert_allclose(here.covariance[k], np.diag(UNKNOWN**2))
+    assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
 
 
 def test_what_was_missed_stays_where_its_part_was_seen_last() -> None:

@@ -12,13 +12,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.goals import Demonstration, Layout, Observation
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.envs.apo_replay import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models import anisotropic
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.isotropic import FLOOR, Isotropic
+from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR, Isotropic
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
 from apo_bench.observation.observing import observe
 from apo_bench.records.settings import TrialSettings
@@ -172,7 +172,7 @@ def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
         seen = observe(scenes.shown(CYCLE), make_noise(name, Level(0.0, 0.0)), np.random.default_rng(seed))
         assert seen.goals.tobytes() == CYCLE.goals.tobytes()
         assert seen.seen.all()
-        assert_allclose(seen.covariance, np.tile(np.diag(FLOOR**2), (5, 1, 1)), rtol=1e-9, atol=1e-20)
+        assert_allclose(seen.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (5, 1, 1)), rtol=1e-9, atol=1e-20)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -201,7 +201,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     """A whole trial up to the robot: what `none` has it carry out are the model's goals for this seed, bit for bit."""
     scenario = load_scenario("carried_bridge")
     layout = draw_layout(scenario, stream(5, 0))
-    final = placed(scenario.assembly, layout.start, layout.goals)[-1]
+    final = placements(scenario.assembly, layout.start, layout.goals)[-1]
     n = len(scenario.assembly)
     demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
     scene: Any = SimpleNamespace(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))

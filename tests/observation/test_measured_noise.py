@@ -23,9 +23,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, read_residuals, residuals_text
 from apo_bench.observation.models.fitted import Fitted
-from apo_bench.observation.models.isotropic import FLOOR
-from apo_bench.observation.models.outliers import UNKNOWN
-from apo_bench.observation.models.residuals import Residuals, compare
+from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
+from apo_bench.observation.models.outliers import UNSEEN_DEVIATION
+from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.observation.observing import observe
@@ -46,7 +46,7 @@ WHOLE, INLIERS = Known(), Known(missed=0.0, outliers=0.0)
 def residuals_of(folder: Path, known: Known, n: int = 400) -> Residuals:
     estimates, truth = made_of.files(folder, made_of.draw(n, known, np.random.default_rng(4)))
     seen = read_results(estimates)
-    return compare(seen, read_truth(truth, seen))
+    return match_residuals(seen, read_truth(truth, seen))
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
         none = see(names[0], seed, Level(0.0, 0.0))
         assert none.goals.tobytes() == TOWER.goals.tobytes()
         assert none.seen.all()
-        assert_allclose(none.covariance, np.tile(np.diag(FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
+        assert_allclose(none.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
 
 
 def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
@@ -175,7 +175,7 @@ def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> N
             missed += 1
             start = TOWER.start[TOWER.assembly.operations[k].main]
             assert_array_equal(seen.goals[k], start)
-            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNKNOWN)
+            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNSEEN_DEVIATION)
     assert missed > 5
 
 

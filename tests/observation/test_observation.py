@@ -12,7 +12,7 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.isotropic import FLOOR, Isotropic, floored
+from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR, Isotropic, floored
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
 from tests import scenes
@@ -94,7 +94,7 @@ def test_carelessness_is_stated_but_not_drawn() -> None:
 
 def test_nothing_is_stated_below_the_floor() -> None:
     seen = observe(scenes.shown(TOWER, CARELESS), Isotropic(Level(0.0, 0.0)), np.random.default_rng(0))
-    expected = np.tile(np.diag(FLOOR**2), (3, 1, 1))
+    expected = np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1))
     expected[1, 1, 1] = 0.0029**2
     assert_allclose(seen.covariance, expected, rtol=1e-9, atol=1e-20)
 
@@ -102,18 +102,18 @@ def test_nothing_is_stated_below_the_floor() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    axis = rng.standard_normal(6) * FLOOR * 20
+    axis = rng.standard_normal(6) * COVARIANCE_FLOOR * 20
     C = np.outer(axis, axis)[None]
     raised = floored(C)
     assert_array_equal(raised, np.swapaxes(raised, 1, 2))
-    unit = np.outer(FLOOR, FLOOR)
+    unit = np.outer(COVARIANCE_FLOOR, COVARIANCE_FLOOR)
     assert np.linalg.eigvalsh(raised[0] / unit).min() > 1 - 1e-9
     assert np.linalg.eigvalsh((raised - C)[0] / unit).min() > -1e-9
-    assert (np.sqrt(np.diagonal(raised[0])) >= FLOOR * (1 - 1e-12)).all()
+    assert (np.sqrt(np.diagonal(raised[0])) >= COVARIANCE_FLOOR * (1 - 1e-12)).all()
 
 
 def test_what_is_above_the_floor_is_left_alone() -> None:
-    C = np.tile(np.diag((3 * FLOOR) ** 2), (2, 1, 1))
+    C = np.tile(np.diag((3 * COVARIANCE_FLOOR) ** 2), (2, 1, 1))
     assert_array_equal(floored(C), C)
 
 

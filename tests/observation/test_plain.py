@@ -14,12 +14,12 @@ from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.isotropic import FLOOR
+from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.models.plain import Plain
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.observation.noise_file import presets
 from apo_bench.observation.observing import observe
-from apo_bench.show.noise_card import described, facts, listed, noise_card
+from apo_bench.show.noise_card import facts, listed_models, model_description, noise_card
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -57,7 +57,7 @@ def test_what_is_declared_as_nothing_is_stated_as_the_floor_and_carelessness_is_
     careless[1, 1, 1] = 0.003**2
     model = make_noise(with_deviations(lambda goals, rng: goals, 0, 0), LEVEL)
     seen = observe(scenes.shown(TOWER, careless), model, np.random.default_rng(0))
-    expected = np.tile(np.diag(FLOOR**2), (3, 1, 1))
+    expected = np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1))
     expected[1, 1, 1] = 0.003**2
     assert_allclose(seen.covariance, expected, rtol=1e-9, atol=1e-20)
     assert seen.goals.tobytes() == TOWER.goals.tobytes()
@@ -146,7 +146,7 @@ def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.Ca
     listing = capsys.readouterr().out
     assert main(["noise"]) == 0
     assert capsys.readouterr().out == listing
-    for name, title in listed().items():
+    for name, title in listed_models().items():
         assert f"{name} " in listing
         assert title in listing
         said = facts(name)
@@ -172,7 +172,7 @@ def test_a_card_prints_what_the_model_does(name: str, capsys: pytest.CaptureFixt
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
     """Written by `python docs/noise.py`."""
     page = (Path(__file__).parents[2] / "docs" / "noise.md").read_text(encoding="utf-8")
-    assert described(name, 2) in page
+    assert model_description(name, 2) in page
     card = page.split(f"![Errors of {name}]")[1]
     assert card.split("\n")[2].startswith(
         "*Errors as measured, " if name in presets() else "*Errors at 1 mm and 1 deg, "

@@ -22,7 +22,7 @@ from apo_bench.observation.relations import (
     make_relations,
     missed,
     relations_name,
-    told,
+    with_relations,
 )
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario, scenario_names
@@ -181,7 +181,7 @@ def test_relations_change_nothing_but_contacts_and_faces() -> None:
         (replace(scene.assembly, solids={"table": scenes.table()}), "changed parts or operations"),
     ):
         with pytest.raises(InputError) as refused:
-            told(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
+            with_relations(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
         assert words in str(refused.value)
 
 

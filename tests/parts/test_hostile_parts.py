@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from apo_bench.errors import InputError
 from apo_bench.geometry.solid import Box
 from apo_bench.parts import load_part, part_names, part_path, read_part
-from apo_bench.parts.allowed import ALLOWED, MOST_BOXES, MOST_SITES
+from apo_bench.parts.allowed import ELEMENT_RULES, MOST_BOXES, MOST_SITES
 from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import unite
 from apo_bench.parts.load import MOST_FACES
@@ -267,7 +267,7 @@ def test_parts_of_the_package_keep_to_the_table(name: str) -> None:
     told, said = ElementTree.fromstring(file.xml), ElementTree.parse(part_path(name)).getroot()
     assert [(e.tag, e.attrib) for e in told.iter()] == [(e.tag, e.attrib) for e in said.iter()]
     assert all(not (e.text or "").strip() for e in told.iter())
-    assert all(key.split("/")[-1] in key for key in ALLOWED)
+    assert all(key.split("/")[-1] in key for key in ELEMENT_RULES)
 
 
 SCENARIO = (folder("scenarios") / "stick_in_tower.toml").read_text(encoding="utf-8")

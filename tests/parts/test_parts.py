@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.clearance import physical_boxes
-from apo_bench.geometry.overlap import area
+from apo_bench.geometry.overlap import face_area
 from apo_bench.geometry.solid import Box, Face, Solid
 from apo_bench.parts import load_part, part_names, part_path
 from apo_bench.parts.faces import SIDES, unite
@@ -71,8 +71,8 @@ def test_names_volume_and_exact_coordinates(name: str):
 def test_the_faces_close_the_solid(name: str):
     """Areas along opposite directions are equal, and the divergence theorem gives the volume."""
     faces = load_part(name).faces.values()
-    assert np.abs(sum(area(f) * f.normal for f in faces)).max() < 1e-12
-    flux = sum(area(f) * f.normal @ f.outline[0] for f in faces)
+    assert np.abs(sum(face_area(f) * f.normal for f in faces)).max() < 1e-12
+    flux = sum(face_area(f) * f.normal @ f.outline[0] for f in faces)
     assert flux / 3 == pytest.approx(1e-9 * VOLUME_MM3[name], rel=1e-9)
 
 
@@ -82,7 +82,7 @@ def test_the_faces_of_the_castle(name: str):
     face = load_part("castle").faces[name]
     assert face.plane == pytest.approx((*normal, -1e-3 * distance), abs=1e-12)
     assert len(face.outline) == corners
-    assert area(face) == pytest.approx(1e-6 * square_mm)
+    assert face_area(face) == pytest.approx(1e-6 * square_mm)
     assert not face.fit
 
 
@@ -144,7 +144,7 @@ def test_a_mesh_union_has_the_same_volume_and_surface(name: str):
     mesh = trimesh.boolean.union(boxes, engine="manifold") if len(boxes) > 1 else boxes[0]
     assert mesh.volume == pytest.approx(solid.volume, rel=1e-6)
     assert mesh.center_mass == pytest.approx(solid.centroid, abs=1e-7)
-    assert mesh.area == pytest.approx(sum(area(face) for face in solid.faces.values()), rel=1e-6)
+    assert mesh.area == pytest.approx(sum(face_area(face) for face in solid.faces.values()), rel=1e-6)
 
 
 GOOD = """<mujoco model="thing">

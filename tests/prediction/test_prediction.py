@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.assembly.goals import Plan, Step
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.failure import Prediction, predict
-from apo_bench.prediction.resting import is_support, residual, settled
+from apo_bench.prediction.resting import is_support, residual, resting_poses
 from apo_bench.records.thresholds import Thresholds
 from tests import scenes
 
@@ -130,8 +130,8 @@ def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
     goals = scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0)
     for operation, goal in zip(scene.assembly.operations, goals, strict=True):
         alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
-        (brought,) = placed(alone, poses, goal[None])
-        rests = settled(alone, operation, brought)
+        (brought,) = placements(alone, poses, goal[None])
+        rests = resting_poses(alone, operation, brought)
         touched = [c for c in operation.contacts if not alone.is_fit(c)]
         sides = [c for c in touched if not is_support(alone, c, rests)]
         for contact in touched:
@@ -142,7 +142,7 @@ def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
             relative = pose.inverse(rests[operation.main]) @ T
             if part in operation.moves:
                 np.testing.assert_allclose(relative, pose.inverse(brought[operation.main]) @ brought[part], atol=1e-12)
-        again = settled(alone, operation, rests)
+        again = resting_poses(alone, operation, rests)
         np.testing.assert_allclose(again[operation.main], rests[operation.main], rtol=0, atol=2e-5)
         poses = dict(rests)
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from apo_bench.assembly.topology import Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.prediction.stability import unstable
+from apo_bench.prediction.stability import first_unstable
 from tests import scenes
 
 pytestmark = pytest.mark.numeric
@@ -19,7 +19,7 @@ def falls(scene: scenes.Scene, operation: int, T: Array) -> int | None:
     """The verdict if that operation (from 1) had another goal, displaced in the frame of its part; counted from 1."""
     goals = scene.goals.copy()
     goals[operation - 1] = goals[operation - 1] @ T
-    found = unstable(scene.assembly, scene.start, goals)
+    found = first_unstable(scene.assembly, scene.start, goals)
     return None if found is None else found + 1
 
 
@@ -27,7 +27,7 @@ def falls(scene: scenes.Scene, operation: int, T: Array) -> int | None:
 @pytest.mark.parametrize("yaw", [0.0, 37.0])
 def test_the_examples_of_the_paper_stand(build, yaw: float) -> None:
     scene = scenes.turned(build(), pose.at((0.1, 0.05, 0.0), (0.0, 0.0, yaw)))
-    assert unstable(scene.assembly, scene.start, scene.goals) is None
+    assert first_unstable(scene.assembly, scene.start, scene.goals) is None
 
 
 @pytest.mark.parametrize("build", [scenes.stick_in_tower, scenes.stick_on_castles])
@@ -35,7 +35,7 @@ def test_noise_alone_topples_nothing(build) -> None:
     scene, rng = build(), np.random.default_rng(0)
     for _ in range(8):
         goals = scenes.noisy(scene.goals, rng, 2.0, 2.0)
-        assert unstable(scene.assembly, scene.start, goals) is None
+        assert first_unstable(scene.assembly, scene.start, goals) is None
 
 
 @pytest.mark.parametrize(("beyond_mm", "expected"), [(-1.0, None), (1.0, 1)])
@@ -92,7 +92,7 @@ def test_without_floor_or_ceiling_nothing_is_claimed(pairs: tuple[str, ...]) -> 
 def test_tilted_floors_still_carry(tilt_deg: float, expected: int | None) -> None:
     scene = scenes.stick_on_castles()
     tilted = scenes.turned(scene, pose.at((0, 0, 0), (tilt_deg, 0, 0)))
-    assert unstable(tilted.assembly, tilted.start, tilted.goals) == expected
+    assert first_unstable(tilted.assembly, tilted.start, tilted.goals) == expected
 
 
 def test_floors_too_steep_claim_nothing() -> None:
@@ -100,7 +100,7 @@ def test_floors_too_steep_claim_nothing() -> None:
     tilted = scenes.turned(scene, pose.at((0, 0, 0), (40.0, 0, 0)))
     far = tilted.goals.copy()
     far[2] = far[2] @ scenes.mm(105, 0, 0)
-    assert unstable(tilted.assembly, tilted.start, far) is None
+    assert first_unstable(tilted.assembly, tilted.start, far) is None
 
 
 def test_what_is_carried_weighs_too() -> None:
@@ -111,9 +111,9 @@ def test_what_is_carried_weighs_too() -> None:
     goals = scene.goals.copy()
     goals[3] = goals[3] @ scenes.mm(60, 0, 0)
     goals[4] = goals[4] @ scenes.mm(85, 0, 0)
-    assert unstable(scene.assembly, scene.start, goals) == 4
+    assert first_unstable(scene.assembly, scene.start, goals) == 4
     goals[4] = goals[4] @ scenes.mm(-25, 0, 0)
-    assert unstable(scene.assembly, scene.start, goals) is None
+    assert first_unstable(scene.assembly, scene.start, goals) is None
 
 
 def test_the_first_unstable_operation_is_named_and_nothing_is_changed() -> None:
@@ -122,5 +122,5 @@ def test_the_first_unstable_operation_is_named_and_nothing_is_changed() -> None:
     goals[1] = goals[1] @ scenes.mm(700, 0, 0)
     goals[2] = goals[2] @ scenes.mm(300, 0, 0)
     before = goals.copy()
-    assert unstable(scene.assembly, scene.start, goals) == 1
+    assert first_unstable(scene.assembly, scene.start, goals) == 1
     assert_array_equal(goals, before)

@@ -13,16 +13,16 @@ from numpy.testing import assert_allclose
 
 from apo_bench.assembly.facing import Facing, facing
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.solid import Solid
 from apo_bench.observation.models.isotropic import floored
-from apo_bench.recognition.belief import Belief, believed
+from apo_bench.recognition.belief import Belief, initial_belief
 from apo_bench.recognition.contacts import recognise
-from apo_bench.recognition.thresholds import FIXED, NOISE, Rules, allowed, reality, slack
+from apo_bench.recognition.thresholds import FIXED_RULES, RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.recognised import counted, recognised, understood
@@ -60,7 +60,7 @@ def blocks(apart_mm: float, level: float) -> Observation:
     return stated(scenes.seen(scene, scene.goals), level)
 
 
-def side_by_side(seen: Observation, rules: Rules = NOISE) -> bool:
+def side_by_side(seen: Observation, rules: Rules = RULES_BY_NOISE) -> bool:
     return any(str(e.contact) == "B.nx on A.px" for e in recognise(seen, rules).evidence)
 
 
@@ -100,7 +100,7 @@ def test_a_part_that_was_put_aside_still_touches_what_it_touches(name: str) -> N
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("rules", [NOISE, FIXED], ids=["noise", "fixed"])
+@pytest.mark.parametrize("rules", [RULES_BY_NOISE, FIXED_RULES], ids=["noise", "fixed"])
 def test_the_contacts_that_came_with_it_are_not_looked_at(name: str, rules: Rules) -> None:
     seen = seen_at(scenes.ALL[name](), 5, 1.0)
     bare = replace(seen, assembly=without_contacts(seen.assembly))
@@ -133,8 +133,8 @@ def test_what_counts_as_near_follows_the_noise_up_to_a_bound() -> None:
 
 def test_fixed_thresholds_ask_for_no_noise() -> None:
     for level in (0.1, 4.0):
-        assert side_by_side(blocks(5.9, level), FIXED)
-        assert not side_by_side(blocks(6.1, level), FIXED)
+        assert side_by_side(blocks(5.9, level), FIXED_RULES)
+        assert not side_by_side(blocks(6.1, level), FIXED_RULES)
 
 
 def test_faces_that_cover_little_of_each_other_do_not_touch() -> None:
@@ -234,7 +234,7 @@ def test_rules_are_checked_at_the_door(rule: dict[str, float], words: str) -> No
 def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, Facing]]:
     """Faces that look at each other, between all parts at the end of a noisy demonstration."""
     goals = scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)
-    at, solids = placed(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
+    at, solids = placements(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
     return [
         (a, b, pair)
         for a in solids
@@ -250,7 +250,7 @@ def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
     """Central differences. Where parts turn the overlap changes too, so the gap is taken where its middle was."""
     scene = scenes.ALL[name]()
     goals = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
-    at, solids = placed(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
+    at, solids = placements(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
     h, found = 1e-6, pairs(scene, 3)
     assert len(found) > 10
     for a, b, pair in found:
@@ -278,11 +278,11 @@ def same(pair: Facing, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
     scene = scenes.ALL[name]()
-    belief = believed(seen_at(scene, 4, 1.0))
+    belief = initial_belief(seen_at(scene, 4, 1.0))
     rng, h = np.random.default_rng(0), 1e-6
     for k in range(len(scene.assembly)):
         now = belief.standing(k)
-        for part, T in placed(scene.assembly, scene.start, belief.goals)[k].items():
+        for part, T in placements(scene.assembly, scene.start, belief.goals)[k].items():
             assert_allclose(now.poses[part], T, rtol=0, atol=1e-12)
         xi = rng.standard_normal(6 * len(belief.goals))
         ends = [
@@ -301,7 +301,7 @@ def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
 def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
     """Two measurements one after the other leave the same covariance as both at once, and less than before."""
     rng = np.random.default_rng(seed)
-    belief = believed(seen_at(scenes.bridge(), 0, 1.0))
+    belief = initial_belief(seen_at(scenes.bridge(), 0, 1.0))
     n = len(belief.covariance)
     rows = [rng.standard_normal((3, n)) * np.tile(np.repeat([1.0, 0.05], 3), n // 6) for _ in range(2)]
     noise = np.diag([1e-4, 2e-3, 2e-3]) ** 2
@@ -324,11 +324,11 @@ def test_thresholds_grow_with_noise_and_play_and_stay_within_the_bounds(
 ) -> None:
     pair = pairs(scenes.bridge(), 0)[0][2]
     C = np.diag([gap_mm * 1e-3, np.radians(tilt_deg), np.radians(tilt_deg)]) ** 2
-    found = allowed(NOISE, C, slack(pair, play_mm * 1e-3))
-    more = allowed(NOISE, 1.5 * C, slack(pair, 1.5e-3 * play_mm))
-    assert 0.0 < found.gap_m <= more.gap_m <= NOISE.gap_m
-    assert 0.0 < found.angle_rad <= more.angle_rad <= NOISE.angle_rad
-    assert allowed(FIXED, C, slack(pair, play_mm * 1e-3)) == (FIXED.gap_m, FIXED.angle_rad)
+    found = pair_thresholds(RULES_BY_NOISE, C, slack(pair, play_mm * 1e-3))
+    more = pair_thresholds(RULES_BY_NOISE, 1.5 * C, slack(pair, 1.5e-3 * play_mm))
+    assert 0.0 < found.gap_m <= more.gap_m <= RULES_BY_NOISE.gap_m
+    assert 0.0 < found.angle_rad <= more.angle_rad <= RULES_BY_NOISE.angle_rad
+    assert pair_thresholds(FIXED_RULES, C, slack(pair, play_mm * 1e-3)) == (FIXED_RULES.gap_m, FIXED_RULES.angle_rad)
     assert np.all(np.linalg.eigvalsh(reality(pair, play_mm * 1e-3)) > 0)
 
 
@@ -337,7 +337,7 @@ def test_the_noise_hides_a_contact_as_rarely_as_it_is_said() -> None:
     pair = pairs(scenes.bridge(), 0)[0][2]
     sigma = np.array([2e-3, np.radians(1.0), np.radians(1.0)])
     rules = Rules(miss=0.01, gap_m=0.1, angle_rad=1.0)
-    most = allowed(rules, np.diag(sigma**2), slack(pair, 0.0))
+    most = pair_thresholds(rules, np.diag(sigma**2), slack(pair, 0.0))
     draws = np.random.default_rng(0).standard_normal((20000, 3)) * sigma
     assert np.mean(np.abs(draws[:, 0]) > most.gap_m) == pytest.approx(0.01, abs=0.003)
     assert np.mean(np.hypot(draws[:, 1], draws[:, 2]) > most.angle_rad) == pytest.approx(0.01, abs=0.003)

@@ -18,7 +18,7 @@ from apo_bench.observation.relations import Shifted, false, missed
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.card import card
+from apo_bench.show.card import scenario_card
 from apo_bench.show.graph.text import graph_lines
 
 SLOTS = (folder("scenarios") / "stick_on_castles.toml").read_text(encoding="utf-8")
@@ -143,11 +143,11 @@ def test_card_and_graph_say_what_is_not_centred(tmp_path: Path) -> None:
     named = WALLS.replace(" }", ", gap_mm = [-0.1, 0.3] }")
     scenario = load(tmp_path, (PAIR, named), ('["ny", "castle1.sny"]', WALLS.replace("py", "ny")))
     words = "py-spy (clearance from -0.1 to 0.3 mm)", "ny-sny (clearance)"
-    assert f"R3 stick -> castle1 (nz-sfl, {', '.join(words)})" in card(scenario)
+    assert f"R3 stick -> castle1 (nz-sfl, {', '.join(words)})" in scenario_card(scenario)
     text = "\n".join(graph_lines("mine", relation_graph(scenario.assembly)))
     assert f"[nz-sfl {' '.join(words)}]" in text
     plain = load_scenario("stick_on_castles")
-    assert "(clearance" not in card(plain) + "\n".join(graph_lines("plain", relation_graph(plain.assembly)))
+    assert "(clearance" not in scenario_card(plain) + "\n".join(graph_lines("plain", relation_graph(plain.assembly)))
 
 
 def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> None:

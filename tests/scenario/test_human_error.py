@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.assembly.goals import Layout
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread
+from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Carelessness, Scenario
 
@@ -33,7 +33,7 @@ def layout(scenario: Scenario, seed: int = 3) -> Layout:
 @pytest.mark.parametrize("size_m", [-0.004, 0.0015])
 def test_which_operations_show_the_error_and_what_is_left_of_it(name: str, size_m: float):
     scenario = SCENARIOS[name]
-    found = spread(scenario, layout(scenario), size_m * scenario.careless.axis)
+    found = spread_error(scenario, layout(scenario), size_m * scenario.careless.axis)
     expected = np.zeros((len(scenario.assembly), 3))
     for k in ALIKE.get(name, {1}):
         expected[k] = size_m * scenario.careless.axis
@@ -44,7 +44,7 @@ def test_which_operations_show_the_error_and_what_is_left_of_it(name: str, size_
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_without_an_error_nothing_is_displaced(name: str):
     scenario = SCENARIOS[name]
-    found = spread(scenario, layout(scenario), np.zeros(3))
+    found = spread_error(scenario, layout(scenario), np.zeros(3))
     assert not found.offsets.any()
     assert found.left == ()
 
@@ -59,9 +59,9 @@ def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, 
     scenario = SCENARIOS["vanished_fixture"]
     truth = layout(scenario, seed)
     allowed = 1e-12 if np.hypot(x, y) > 2.0 * NOTHING_M else 2.0 * NOTHING_M
-    offsets = spread(scenario, truth, np.array([x, y, 0.0])).offsets
+    offsets = spread_error(scenario, truth, np.array([x, y, 0.0])).offsets
     shown = truth.goals @ pose.exp(np.hstack([offsets, np.zeros_like(offsets)]))
-    poses = placed(scenario.assembly, truth.start, shown)[2]
+    poses = placements(scenario.assembly, truth.start, shown)[2]
     face, on = (scenario.assembly.face(of) for of in scenario.assembly.operations[2].contacts[1])
     corner = pose.apply(pose.inverse(poses["cube"]) @ poses["castle2"], face.outline[:1])[0]
     assert on.plane[:3] @ corner + on.plane[3] == pytest.approx(0.0, abs=allowed)
@@ -72,7 +72,7 @@ def test_a_castle_stays_in_contact_with_a_displaced_fixture(x: float, y: float, 
 @settings(max_examples=20, deadline=None)
 def test_twice_the_error_is_twice_as_far_everywhere(factor: float):
     scenario = SCENARIOS["vanished_fixture"]
-    once, more = (spread(scenario, layout(scenario), f * 1e-3 * scenario.careless.axis) for f in (1.0, factor))
+    once, more = (spread_error(scenario, layout(scenario), f * 1e-3 * scenario.careless.axis) for f in (1.0, factor))
     assert more.offsets == pytest.approx(factor * once.offsets, abs=2e-9)
 
 
@@ -80,7 +80,7 @@ def test_what_stands_on_a_displaced_part_and_moves_with_it_becomes_right_with_it
     """Example 5.2 with the cube put down wrong: taken up and moved on, it and the stick in it are where they should."""
     scenario = SCENARIOS["carried_bridge"]
     wrong = replace(scenario, careless=Carelessness(2, np.array([0.0, 1.0, 0.0]), 1e-3, 2e-3))
-    found = spread(wrong, layout(wrong), np.array([0.0, 1e-3, 0.0]))
+    found = spread_error(wrong, layout(wrong), np.array([0.0, 1e-3, 0.0]))
     assert found.offsets[2] == pytest.approx((0.0, 1e-3, 0.0))
     assert found.offsets[3] == pytest.approx((0.0, 1e-3, 0.0)), "the hole leads the stick"
     assert found.offsets[4] == pytest.approx((0.0, 0.0, 0.0))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapely import MultiPoint
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -90,7 +90,7 @@ def test_who_is_careless_and_how():
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
     scenario = SCENARIOS[name]
-    stages = placed(scenario.assembly, scenario.start, scenario.goals)
+    stages = placements(scenario.assembly, scenario.start, scenario.goals)
     gaps = [
         gap_m(scenario.assembly, contact, stages[k])
         for k, operation in enumerate(scenario.assembly.operations)
@@ -103,10 +103,10 @@ def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
 def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
-    nominal = placed(assembly, scenario.start, scenario.goals)
+    nominal = placements(assembly, scenario.start, scenario.goals)
     for seed in GENERATOR_SEEDS:
         layout = draw_layout(scenario, np.random.default_rng([seed, 0]))
-        stages = placed(assembly, layout.start, layout.goals)
+        stages = placements(assembly, layout.start, layout.goals)
         for k, operation in enumerate(assembly.operations):
             for contact in operation.contacts:
                 assert gap_m(assembly, contact, stages[k]) < 1e-9
@@ -122,9 +122,9 @@ def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
 def test_the_overlap_at_the_ends_of_every_shift(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
-    nominal = placed(assembly, scenario.start, scenario.goals)
+    nominal = placements(assembly, scenario.start, scenario.goals)
     for shifts in product(*[(s.low_m, s.high_m) for s in scenario.shifts]):
-        stages = placed(assembly, scenario.start, layout_at(scenario, 0, 0, 0, shifts).goals)
+        stages = placements(assembly, scenario.start, layout_at(scenario, 0, 0, 0, shifts).goals)
         for k, operation in enumerate(assembly.operations):
             for contact in operation.contacts:
                 assert overlap_m2(assembly, contact, stages[k]) >= 0.6 * overlap_m2(assembly, contact, nominal[k])
@@ -223,7 +223,7 @@ def test_no_start_is_in_the_way_of_the_assembly(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
     for layout in extremes(scenario):
-        stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        stages = (layout.start, *placements(assembly, layout.start, layout.goals))
         waiting = set(assembly.solids) - assembly.fixed
         for k, operation in enumerate(assembly.operations):
             waiting -= set(operation.moves)
@@ -246,7 +246,7 @@ def test_the_fingers_find_room_where_a_part_waits(name: str):
     scenario = SCENARIOS[name]
     assembly = scenario.assembly
     for layout in extremes(scenario):
-        stages = (layout.start, *placed(assembly, layout.start, layout.goals))
+        stages = (layout.start, *placements(assembly, layout.start, layout.goals))
         moved: set[str] = set()
         for k, operation in enumerate(assembly.operations):
             if operation.main not in moved:

@@ -10,8 +10,8 @@ import pytest
 
 from apo_bench.assembly.graph import Graph, relation_graph
 from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.show.graph.layers import Links, layered, links_of
-from apo_bench.show.graph.layout import Rectangle, arranged, overlap
+from apo_bench.show.graph.layers import Links, arrange_layers, links_of
+from apo_bench.show.graph.layout import Rectangle, arrange, shared_area
 from apo_bench.show.graph.picture import draw_graph
 from tests import scenes
 
@@ -33,7 +33,7 @@ def crossings(links: Links, rows: tuple) -> int:
 
 @pytest.mark.parametrize(("name", "step"), CASES)
 def test_arrows_lead_down_and_do_not_cross(name: str, step: int) -> None:
-    layers = layered(graph_of(name, step))
+    layers = arrange_layers(graph_of(name, step))
     row = {item: j for j, items in enumerate(layers.rows) for item in items}
     assert all(row[a] == row[b] + 1 for chain in layers.chains for a, b in pairwise(chain))
     assert crossings(links_of(layers.chains), layers.rows) == 0
@@ -42,9 +42,9 @@ def test_arrows_lead_down_and_do_not_cross(name: str, step: int) -> None:
 @pytest.mark.parametrize(("name", "step"), CASES)
 def test_nothing_lies_on_anything(name: str, step: int) -> None:
     graph = graph_of(name, step)
-    layout = arranged(graph, [f"{arc.name}\n10.00 mm" for arc in graph.arcs])
+    layout = arrange(graph, [f"{arc.name}\n10.00 mm" for arc in graph.arcs])
     for a, b in combinations((*layout.boxes.values(), *layout.labels), 2):
-        assert overlap(a, b) == 0
+        assert shared_area(a, b) == 0
     for i, route in enumerate(layout.routes):
         points = np.concatenate([a + np.linspace(0, 1, 100)[:, None] * (b - a) for a, b in pairwise(route)])
         for box in layout.boxes.values():
@@ -61,7 +61,7 @@ def inside(box: Rectangle, points: np.ndarray) -> bool:
 @pytest.mark.parametrize(("name", "step"), CASES)
 def test_arrows_begin_and_end_at_their_parts(name: str, step: int) -> None:
     graph = graph_of(name, step)
-    layout = arranged(graph, [arc.name for arc in graph.arcs])
+    layout = arrange(graph, [arc.name for arc in graph.arcs])
     for arc, route in zip(graph.arcs, layout.routes, strict=True):
         above, below = layout.boxes[arc.manipulated], layout.boxes[arc.environment]
         assert abs(route[0, 0] - above.x) < above.width / 2
@@ -79,7 +79,7 @@ def test_many_parts_need_no_patience() -> None:
     ]
     parts = [scenes.table(), *(scenes.block(f"b{i}") for i in range(10)), *(scenes.stick(f"s{i}") for i in range(9))]
     assembly = Assembly({part.name: part for part in parts}, tuple(operations), frozenset({"table"}))
-    layers = layered(relation_graph(assembly))
+    layers = arrange_layers(relation_graph(assembly))
     assert crossings(links_of(layers.chains), layers.rows) == 0
 
 

@@ -14,7 +14,7 @@ from apo_bench.correction.correctors import correct
 from apo_bench.files.observation import as_planned
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
-from apo_bench.show.believed_picture import belief, belief_lines
+from apo_bench.show.believed_picture import belief_lines, belief_panel
 
 SHIFT_M = 2e-3
 
@@ -30,19 +30,19 @@ def lifted() -> Observation:
 
 def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     seen = lifted()
-    found = belief("as seen", seen, seen.goals, 3)
+    found = belief_panel("as seen", seen, seen.goals, 3)
     assert found.gap_m == pytest.approx(SHIFT_M)
     wrong = ("R2 castle2 -> castle1: 2.00 mm", "R4 stick -> castle2: 1.50 mm", "R3 stick -> castle1: 0.50 mm")
     assert found.open == wrong
     np.testing.assert_array_equal(found.poses["castle2"], seen.goals[1])
-    mended = belief("corrected", seen, correct(seen, "contact").goals, 3)
+    mended = belief_panel("corrected", seen, correct(seen, "contact").goals, 3)
     assert (mended.open, mended.gap_m < 1e-9) == ((), True)
     assert belief_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
 
 
 def test_only_what_was_done_by_then_is_shown() -> None:
     seen = lifted()
-    one, two = (belief("as seen", seen, seen.goals, k) for k in (1, 2))
+    one, two = (belief_panel("as seen", seen, seen.goals, k) for k in (1, 2))
     assert one.open == ()
     assert two.open == ("R2 castle2 -> castle1: 2.00 mm",)
     np.testing.assert_array_equal(one.poses["castle2"], seen.start["castle2"])
@@ -53,7 +53,7 @@ def test_disappeared_contacts_are_said_to_be() -> None:
     seen = as_planned(scenario, 1.0, 1.0)
     goals = np.array(seen.goals)
     goals[1] = pose.at((0.0, 1e-3, 0.0)) @ goals[1]
-    found = belief("as seen", seen, goals, len(goals))
+    found = belief_panel("as seen", seen, goals, len(goals))
     assert found.open == ("R4 castle2 -> cube: 1.00 mm (disappeared)",)
 
 

@@ -165,7 +165,7 @@ def test_the_same_plan_gives_the_same_bytes_whatever_ran_before(tower: Scene) ->
 
 def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) -> None:
     """Velocity feed-forward: without it the tip lags by millimetres and yaws by half a degree."""
-    from apo_bench.simulation.robot.paths import moved, smooth
+    from apo_bench.simulation.robot.paths import shifted, smooth
 
     worst = np.zeros(2)
 
@@ -176,6 +176,6 @@ def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) ->
         worst[:] = np.maximum(worst, [across * 1e3, turn])
 
     robot = Robot(tower, layout(tower, 2).start, watch)
-    robot.follow(smooth(robot.T, moved(robot.T, np.array([0.0, 1.0, 0.0]), 0.2), 0.2))
+    robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.2), 0.2))
     assert worst[0] < 0.3
     assert worst[1] < 0.05

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.file import load_scenario, scenario_names
@@ -44,7 +44,7 @@ def off_mm(of: Shown) -> Array:
 def end_mm(of: Shown, part: str) -> Array:
     """How far a part ends from where it should be, (3,), world."""
     demonstration = of.demonstration
-    true = placed(demonstration.assembly, of.layout.start, of.layout.goals)[-1][part]
+    true = placements(demonstration.assembly, of.layout.start, of.layout.goals)[-1][part]
     return 1e3 * (demonstration.final[part] - true)[:3, 3]
 
 

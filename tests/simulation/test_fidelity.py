@@ -15,13 +15,13 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest, replay
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.execution.replay_cache import Branches, marks
+from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import near, robot
-from apo_bench.simulation.robot.fast_forward import leap
-from apo_bench.simulation.robot.paths import Line, minimum_jerk, moved, smooth
+from apo_bench.simulation.robot.fast_forward import fast_forward
+from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.simulation.scene.world import SLEEP, fresh, part_pose, sleeping, timestep
+from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
 from apo_bench.trial.stages import show
 from apo_bench.trial.trial import run_trial
 
@@ -44,7 +44,7 @@ def row(method, fidelity, *, grasp="friction", level=1.0, branches=None):
 @pytest.mark.parametrize(("fidelity", "grasp"), [("full", "friction"), ("contact", "friction"), ("full", "weld")])
 def test_shared_beginnings_change_no_byte(fidelity, grasp):
     asked = [("paper", 1.0), ("paper-track", 1.0), ("none", 1.0), ("paper", 0.5), ("paper", 1.0)]
-    branches = Branches()
+    branches = ReplayCache()
     shared = [row(method, fidelity, grasp=grasp, level=level, branches=branches) for method, level in asked]
     alone = [row(method, fidelity, grasp=grasp, level=level) for method, level in asked[:-1]]
     assert shared == [*alone, alone[0]]
@@ -52,7 +52,7 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp):
 
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
     branches, plan = (
-        Branches(),
+        ReplayCache(),
         Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals),
     )
     first = replay(plan, scene(), fidelity="contact", branches=branches)
@@ -66,12 +66,12 @@ def test_marks_differ_where_anything_that_led_there_differs():
     later = np.array(layout.goals)
     later[-1, :3, 3] += [0.0, 0.0, 1e-9]
     other = Plan(plan.assembly, plan.start, later)
-    a, b = (marks(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
+    a, b = (cache_keys(scene(), layout.start, "full", moves(p, scene())) for p in (plan, other))
     assert a[:-1] == b[:-1]
     assert a[-1] != b[-1]
-    assert not set(a) & set(marks(scene(), layout.start, "contact", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), layout.start, "contact", moves(plan, scene())))
     elsewhere = {part: T @ pose.at((1e-9, 0.0, 0.0)) for part, T in layout.start.items()}
-    assert not set(a) & set(marks(scene(), elsewhere, "full", moves(plan, scene())))
+    assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "vanished_fixture"])
@@ -132,7 +132,7 @@ def test_contact_simulates_less_and_passes_as_much_time():
 
 def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
     its = scene()
-    data, kinematics = fresh(its.work, shown().layout.start), its.kinematics
+    data, kinematics = initial_state(its.work, shown().layout.start), its.kinematics
     model = its.work.model
     joints = [model.joint(f"arm/{name}").id for name in its.arm.joints]
     at, dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
@@ -141,7 +141,7 @@ def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
     before, rest = kinematics.forward(data.qpos[at]), [part_pose(its.work, data, part) for part in others]
     in_hand = pose.inverse(before) @ part_pose(its.work, data, "stick")
     velocity = np.array([0.3, -0.2, 0.1, 0.4, -0.5, 0.6])
-    leap(its.work, data, kinematics.forward, (at, dof), np.full(6, 0.05), velocity, held)
+    fast_forward(its.work, data, kinematics.forward, (at, dof), np.full(6, 0.05), velocity, held)
     assert data.qpos[at] == pytest.approx(np.asarray(its.arm.home) + 0.05)
     after = kinematics.forward(data.qpos[at])
     assert pose.inverse(after) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-9)
@@ -154,7 +154,7 @@ def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
 
 def test_what_is_near_is_told_from_what_is_far():
     its = scene()
-    data = fresh(its.work, shown().layout.start)
+    data = initial_state(its.work, shown().layout.start)
     stick = part_pose(its.work, data, "stick")
     hand = [near.Moving(its.boxes["stick"], np.eye(4))]
     held = ("stick",)
@@ -164,14 +164,14 @@ def test_what_is_near_is_told_from_what_is_far():
         s = minimum_jerk(np.linspace(0.0, 1.0, 1 + round(line.seconds * 1e3)))
         return near.near_spans(its, data, hand, held, line, s), len(s) - 1
 
-    high = moved(stick, (0.0, 0.0, 1.0), 0.2)
+    high = shifted(stick, (0.0, 0.0, 1.0), 0.2)
     up, n = spans(stick, high)
     assert [begin for begin, _ in up] == [0]
     assert up[0][1] < n / 2
     down, n = spans(high, stick)
     assert [end for _, end in down] == [n]
     assert down[0][0] > n / 2
-    assert spans(high, moved(high, (1.0, 0.0, 0.0), 0.1))[0] == []
+    assert spans(high, shifted(high, (1.0, 0.0, 0.0), 0.1))[0] == []
     turned = high @ pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 40.0))
     assert spans(high, turned)[0] == []
     tipped = high @ pose.at((0.0, 0.0, 0.0), (0.0, 40.0, 0.0))
@@ -180,9 +180,9 @@ def test_what_is_near_is_told_from_what_is_far():
 
 def test_nothing_is_left_out_while_something_moves():
     its = scene()
-    data = fresh(its.work, shown().layout.start)
+    data = initial_state(its.work, shown().layout.start)
     stick = part_pose(its.work, data, "stick")
-    line = Line(moved(stick, (0, 0, 1), 0.2), moved(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
+    line = Trajectory(shifted(stick, (0, 0, 1), 0.2), shifted(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
     s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
     hand = [near.Moving(its.boxes["stick"], np.eye(4))]
     assert near.near_spans(its, data, hand, ("stick",), line, s) == []
@@ -213,7 +213,12 @@ class Restless:
     """A robot beside parts that move for so many waits."""
 
     def __init__(self, waits: float):
-        self.scene, self.data, self.waits, self.parts = scene(), fresh(scene().work, shown().layout.start), waits, []
+        self.scene, self.data, self.waits, self.parts = (
+            scene(),
+            initial_state(scene().work, shown().layout.start),
+            waits,
+            [],
+        )
         self.data.qvel[self.scene.work.dof["stick"]] = 1.0
 
     def wait(self, seconds, parts=1):

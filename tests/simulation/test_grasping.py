@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Plan, Poses, Step
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import depths, intrusion
+from apo_bench.geometry.intrusion import intrusion, intrusion_depths
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.execution.grasping import Place, grasp_at, obstacles, tip_frame
+from apo_bench.simulation.execution.grasping import RestingPart, grasp_at, obstacles, tip_frame
 from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.robot.gripper import gripper_boxes
-from apo_bench.simulation.robot.paths import turn_from, unwound
+from apo_bench.simulation.robot.paths import turn_from, waypoints_unwound
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from tests.scenes import block
 
@@ -42,14 +42,14 @@ def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float,
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
     T = T_part @ T_tip
     around = obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
-    return max(float(depths(boxes, T[:3, :3], T[None, :3, 3], o.boxes, o.T)[0]) for o in around)
+    return max(float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.boxes, o.T)[0]) for o in around)
 
 
 def test_depths_of_boxes_at_many_places_are_those_of_the_solids() -> None:
     a, b = block("a"), block("b")
     T_a, T_b = pose.at((0, 0, 0), (0, 0, 30)), pose.at((0.02, 0.01, 0.03), (10, 0, 0))
     at = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.01], [0.2, 0.0, 0.0]])
-    found = depths(a.boxes, T_a[:3, :3], at, b.boxes, T_b)
+    found = intrusion_depths(a.boxes, T_a[:3, :3], at, b.boxes, T_b)
     for p, depth_m in zip(at, found, strict=True):
         T = np.array(T_a)
         T[:3, 3] = p
@@ -74,7 +74,7 @@ def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
     assert 0.01 < left < 0.05
     assert first.T_part_tip[0, 3] < -0.05
     assert abs(second.T_part_tip[0, 3]) < 0.025
-    poses = placed(plan.assembly, plan.start, plan.goals)[4]
+    poses = placements(plan.assembly, plan.start, plan.goals)[4]
     goal = plan.goals[4]
     for back in np.linspace(move.transfer.into.travel, left, 60):
         at = goal @ pose.at((-back, 0, 0))
@@ -95,8 +95,8 @@ def test_pulling_out_is_pushing_in_backwards(pockets: Scene) -> None:
 
 def test_a_part_beside_another_is_taken_where_there_is_room_for_the_fingers(fixture: Scene) -> None:
     plan = nominal(fixture)
-    poses = placed(plan.assembly, plan.start, plan.goals)[2]
-    place = Place(poses["cube"], obstacles(plan.assembly.solids, poses, ("cube",)))
+    poses = placements(plan.assembly, plan.start, plan.goals)[2]
+    place = RestingPart(poses["cube"], obstacles(plan.assembly.solids, poses, ("cube",)))
     found = grasp_at(fixture, "cube", Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0])), [place])
     assert abs(found.across[0]) == 1.0
 
@@ -104,7 +104,7 @@ def test_a_part_beside_another_is_taken_where_there_is_room_for_the_fingers(fixt
 def test_a_clear_preferred_grasp_is_kept(fixture: Scene) -> None:
     plan = nominal(fixture)
     preferred = Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0]))
-    place = Place(plan.start["cube"], obstacles(plan.assembly.solids, plan.start, ("cube",)))
+    place = RestingPart(plan.start["cube"], obstacles(plan.assembly.solids, plan.start, ("cube",)))
     assert grasp_at(fixture, "cube", preferred, [place]) is preferred
 
 
@@ -164,8 +164,8 @@ def test_undoing_and_doing_again_at_once_is_one_move(fixture: Scene) -> None:
 def test_a_wrist_turns_back_instead_of_winding_up() -> None:
     rest = pose.at((0, 0, 0.3), (180, 0, 0))
     start, end = (pose.at((x, 0, 0), (0, 0, turn)) @ rest for x, turn in ((0.0, 100), (0.2, -110)))
-    middle, last = unwound(rest, start, end)
+    middle, last = waypoints_unwound(rest, start, end)
     assert np.array_equal(last, end)
     assert np.degrees(turn_from(rest, middle)) == pytest.approx(-5)
     np.testing.assert_allclose(middle[:3, 3], (0.1, 0, 0.3), atol=1e-12)
-    assert len(unwound(rest, start, pose.at((0, 0, 0), (0, 0, -70)) @ rest)) == 1
+    assert len(waypoints_unwound(rest, start, pose.at((0, 0, 0), (0, 0, -70)) @ rest)) == 1

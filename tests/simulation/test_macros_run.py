@@ -11,7 +11,7 @@ from apo_bench.assembly.goals import Plan, Step
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.scenario.nominal import understood
+from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import Tried, attempt
@@ -47,7 +47,7 @@ def done(scenario: Scenario, off_mm: tuple[float, float, float] = (0, 0, 0), sch
 
 
 def names(scenario: Scenario) -> list[list[str]]:
-    return [list(each.names) for each in understood(scenario)]
+    return [list(each.names) for each in nominal_operations(scenario)]
 
 
 @pytest.mark.parametrize("short_mm", [0.0, 1.0, -2.0])

@@ -11,7 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.scene.render import Film, picture, save_film, view
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import fresh
+from apo_bench.simulation.scene.world import initial_state
 
 SIZE = (160, 120)
 
@@ -26,7 +26,7 @@ def test_a_picture_shows_where_the_parts_are(tower: Scene) -> None:
 
 
 def test_the_end_of_one_film_does_not_spoil_the_next(tower: Scene) -> None:
-    data = fresh(tower.work, draw_layout(tower.scenario, np.random.default_rng(0)).start)
+    data = initial_state(tower.work, draw_layout(tower.scenario, np.random.default_rng(0)).start)
     first = Film(tower, width=SIZE[0], height=SIZE[1], camera=view(np.zeros(3), 1.0))
     first(data)
     second = Film(tower, width=SIZE[0], height=SIZE[1], camera=view(np.zeros(3), 1.0))

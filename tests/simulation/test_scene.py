@@ -12,7 +12,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.scene.arm import Kinematics, six_axis
 from apo_bench.simulation.scene.scene import Scene, build_scene, scene_xml
-from apo_bench.simulation.scene.world import fresh, place, snapshot
+from apo_bench.simulation.scene.world import initial_state, place, snapshot
 
 
 def half(scene: Scene, geom: str) -> list[float]:
@@ -34,7 +34,7 @@ def test_the_written_scene_is_the_scene_and_opens_in_mujoco(tower: Scene) -> Non
 
 def test_every_part_stands_at_its_start_and_rests(tower: Scene) -> None:
     start = draw_layout(tower.scenario, np.random.default_rng(0)).start
-    data = fresh(tower.shown, start)
+    data = initial_state(tower.shown, start)
     mujoco.mj_step(tower.shown.model, data, 300)
     now = snapshot(tower.shown, data, start)
     for part in tower.work.free:
@@ -59,7 +59,7 @@ def test_contacts_of_parts_and_pads_have_the_checked_stiffness(tower: Scene) -> 
 
 def test_a_snapshot_sees_what_is_inside_what(tower: Scene) -> None:
     start = draw_layout(tower.scenario, np.random.default_rng(0)).start
-    data = fresh(tower.shown, start)
+    data = initial_state(tower.shown, start)
     place(tower.shown, data, "stick", start["stick"] @ pose.at((0, 0, -0.0004)))
     assert snapshot(tower.shown, data, start).penetration_m == pytest.approx(0.0004, abs=1e-6)
 

@@ -10,7 +10,7 @@ from apo_bench.assembly.goals import Plan
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.execution.replay_cache import Branches
+from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
 from apo_bench.simulation.robot.robot import Guard, Robot
 from apo_bench.simulation.scene.scene import build_scene
@@ -89,7 +89,7 @@ def test_where_no_hole_is_missed_nothing_changes():
 
 def test_shared_beginnings_change_no_byte():
     asked = [("none", 0.1), ("search", 0.1), ("contact+search", 0.1), ("contact", 0.1), ("search", 0.1), ("none", 0.1)]
-    branches = Branches()
+    branches = ReplayCache()
     shared = [json.dumps(row(*each, branches)) for each in asked]
     alone = [json.dumps(row(*each)) for each in asked[:4]]
     assert shared == [*alone, alone[1], alone[0]]

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Poses, Reached, Snapshot
-from apo_bench.assembly.placement import placed
-from apo_bench.correction.solvers.newton import solve
+from apo_bench.assembly.placement import placements
+from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.trial.pose_error import goal_errors, pose_errors
@@ -26,7 +26,7 @@ def state(poses: Poses) -> Snapshot:
 
 
 def reached(scene: scenes.Scene, goals: Array) -> Reached:
-    after = tuple(state(poses) for poses in placed(scene.assembly, scene.start, goals))
+    after = tuple(state(poses) for poses in placements(scene.assembly, scene.start, goals))
     return Reached(after, after[-1])
 
 
@@ -73,7 +73,7 @@ def test_the_fixed_part_is_what_the_contacts_would_take_back() -> None:
     fixed, free = errors(scene, {2: error})
     goals = scene.goals.copy()
     goals[1] = goals[1] @ error
-    mended = solve(equations(scene.assembly, scene.start, goals), goals, range(3)).goals
+    mended = solve_newton(equations(scene.assembly, scene.start, goals), goals, range(3)).goals
     taken_back = pose.log(pose.inverse(goals) @ mended) * [1, 1, 1, 0.04, 0.04, 0.04] * 1e3
     assert fixed == pytest.approx(np.linalg.norm(taken_back) / np.sqrt(3), rel=1e-3)
     assert fixed == pytest.approx(0.0997, abs=1e-4)

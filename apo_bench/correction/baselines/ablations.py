@@ -9,27 +9,27 @@ import numpy as np
 
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.correction.baselines.paper import at_once
-from apo_bench.correction.baselines.track import follow
+from apo_bench.correction.baselines.track import track_operations
 
-MOST = 255
+MOST_SETS = 255
 """Sets that `minimal` tries at a step: every set of 8 candidates; of more, the smallest ones."""
 
 
 def last_only(seen: Observation) -> Correction:
     """Tracking that never reaches back: only the motion parameter of the newest operation may change."""
-    return follow(seen, lambda chosen: (chosen[:1],))
+    return track_operations(seen, lambda chosen: (chosen[:1],))
 
 
 def minimal(seen: Observation) -> Correction:
     """Tracking with the smallest set of candidates that suffices, the most recent one of that size."""
-    return follow(seen, smallest)
+    return track_operations(seen, smallest)
 
 
 def smallest(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
-    """Sets of candidates by size, then by recency, at most `MOST`; after those, all candidates."""
+    """Sets of candidates by size, then by recency, at most `MOST_SETS`; after those, all candidates."""
     sets = (free for size in range(1, len(chosen) + 1) for free in combinations(chosen, size))
-    yield from islice(sets, MOST)
-    if 2 ** len(chosen) - 1 > MOST:
+    yield from islice(sets, MOST_SETS)
+    if 2 ** len(chosen) - 1 > MOST_SETS:
         yield chosen
 
 

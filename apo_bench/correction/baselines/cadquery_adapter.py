@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.equations import gap
+from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Correction, Observation, Poses
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import PartFace, Relation
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.errors import InputError
@@ -53,7 +53,7 @@ def cadquery(seen: Observation) -> Correction:
     try:
         return as_it_ends(seen, lambda seen: _mated(module, seen), "the mates of the last poses were solved")
     except _NoSolution:
-        now = gap(seen.assembly, seen.start, seen.goals)
+        now = largest_gap(seen.assembly, seen.start, seen.goals)
         return Correction(seen.goals, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
 
 
@@ -80,7 +80,7 @@ def _mated(cq: Any, seen: Observation) -> Array:
     last = {part: k for k, operation in enumerate(operations) for part in operation.moves}
     if not any(end.part in last for relation in standing for end in relation.contact):
         return goals
-    found = _solved(cq, seen, placed(seen.assembly, seen.start, goals)[-1], standing, set(last))
+    found = _solved(cq, seen, placements(seen.assembly, seen.start, goals)[-1], standing, set(last))
     for part, T in found.items():
         if operations[last[part]].main == part:
             goals[last[part]] = T

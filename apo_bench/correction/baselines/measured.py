@@ -6,18 +6,18 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from apo_bench.assembly.equations import equations, gap, largest
+from apo_bench.assembly.equations import equations, largest, largest_gap
 from apo_bench.assembly.goals import Correction, Observation
-from apo_bench.correction.ending import refused, sentence
-from apo_bench.correction.solvers.newton import CUT_OFF, LENGTH_M, least_step
-from apo_bench.correction.solvers.walls import asked, left_open
+from apo_bench.correction.ending import refused_correction, status_sentence
+from apo_bench.correction.solvers.inequalities import demanded, violation
+from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, least_step
 from apo_bench.geometry.arrays import Array
 from apo_bench.records import outcomes
 
-UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
+TWIST_UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
 
 
-def measured(seen: Observation, goals: Array, said: str) -> Correction:
+def goals_as_given(seen: Observation, goals: Array, said: str) -> Correction:
     """A correction of these goals, (n, 4, 4), to be executed as it is, whatever gap it leaves.
 
     Args:
@@ -26,15 +26,15 @@ def measured(seen: Observation, goals: Array, said: str) -> Correction:
     Returns:
         `converged`; `not_finite`, and what was seen, if a number is not finite.
     """
-    before = gap(seen.assembly, seen.start, seen.goals)
+    before = largest_gap(seen.assembly, seen.start, seen.goals)
     if not np.isfinite(goals).all():
         return Correction(seen.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
     system = equations(seen.assembly, seen.start, goals)
     e, J = system.linearised(goals)
-    _, rank = least_step(J / np.tile(UNITS, len(goals)), e, CUT_OFF)
+    _, rank = least_step(J / np.tile(TWIST_UNITS, len(goals)), e, SINGULAR_CUT_OFF)
     freed = tuple(int(k) for k in np.flatnonzero((goals != seen.goals).any(axis=(1, 2)))[::-1])
     after = largest(e)
-    said = sentence("converged", seen.gap_m) if after <= seen.gap_m else said
+    said = status_sentence("converged", seen.gap_m) if after <= seen.gap_m else said
     return Correction(goals, "converged", said, freed, before, after, rank)
 
 
@@ -45,8 +45,8 @@ def gap_of(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> fl
         dropped: Relations, or single contacts, that do not count.
     """
     plain = equations(seen.assembly, seen.start, seen.goals)
-    system, exact, walls = asked(plain, seen.assembly, seen.play_m)
-    return left_open(system, exact, walls, goals, seen.assembly.without(dropped))
+    system, exact, walls = demanded(plain, seen.assembly, seen.play_m)
+    return violation(system, exact, walls, goals, seen.assembly.without(dropped))
 
 
 def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:
@@ -57,10 +57,10 @@ def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: 
         done: What the method did, the beginning of the sentence.
 
     Returns:
-        As `measured`, or `not_seen`; what was seen where there is no contact.
+        As `goals_as_given`, or `not_seen`; what was seen where there is no contact.
     """
     if not seen.seen.all():
-        return refused(seen)
+        return refused_correction(seen)
     goals = mended(seen) if seen.assembly.relations() else seen.goals
-    left_m = gap(seen.assembly, seen.start, goals)
-    return measured(seen, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")
+    left_m = largest_gap(seen.assembly, seen.start, goals)
+    return goals_as_given(seen, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

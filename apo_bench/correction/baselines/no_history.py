@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.equations import equations, gap, largest
+from apo_bench.assembly.equations import equations, largest, largest_gap
 from apo_bench.assembly.goals import Correction, Observation
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.correction.baselines.candidates import candidates
-from apo_bench.correction.ending import refused, sentence, status
-from apo_bench.correction.solvers.newton import solve
+from apo_bench.correction.ending import refused_correction, solver_status, status_sentence
+from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry.arrays import Array
 
 
@@ -29,24 +29,24 @@ def no_history(seen: Observation) -> Correction:
         ever made. `freed` are the operations that got a new motion parameter.
     """
     if not seen.seen.all():
-        return refused(seen)
+        return refused_correction(seen)
     last = {part: k for k, operation in enumerate(seen.assembly.operations) for part in operation.moves}
     poses = _poses(seen, tuple(last))
     end = _end(seen.assembly, tuple(last))
     system = equations(end, seen.start, poses)
     free = candidates(end, ~(system.gaps(poses) <= seen.gap_m))
-    found = solve(system.among(system.containing(free)), poses, free)
-    ended = status(found, largest(system.gaps(found.goals)), seen.gap_m)
+    found = solve_newton(system.among(system.containing(free)), poses, free)
+    ended = solver_status(found, largest(system.gaps(found.goals)), seen.gap_m)
     freed = _main(seen.assembly, last, free)
     goals = np.array(seen.goals)
     goals[list(freed)] = found.goals[list(freed.values())]
     return Correction(
         goals=goals,
         status=ended,
-        sentence=sentence(ended, seen.gap_m, "every contact that stands at the end"),
+        sentence=status_sentence(ended, seen.gap_m, "every contact that stands at the end"),
         freed=tuple(freed),
-        gap_before_m=gap(seen.assembly, seen.start, seen.goals),
-        gap_after_m=gap(seen.assembly, seen.start, goals),
+        gap_before_m=largest_gap(seen.assembly, seen.start, seen.goals),
+        gap_after_m=largest_gap(seen.assembly, seen.start, goals),
         rank=found.rank,
         trace=found.trace,
     )
@@ -54,7 +54,7 @@ def no_history(seen: Observation) -> Correction:
 
 def _poses(seen: Observation, parts: tuple[str, ...]) -> Array:
     """Where the motion parameters leave these parts, (parts, 4, 4), world frame, [m]."""
-    final = placed(seen.assembly, seen.start, seen.goals)[-1] if parts else {}
+    final = placements(seen.assembly, seen.start, seen.goals)[-1] if parts else {}
     return np.array([final[part] for part in parts]).reshape(-1, 4, 4)
 
 

@@ -7,11 +7,11 @@ wedged in the fingers that let go of it.
 from __future__ import annotations
 
 from apo_bench.assembly.equations import Equations
-from apo_bench.correction.solvers.newton import solve
+from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry.arrays import Array
 
 
-def settled(system: Equations, goals: Array, k: int, gap_m: float) -> Array:
+def solve_own_contacts(system: Equations, goals: Array, k: int, gap_m: float) -> Array:
     """The goals (n, 4, 4) with that of operation k solved for what it makes, unless that opens a contact that held.
 
     Args:
@@ -19,6 +19,6 @@ def settled(system: Equations, goals: Array, k: int, gap_m: float) -> Array:
         gap_m: Largest |e| at which a contact holds, [m].
     """
     own = system.among(system.made == k)
-    found = solve(own, goals, (k,))
+    found = solve_newton(own, goals, (k,))
     held, holds = system.gaps(goals) <= gap_m, system.gaps(found.goals) <= gap_m
     return found.goals if found.finite and (holds | ~held).all() else goals

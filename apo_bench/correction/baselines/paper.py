@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from apo_bench.assembly.equations import equations, largest
 from apo_bench.assembly.goals import Correction, Observation
 from apo_bench.correction.baselines.candidates import candidates
-from apo_bench.correction.baselines.own_contacts import settled
-from apo_bench.correction.ending import refused, sentence, status
-from apo_bench.correction.solvers.newton import solve
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
+from apo_bench.correction.ending import refused_correction, solver_status, status_sentence
+from apo_bench.correction.solvers.newton import solve_newton
 
 
 def paper(seen: Observation) -> Correction:
@@ -30,20 +30,20 @@ def at_once(seen: Observation, known: NDArray[np.bool_]) -> Correction:
     The status says whether those hold; the gaps are those of every contact ever made.
     """
     if not seen.seen.all():
-        return refused(seen)
+        return refused_correction(seen)
     system = equations(seen.assembly, seen.start, seen.goals)
     before = system.gaps(seen.goals)
     freed = candidates(seen.assembly, known & ~(before <= seen.gap_m), known)
-    found = solve(system.among(known & system.containing(freed)), seen.goals, freed)
-    ended = status(found, largest(system.gaps(found.goals)[known]), seen.gap_m)
+    found = solve_newton(system.among(known & system.containing(freed)), seen.goals, freed)
+    ended = solver_status(found, largest(system.gaps(found.goals)[known]), seen.gap_m)
     goals = found.goals
     if ended == "converged":
         for k in sorted(set(range(len(goals))).difference(freed)):
-            goals = settled(system, goals, k, seen.gap_m)
+            goals = solve_own_contacts(system, goals, k, seen.gap_m)
     return Correction(
         goals=goals,
         status=ended,
-        sentence=sentence(ended, seen.gap_m, "every contact" if known.all() else "every contact that was kept"),
+        sentence=status_sentence(ended, seen.gap_m, "every contact" if known.all() else "every contact that was kept"),
         freed=freed,
         gap_before_m=largest(before),
         gap_after_m=largest(system.gaps(goals)),

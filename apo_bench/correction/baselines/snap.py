@@ -11,8 +11,8 @@ import numpy as np
 
 from apo_bench.assembly.equations import Equations, equations
 from apo_bench.assembly.goals import Correction, Observation
-from apo_bench.correction.baselines.measured import UNITS, as_it_ends
-from apo_bench.correction.solvers.newton import CUT_OFF, REST_M
+from apo_bench.correction.baselines.measured import TWIST_UNITS, as_it_ends
+from apo_bench.correction.solvers.newton import REST_M, SINGULAR_CUT_OFF
 from apo_bench.correction.solvers.whitened import Whitened, whitened
 from apo_bench.geometry.arrays import Array
 
@@ -52,13 +52,13 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
         e, J = own.linearised(now)
         if not e.size:
             break
-        U, w, Vt = np.linalg.svd(J[:, 6 * k : 6 * k + 6] / UNITS, full_matrices=False)
-        rank = int(np.count_nonzero(w > CUT_OFF * w[0]))
-        fixed = one.pulled(z, Vt[:rank] * UNITS)
+        U, w, Vt = np.linalg.svd(J[:, 6 * k : 6 * k + 6] / TWIST_UNITS, full_matrices=False)
+        rank = int(np.count_nonzero(w > SINGULAR_CUT_OFF * w[0]))
+        fixed = one.pulled(z, Vt[:rank] * TWIST_UNITS)
         wanted = fixed @ z - (U[:, :rank].T @ e) / w[:rank]
         step = np.linalg.lstsq(fixed, wanted, rcond=None)[0] - z
         z = z + step
         now[k] = one.goals(z)[0]
-        if np.linalg.norm(one.factor[0] @ step * UNITS) < REST_M:
+        if np.linalg.norm(one.factor[0] @ step * TWIST_UNITS) < REST_M:
             break
     return now[k]

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from apo_bench.assembly.equations import Equations, equations, largest
 from apo_bench.assembly.goals import Correction, Iterate, Observation, Step, Try
 from apo_bench.correction.baselines.candidates import candidates
-from apo_bench.correction.baselines.own_contacts import settled
-from apo_bench.correction.ending import refused, sentence, status
-from apo_bench.correction.solvers.newton import Solution, solve
+from apo_bench.correction.baselines.own_contacts import solve_own_contacts
+from apo_bench.correction.ending import refused_correction, solver_status, status_sentence
+from apo_bench.correction.solvers.newton import Solution, solve_newton
 from apo_bench.geometry.arrays import Array
 
 _Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
@@ -33,7 +33,7 @@ def paper_track(seen: Observation) -> Correction:
         As `paper`; `freed` is what successful trials changed, `tried` every trial, rank and trace those of the last
         one. If no set of candidates suffices, the steps before keep their corrected goals and there is no schedule.
     """
-    return follow(seen, nested)
+    return track_operations(seen, nested)
 
 
 def nested(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
@@ -43,7 +43,7 @@ def nested(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Followed:
+class TrackedOperation:
     """What one more operation asked for."""
 
     goals: Array
@@ -55,12 +55,12 @@ class Followed:
     trace: tuple[Iterate, ...] = ()
 
 
-def follow(seen: Observation, sets: _Sets) -> Correction:
+def track_operations(seen: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
     if not seen.seen.all():
-        return refused(seen)
+        return refused_correction(seen)
     now, schedule, targets = np.array(seen.goals), list[Step](), list[Array]()
-    steps = list[Followed]()
+    steps = list[TrackedOperation]()
     for n in range(len(now)):
         steps.append(_next(seen, now[: n + 1], sets))
         if steps[-1].status != "converged":
@@ -78,13 +78,13 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
     return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
 
 
-def _next(seen: Observation, goals: Array, sets: _Sets) -> Followed:
+def _next(seen: Observation, goals: Array, sets: _Sets) -> TrackedOperation:
     """The last of these goals has just been observed; the others are in force."""
     n = len(goals) - 1
     system = equations(seen.assembly.first(n + 1), seen.start, goals)
     failing = ~(system.gaps(goals) <= seen.gap_m)
     if not failing[system.made == n].any():
-        return Followed(settled(system, goals, n, seen.gap_m), "converged")
+        return TrackedOperation(solve_own_contacts(system, goals, n, seen.gap_m), "converged")
     chosen, tried, last = candidates(seen.assembly.first(n + 1), failing), list[Try](), None
     for free in sets(chosen):
         last, left_m = _trial(system, goals, free, failing)
@@ -92,9 +92,9 @@ def _next(seen: Observation, goals: Array, sets: _Sets) -> Followed:
             break
         tried.append(Try(n, free, left_m))
         if left_m <= seen.gap_m:
-            return Followed(last.goals, "converged", free, tuple(tried), last.rank, last.trace)
-    ended = "inconsistent" if last is None else status(last, np.inf, seen.gap_m)
-    return Followed(goals, ended, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
+            return TrackedOperation(last.goals, "converged", free, tuple(tried), last.rank, last.trace)
+    ended = "inconsistent" if last is None else solver_status(last, np.inf, seen.gap_m)
+    return TrackedOperation(goals, ended, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
 
 
 def _trial(
@@ -102,24 +102,24 @@ def _trial(
 ) -> tuple[Solution, float]:
     """Solve all equations that contain a free motion parameter; what is left there and of what had failed, [m]."""
     asked = system.containing(free)
-    found = solve(system.among(asked), goals, free)
+    found = solve_newton(system.among(asked), goals, free)
     return found, largest(system.gaps(found.goals)[asked | failing])
 
 
 def _report(
     seen: Observation,
     goals: Array,
-    steps: list[Followed],
+    steps: list[TrackedOperation],
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
     system = equations(seen.assembly, seen.start, seen.goals)
     ended = steps[-1].status if steps else "converged"
-    last = next((step for step in reversed(steps) if step.trace), Followed(goals, ended))
+    last = next((step for step in reversed(steps) if step.trace), TrackedOperation(goals, ended))
     return Correction(
         goals=goals,
         status=ended,
-        sentence=sentence(ended, seen.gap_m),
+        sentence=status_sentence(ended, seen.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
         gap_before_m=largest(system.gaps(seen.goals)),
         gap_after_m=largest(system.gaps(goals)),

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Consistency, Correction, Iterate, Observation, Step, Suspect, Try
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
-from apo_bench.correction.own_code.message import Arrays, Form, Garbled, Message
+from apo_bench.correction.own_code.message import Arrays, GarbledMessage, Message, MessageForm
 from apo_bench.geometry.solid import Box, Face, Solid
 
 
@@ -31,7 +31,7 @@ def observation_message(seen: Observation) -> Message:
     return form, {"start": start, "goals": seen.goals, "covariance": seen.covariance, "seen": seen.seen}
 
 
-def read_observation(form: Form, arrays: Arrays) -> Observation:
+def parse_observation(form: MessageForm, arrays: Arrays) -> Observation:
     """The observation of such a message."""
     assembly = Assembly(
         solids={part: _solid(solid) for part, solid in form["solids"]},
@@ -72,11 +72,11 @@ def correction_message(made: Correction) -> Message:
     return form, {name: array for name, array in possible.items() if array is not None}
 
 
-def read_correction(form: Form, arrays: Arrays) -> Correction:
+def parse_correction(form: MessageForm, arrays: Arrays) -> Correction:
     """The correction of such a message.
 
     Raises:
-        Garbled: It is none, or a number is not finite where one must be.
+        GarbledMessage: It is none, or a number is not finite where one must be.
     """
     try:
         before, after = map(_number, form["gaps"])
@@ -98,10 +98,10 @@ def read_correction(form: Form, arrays: Arrays) -> Correction:
             dropped=tuple(map(_text, form["dropped"])),
         )
     except (ValueError, TypeError, KeyError, IndexError, OverflowError) as error:
-        raise Garbled("the message is no correction") from error
+        raise GarbledMessage("the message is no correction") from error
 
 
-def _solid_form(solid: Solid) -> Form:
+def _solid_form(solid: Solid) -> MessageForm:
     return {
         "name": solid.name,
         "faces": [
@@ -114,7 +114,7 @@ def _solid_form(solid: Solid) -> Form:
     }
 
 
-def _solid(form: Form) -> Solid:
+def _solid(form: MessageForm) -> Solid:
     return Solid(
         form["name"],
         {key: Face(name, outline, tuple(holes), fit) for key, name, outline, holes, fit in form["faces"]},

@@ -18,24 +18,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-HEAD = struct.Struct("!II")
+HEADER = struct.Struct("!II")
 _TYPES = ("float64", "bool")
 _LARGEST_JSON, _LARGEST_NUMBERS = 1 << 24, 1 << 26
 """Bytes; beyond, nothing is read."""
 _CHUNK = 1 << 20
 
-Form = dict[str, Any]
+MessageForm = dict[str, Any]
 Arrays = Mapping[str, NDArray]
-Message = tuple[Form, Arrays]
+Message = tuple[MessageForm, Arrays]
 _Wait = Callable[[], None]
 """Returns when there is something to read; raises if there never will be."""
 
 
-class Garbled(ValueError):
+class GarbledMessage(ValueError):
     """What came is no such message."""
 
 
-def send(to: socket.socket, form: Form, arrays: Arrays, deadline: float = math.inf) -> None:
+def send(to: socket.socket, form: MessageForm, arrays: Arrays, deadline: float = math.inf) -> None:
     """Send one message.
 
     Args:
@@ -48,7 +48,7 @@ def send(to: socket.socket, form: Form, arrays: Arrays, deadline: float = math.i
     stated = {name: [str(array.dtype), list(array.shape)] for name, array in arrays.items()}
     text = json.dumps({**form, "arrays": stated}).encode()
     numbers = b"".join(array.tobytes() for array in arrays.values())
-    left = memoryview(HEAD.pack(len(text), len(numbers)) + text + numbers)
+    left = memoryview(HEADER.pack(len(text), len(numbers)) + text + numbers)
     while left:
         to.settimeout(_remaining(deadline))
         left = left[to.send(left) :]
@@ -61,33 +61,33 @@ def receive(of: socket.socket, wait: _Wait = lambda: None) -> Message:
         wait: Called before each piece is read.
 
     Raises:
-        Garbled: It is none.
+        GarbledMessage: It is none.
         EOFError: It ends in the middle, or does not begin.
     """
     of.settimeout(None)
-    size, length = HEAD.unpack(_read(of, HEAD.size, wait))
+    size, length = HEADER.unpack(_read(of, HEADER.size, wait))
     if size > _LARGEST_JSON or length > _LARGEST_NUMBERS:
-        raise Garbled("the message is too large")
+        raise GarbledMessage("the message is too large")
     text, numbers = _read(of, size, wait), _read(of, length, wait)
     try:
         form = json.loads(text)
         return form, _arrays(form.pop("arrays"), numbers)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        raise Garbled("the message cannot be read") from error
+        raise GarbledMessage("the message cannot be read") from error
 
 
 def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
     found, at = {}, 0
     for name, (kind, shape) in stated.items():
         if kind not in _TYPES or not all(type(size) is int and size >= 0 for size in shape):
-            raise Garbled("an array of another type")
+            raise GarbledMessage("an array of another type")
         count = math.prod(shape)
         if count > _LARGEST_NUMBERS:
-            raise Garbled("an array that is too large")
+            raise GarbledMessage("an array that is too large")
         found[name] = np.frombuffer(numbers, np.dtype(kind), count, at).reshape(shape)
         at += found[name].nbytes
     if at != len(numbers):
-        raise Garbled("numbers that belong to no array")
+        raise GarbledMessage("numbers that belong to no array")
     return found
 
 

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from typing import Any, final
 
 from apo_bench.assembly.goals import Correction, Observation
-from apo_bench.correction.correctors import Misbehaved, checked_corrector, correct
-from apo_bench.correction.own_code.forms import observation_message, read_correction
-from apo_bench.correction.own_code.message import Arrays, Form, Garbled, Message
+from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
+from apo_bench.correction.own_code.forms import observation_message, parse_correction
+from apo_bench.correction.own_code.message import Arrays, GarbledMessage, Message, MessageForm
 from apo_bench.correction.own_code.process import Server
 from apo_bench.errors import InputError
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -25,7 +25,7 @@ _LONGEST_SENTENCE = 2000
 
 
 @final
-class Lost(Misbehaved):
+class CorrectorLost(CorrectorMisbehaved):
     """A corrector ended its process, or took too long."""
 
     def __init__(self, code: str, sentence: str) -> None:
@@ -122,16 +122,16 @@ class _OwnCorrector:
         """Ask it.
 
         Raises:
-            Misbehaved: It raised an error or returned what it must not; or, as `Lost`, it ended its process or took
-                too long.
+            CorrectorMisbehaved: It raised an error or returned what it must not; or, as `CorrectorLost`, it ended its
+                process or took too long.
         """
         said, numbers = self._asked("correct", *observation_message(seen), self._limit_s)
         if "raised" in said:
-            raise Misbehaved(_line(said["raised"]))
+            raise CorrectorMisbehaved(_line(said["raised"]))
         try:
-            return read_correction(said, numbers)
-        except Garbled as error:
-            raise Misbehaved(f"the corrector '{self.__name__}' sent back what is no correction.") from error
+            return parse_correction(said, numbers)
+        except GarbledMessage as error:
+            raise CorrectorMisbehaved(f"the corrector '{self.__name__}' sent back what is no correction.") from error
 
     def check(self) -> list[str]:
         """The files of the modules that it brought in.
@@ -141,23 +141,23 @@ class _OwnCorrector:
         """
         try:
             said, _ = self._asked("check", {}, {}, self._server.starting_s)
-        except Misbehaved as error:
+        except CorrectorMisbehaved as error:
             raise InputError(f"{str(error).rstrip('.')} while it was imported; mend it, or use another.") from error
         if "raised" in said:
             raise InputError(_line(said["raised"]))
         files = said.get("files")
         return [path for path in files if isinstance(path, str)] if isinstance(files, list) else []
 
-    def _asked(self, what: str, form: Form, arrays: Arrays, limit_s: float) -> Message:
+    def _asked(self, what: str, form: MessageForm, arrays: Arrays, limit_s: float) -> Message:
         name = f"the corrector '{self.__name__}'"
         try:
             return self._server.ask({**form, "asked": what, "name": self.__name__}, arrays, limit_s)
         except TimeoutError as error:
-            raise Lost("time_limit", f"{name} took longer than {limit_s:g} s.") from error
+            raise CorrectorLost("time_limit", f"{name} took longer than {limit_s:g} s.") from error
         except (EOFError, OSError) as error:
-            raise Lost("worker_died", f"{name} ended its process{_how(error)}.") from error
-        except Garbled as error:
-            raise Misbehaved(f"{name} sent back what cannot be read.") from error
+            raise CorrectorLost("worker_died", f"{name} ended its process{_how(error)}.") from error
+        except GarbledMessage as error:
+            raise CorrectorMisbehaved(f"{name} sent back what cannot be read.") from error
 
 
 def _how(error: BaseException) -> str:

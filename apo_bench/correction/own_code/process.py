@@ -13,7 +13,7 @@ from contextlib import suppress
 from multiprocessing import connection
 from typing import final
 
-from apo_bench.correction.own_code.message import Arrays, Form, Message, receive, send
+from apo_bench.correction.own_code.message import Arrays, Message, MessageForm, receive, send
 from apo_bench.correction.own_code.server import NOTICE
 from apo_bench.errors import InputError
 from apo_bench.io.processes import descendants, end_descendants
@@ -44,13 +44,13 @@ class Server:
         self._helpers: Iterable[int] = ()
         """Processes that importing the module has started."""
 
-    def ask(self, form: Form, arrays: Arrays, limit_s: float) -> Message:
+    def ask(self, form: MessageForm, arrays: Arrays, limit_s: float) -> Message:
         """What a fork of it answers.
 
         Raises:
             TimeoutError: Nothing, in that time.
             EOFError, OSError: It ended before.
-            Garbled: What it sent is no message.
+            GarbledMessage: What it sent is no message.
         """
         process, control = self._running()
         here, there = _pair()

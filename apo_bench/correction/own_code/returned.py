@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.goals import Consistency, Correction, Step, Try
-from apo_bench.assembly.schedule import REMEDY, fault
+from apo_bench.assembly.schedule import REMEDY, schedule_fault
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import FARTHEST_M, rigid
+from apo_bench.geometry.rigid import FARTHEST_M, is_rigid
 from apo_bench.io.plain_text import UNSHOWN
 
 RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
@@ -21,7 +21,7 @@ _SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
 
 
-def checked(found: Correction, assembly: Assembly, name: str) -> Correction:
+def check_correction(found: Correction, assembly: Assembly, name: str) -> Correction:
     """The correction by the corrector called `name`, its schedule made of steps.
 
     Raises:
@@ -106,7 +106,7 @@ def _whole(value: Any) -> bool:
 
 
 def _check_schedule(found: Correction, name: str) -> None:
-    if found.schedule and (wrong := fault(found.schedule, len(found.goals))):
+    if found.schedule and (wrong := schedule_fault(found.schedule, len(found.goals))):
         raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {REMEDY}.")
     if found.targets is None:
         return
@@ -114,7 +114,7 @@ def _check_schedule(found: Correction, name: str) -> None:
         raise InputError(
             f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets."
         )
-    for j in np.flatnonzero(~rigid(found.targets)):
+    for j in np.flatnonzero(~is_rigid(found.targets)):
         raise InputError(
             f"the corrector '{name}' returned a target for step {j + 1} of its schedule that is not a rigid pose; "
             f"{RIGID}."

@@ -19,8 +19,8 @@ from contextlib import suppress
 from importlib import import_module
 
 from apo_bench.correction.correctors import checked_corrector, correct
-from apo_bench.correction.own_code.forms import correction_message, read_observation
-from apo_bench.correction.own_code.message import Arrays, Form, Message, receive, send
+from apo_bench.correction.own_code.forms import correction_message, parse_observation
+from apo_bench.correction.own_code.message import Arrays, Message, MessageForm, receive, send
 from apo_bench.errors import InputError
 from apo_bench.io.processes import end_descendants, flush
 
@@ -111,14 +111,14 @@ def _do(given: int) -> None:
     os._exit(1)
 
 
-def _said(form: Form, arrays: Arrays) -> Message:
+def _said(form: MessageForm, arrays: Arrays) -> Message:
     """What was asked for, or why there is none."""
     name = form["name"]
     try:
         if form["asked"] == "check":
             checked_corrector(name)
             return {"files": _files()}, {}
-        return correction_message(correct(read_observation(form, arrays), name))
+        return correction_message(correct(parse_observation(form, arrays), name))
     except InputError as error:
         return {"raised": str(error)}, {}
     except BaseException as error:

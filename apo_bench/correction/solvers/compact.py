@@ -30,7 +30,7 @@ ROUNDING, SMALLEST = 1e-15, 1e-300
 
 @final
 @dataclass(frozen=True, eq=False)
-class Compact:
+class CompactEquations:
     """c contacts with three equations each, in the motion parameters of n operations."""
 
     start: Array
@@ -50,11 +50,11 @@ class Compact:
     def __len__(self) -> int:
         return len(self.letters)
 
-    def only(self, some: NDArray[np.bool_]) -> Compact:
+    def only(self, some: NDArray[np.bool_]) -> CompactEquations:
         """The same for some of the observations, if each has points of its own."""
         return self if self.points.ndim == 3 else replace(self, points=self.points[some])
 
-    def among(self, contacts: NDArray[np.bool_]) -> Compact:
+    def among(self, contacts: NDArray[np.bool_]) -> CompactEquations:
         """The equations of these contacts, (c,), alone."""
         return replace(
             self,
@@ -158,18 +158,18 @@ class Compact:
         return stack[..., self._rows, :, :]
 
 
-def compact(system: Equations, n: int) -> Compact:
+def compact_equations(system: Equations, n: int) -> CompactEquations:
     """The same equations, three per contact, in the motion parameters of `n` operations."""
     letters = system.letters
     k = letters - len(system.start)
     columns = np.where((k >= 0) & (k < n), k, n)
     plane = np.zeros((len(letters), 4))
     plane[system.contact] = system.plane
-    return Compact(system.start, letters, columns, system.inverse, plane, _points(system), n)
+    return CompactEquations(system.start, letters, columns, system.inverse, plane, _points(system), n)
 
 
 def moments(outlines: Sequence[Array]) -> Array:
-    """What stands for the corners of each outline (k, 3): the rows of `Compact.points`, (len, 3, 4), in its frame."""
+    """Three points that stand for the corners of each outline (k, 3), as in `CompactEquations.points`, (len, 3, 4)."""
     count = np.array([len(corners) for corners in outlines])
     return _moments(np.concatenate(outlines), np.repeat(np.arange(len(count)), count), len(count))
 

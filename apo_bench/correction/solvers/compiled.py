@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import Equations
 from apo_bench.correction.solvers import loops, manifold
-from apo_bench.correction.solvers.compact import ROUNDING, SMALLEST, Compact
-from apo_bench.correction.solvers.manifold import Nearest, Turn
+from apo_bench.correction.solvers.compact import ROUNDING, SMALLEST, CompactEquations
+from apo_bench.correction.solvers.manifold import NearestGoals, SolverTurn
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import SERIES
@@ -35,25 +35,27 @@ HELPERS = (
     loops.factored,
     loops.substituted,
     loops.back,
-    loops.shortened,
-    loops.moved,
-    loops.hat,
+    loops.step_share,
+    loops.displaced,
+    loops.cross_matrix,
     loops.scattered,
 )
 _RULE = (
-    manifold.TURNS,
+    manifold.MOST_TURNS,
     manifold.STEP,
     manifold.SURE,
     manifold.DAMPING,
     manifold.FALL,
-    manifold.FLOOR,
+    manifold.SQUARED_GAP_FLOOR,
     manifold.LARGEST_TURN,
     manifold.SMALLEST,
 )
 
 
-def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None) -> Nearest:
-    """As `manifold.nearest`, and with the same results but for rounding.
+def nearest_goals_compiled(
+    system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None
+) -> NearestGoals:
+    """As `manifold.nearest_goals`, and with the same results but for rounding.
 
     One observation of very many operations is left to sparse matrices there.
 
@@ -61,11 +63,11 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
         InputError: Numba is not installed.
     """
     (solve, _), lead, n, m = _compiled(), goals.shape[:-3], system.n, 3 * len(system)
-    if not lead and 6 * n > manifold.LARGE:
-        return manifold.nearest(system, goals, L, soft_m)
+    if not lead and 6 * n > manifold.LARGEST_DENSE:
+        return manifold.nearest_goals(system, goals, L, soft_m)
     b = math.prod(lead)
     out = tuple(np.empty((b, *shape)) for shape in ((n, 4, 4), (6 * n,), (m,), (6 * n, m), (n, 6, 6)))
-    rest, finite, trace = np.empty(b, np.bool_), np.empty(b, np.bool_), np.zeros((manifold.TURNS, 2))
+    rest, finite, trace = np.empty(b, np.bool_), np.empty(b, np.bool_), np.zeros((manifold.MOST_TURNS, 2))
     turns = solve(
         _own(system.start),
         (_own(system.letters, np.intp), _own(system.columns, np.intp), _own(system.inverse, np.intp)),
@@ -82,11 +84,13 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
         trace,
     )
     T, z, e, Jt, B, at_rest, ended = (x.reshape(lead + x.shape[1:]) for x in (*out, rest, finite))
-    return Nearest(T, z, e, Jt, B, at_rest, ended, tuple(Turn(gap, step) for gap, step in trace[:turns].tolist()))
+    return NearestGoals(
+        T, z, e, Jt, B, at_rest, ended, tuple(SolverTurn(gap, step) for gap, step in trace[:turns].tolist())
+    )
 
 
-def compact(system: Equations, n: int) -> Compact:
-    """As `compact.compact`.
+def compact_equations_compiled(system: Equations, n: int) -> CompactEquations:
+    """As `compact.compact_equations`.
 
     Raises:
         InputError: Numba is not installed.
@@ -107,7 +111,7 @@ def compact(system: Equations, n: int) -> Compact:
         plane,
         points,
     )
-    return Compact(system.start, system.letters, columns, system.inverse, plane, points, n)
+    return CompactEquations(system.start, system.letters, columns, system.inverse, plane, points, n)
 
 
 @cache
@@ -130,7 +134,7 @@ def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
         except RuntimeError:  # nowhere to keep it: it is compiled anew in every process
             return njit(fastmath=set(_SAFE), error_model="numpy")(function)
 
-    return compiled(loops.solve), compiled(loops.summarised)
+    return compiled(loops.solve_each), compiled(loops.summarised)
 
 
 def _own(x: Any, dtype: Any = np.float64) -> NDArray[Any]:

@@ -1,25 +1,33 @@
-"""`manifold.nearest` for one observation of many operations, on sparse matrices."""
+"""`manifold.nearest_goals` for one observation of many operations, on sparse matrices."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from apo_bench.correction.solvers.compact import Compact
-from apo_bench.correction.solvers.manifold import SMALLEST, TURNS, Nearest, Turn, damping, settles, shortened
-from apo_bench.correction.solvers.sparse import incidence, solver
+from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.manifold import (
+    MOST_TURNS,
+    SMALLEST,
+    NearestGoals,
+    SolverTurn,
+    damping,
+    settles,
+    shortened_step,
+)
+from apo_bench.correction.solvers.sparse import incidence, sparse_solver
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
 
 
-def nearest_large(system: Compact, seen: Array, L: Array, soft_m: Array | None = None) -> Nearest:
-    """As `manifold.nearest`, of goals (n, 4, 4); the Jacobian of the result is a sparse matrix."""
+def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
+    """As `manifold.nearest_goals`, of goals (n, 4, 4); the Jacobian of the result is a sparse matrix."""
     n, m = system.n, 3 * len(system)
     where = incidence(system)
-    solve = solver(where)
+    solve = sparse_solver(where)
     z, T, B = np.zeros(6 * n), seen, L
-    before, trace, rest, finite = np.inf, list[Turn](), False, True
+    before, trace, rest, finite = np.inf, list[SolverTurn](), False, True
     blocks = np.zeros((len(where.contact), 6, 3))
-    for turn in range(TURNS):
+    for turn in range(MOST_TURNS):
         e, every = system.blocks(T, B)
         blocks = every[where.contact, where.letter]
         size = float((blocks * blocks).sum()) / max(m, 1)
@@ -31,9 +39,9 @@ def nearest_large(system: Compact, seen: Array, L: Array, soft_m: Array | None =
         added = np.full(m, max(float(mu), SMALLEST)) + (0.0 if soft_m is None else soft_m * soft_m)
         step = solve(added, blocks, where.times(blocks, z) - e) - z
         length = float(np.abs(step).max(initial=0.0))
-        trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))
+        trace.append(SolverTurn(float(np.abs(e).max(initial=0.0)), length))
         rest = bool(settles(np.array(length), np.array(before)))
-        z = z + (step if rest else shortened(step[None], L[None])[0])
+        z = z + (step if rest else shortened_step(step[None], L[None])[0])
         D, Jr = exp_and_jacobian((L @ z.reshape(n, 6, 1))[..., 0])
         T, B, before = seen @ D, Jr @ L, length
         if rest:
@@ -41,4 +49,4 @@ def nearest_large(system: Compact, seen: Array, L: Array, soft_m: Array | None =
     if not finite:
         z, T = np.zeros(6 * n), seen
     Jt = where.matrix(blocks).T
-    return Nearest(T, z, system.residual(T), Jt, B, np.array(rest and finite), np.array(finite), tuple(trace))
+    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest and finite), np.array(finite), tuple(trace))

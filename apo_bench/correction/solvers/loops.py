@@ -1,6 +1,6 @@
 """The solver of `manifold`, written out in loops over numbers, for a compiler.
 
-The algorithm is that of `manifold.nearest`, with the same constants. Three things differ in how it is calculated:
+The algorithm is that of `manifold.nearest_goals`, with the same constants. Three things differ in how it is calculated:
 
 - J is kept as blocks of 3 x 6, one for each motion parameter in the word of each contact, and J J^t is summed over
   pairs of contacts that share a motion parameter.
@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
 _Words = tuple[_Index, _Index, _Index]
-"""Letters, columns and inverse (0 or 1) of `Compact`, each (c, w)."""
+"""Letters, columns and inverse (0 or 1) of `CompactEquations`, each (c, w)."""
 _Rule = tuple[int, float, float, float, float, float, float, float]
 """TURNS, STEP, SURE, DAMPING, FALL, FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
 _SHORT = 9
 """Terms of the series of exp that are enough below one radian."""
 
 
-def solve(
+def solve_each(
     start: _Array,
     words: _Words,
     plane: _Array,
@@ -54,7 +54,7 @@ def solve(
         L: (b or 1, n, 6, 6).
         soft_m: (3 c,); (0,) demands every equation.
         series: As in `twist`.
-        out: goals (b, n, 4, 4), z (b, 6 n), e (b, 3 c), Jt (b, 6 n, 3 c), B (b, n, 6, 6), as in `Nearest`.
+        out: goals (b, n, 4, 4), z (b, 6 n), e (b, 3 c), Jt (b, 6 n, 3 c), B (b, n, 6, 6), as in `NearestGoals`.
         rest: (b,), overwritten; so is `finite`.
         trace: (TURNS, 2), zeros: the largest |e| and the largest step of each turn.
     """
@@ -103,11 +103,11 @@ def solve(
             rest[o] = size < step_size or (size < sure and size * size < step_size * before)
             if not finite[o]:
                 break
-            share = 1.0 if rest[o] else shortened(Lo, step, largest_turn, smallest)
+            share = 1.0 if rest[o] else step_share(Lo, step, largest_turn, smallest)
             for i in range(6 * n):
                 z[i] += share * step[i]
             for k in range(n):
-                moved(seen[o, k], Lo[k], z[6 * k : 6 * k + 6], series, T[k], B[k])
+                displaced(seen[o, k], Lo[k], z[6 * k : 6 * k + 6], series, T[k], B[k])
             if rest[o]:
                 break
         scattered(blocks, words[1], slot, out[3][o])
@@ -132,7 +132,7 @@ def summarised(
     planes: _Array,
     points: _Array,
 ) -> None:
-    """What `compact.compact` makes of equations: columns (c, w), planes (c, 4), points (c, 3, 4), zeros before."""
+    """Fill columns (c, w), planes (c, 4) and points (c, 3, 4), all zero before, as `compact_equations` does."""
     c, w = letters.shape
     count, S, a = np.zeros(c), np.zeros((c, 3, 3)), np.zeros(3)
     for i in range(c):
@@ -228,7 +228,7 @@ def linearise(
     blocks: _Array,
     behind: _Array,
 ) -> None:
-    """e, (3 c,), and its derivative, blocks (c, w, 3, 6), as `Compact.blocks`; `behind`, (w + 1, 3, 4), is scratch."""
+    """e, (3 c,), and its derivative, blocks (c, w, 3, 6) as in `CompactEquations`; `behind` (w + 1, 3, 4) is scratch."""
     letters, columns, inverse = words
     n = len(B)
     blocks[:] = 0.0
@@ -349,7 +349,7 @@ def back(blocks: _Array, columns: _Index, slot: _Index, y: _Array, z: _Array, st
                         step[6 * columns[i, j] + q] += blocks[i, j, r, q] * y[3 * i + r]
 
 
-def shortened(L: _Array, step: _Array, largest_turn: float, smallest: float) -> float:
+def step_share(L: _Array, step: _Array, largest_turn: float, smallest: float) -> float:
     """The share of the step at which no goal turns further than `largest_turn`."""
     largest = 0.0
     for k in range(len(L)):
@@ -363,7 +363,7 @@ def shortened(L: _Array, step: _Array, largest_turn: float, smallest: float) -> 
     return min(1.0, largest_turn / max(math.sqrt(largest), smallest))
 
 
-def moved(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Array) -> None:
+def displaced(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Array) -> None:
     """T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z."""
     xi = np.zeros(6)
     for i in range(6):
@@ -375,7 +375,7 @@ def moved(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Arr
     for i in range((_SHORT if square < 1.0 else len(series)) - 1, -1, -1):
         for j in range(6):
             f[j] = f[j] * square + series[i, j]
-    W, V = hat(w), hat(v)
+    W, V = cross_matrix(w), cross_matrix(v)
     R, G, P, S = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     for i in range(3):
         for j in range(3):
@@ -397,7 +397,7 @@ def moved(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Arr
             B[i + 3, q] = P[i, 0] * L[3, q] + P[i, 1] * L[4, q] + P[i, 2] * L[5, q]
 
 
-def hat(a: _Array) -> _Array:
+def cross_matrix(a: _Array) -> _Array:
     """hat(a) b = a x b."""
     out = np.zeros((3, 3))
     out[0, 1], out[0, 2], out[1, 2] = -a[2], a[1], -a[0]

@@ -23,11 +23,11 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.solvers.compact import Compact
+from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
 
-TURNS = 60
+MOST_TURNS = 60
 STEP = 1e-7
 """The solver rests when its next step would be shorter in every component, in standard deviations."""
 SURE = 1e-5
@@ -36,16 +36,16 @@ DAMPING = 0.05
 """mu, per mean square of the rows of J and per mean square of the gaps in that unit."""
 FALL = 0.3
 """mu is at most `DAMPING` times this to the number of turns, so that it cannot hold a gap open."""
-FLOOR = 1e-14
+SQUARED_GAP_FLOOR = 1e-14
 """mu is at least this part of the mean square of the rows: rounding."""
 LARGEST_TURN = 0.25
 """[rad]. No goal turns further in one step."""
-LARGE = 48
+LARGEST_DENSE = 48
 """Unknowns above which one observation is solved with sparse matrices."""
 SMALLEST = 1e-300
 
 
-class Turn(NamedTuple):
+class SolverTurn(NamedTuple):
     """One turn of the solver: the largest |e| before it, [m], and the length of its step, in standard deviations."""
 
     gap_m: float
@@ -54,7 +54,7 @@ class Turn(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Nearest:
+class NearestGoals:
     """Where the solver ended, for each observation."""
 
     goals: Array
@@ -71,11 +71,11 @@ class Nearest:
     """(*,)."""
     finite: NDArray[np.bool_]
     """(*,)."""
-    trace: tuple[Turn, ...]
+    trace: tuple[SolverTurn, ...]
     """Of the observation that took longest."""
 
 
-def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None) -> Nearest:
+def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
     """Change all goals as little as the contacts ask for.
 
     Args:
@@ -85,10 +85,10 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
     """
     lead, n = goals.shape[:-3], system.n
-    if not lead and 6 * n > LARGE:
-        from apo_bench.correction.solvers.large import nearest_large
+    if not lead and 6 * n > LARGEST_DENSE:
+        from apo_bench.correction.solvers.large import nearest_goals_sparse
 
-        return nearest_large(system, goals, L, soft_m)
+        return nearest_goals_sparse(system, goals, L, soft_m)
     b = math.prod(lead)
     seen = goals.reshape(b, n, 4, 4)
     scale = np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)
@@ -97,23 +97,23 @@ def nearest(system: Compact, goals: Array, L: Array, soft_m: Array | None = None
         return found
     names = ("goals", "z", "e", "Jt", "B", "at_rest", "finite")
     shaped = {name: getattr(found, name) for name in names}
-    return Nearest(**{name: x.reshape((*lead, *x.shape[1:])) for name, x in shaped.items()}, trace=found.trace)
+    return NearestGoals(**{name: x.reshape((*lead, *x.shape[1:])) for name, x in shaped.items()}, trace=found.trace)
 
 
-def _many(system: Compact, seen: Array, L: Array, soft_m: Array | None) -> Nearest:
+def _many(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None) -> NearestGoals:
     """(b, n, 4, 4) goals; observations that rest are left alone while the others go on."""
     b, n = len(seen), system.n
     now = _Going(np.arange(b), system, seen, L, seen, L, np.zeros((b, 6 * n)), np.full(b, np.inf))
-    done, trace = list[tuple[NDArray[np.intp], tuple[Any, ...]]](), list[Turn]()
-    for turn in range(TURNS):
+    done, trace = list[tuple[NDArray[np.intp], tuple[Any, ...]]](), list[SolverTurn]()
+    for turn in range(MOST_TURNS):
         e, blocks = now.system.blocks(now.T, now.B)
         Jt = now.system.gathered(blocks)
         step, finite = project(e, Jt, now.z, soft_m, turn)
         size = np.abs(step).max(axis=1, initial=0.0)
-        trace.append(Turn(float(np.abs(e).max(initial=0.0)), float(size.max(initial=0.0))))
+        trace.append(SolverTurn(float(np.abs(e).max(initial=0.0)), float(size.max(initial=0.0))))
         rest = finite & settles(size, now.size)
-        over = ~finite | rest if turn + 1 < TURNS else np.ones(b, dtype=np.bool_)[now.which]
-        z = now.z + (step if rest.all() else shortened(step, now.L))
+        over = ~finite | rest if turn + 1 < MOST_TURNS else np.ones(b, dtype=np.bool_)[now.which]
+        z = now.z + (step if rest.all() else shortened_step(step, now.L))
         D, Jr = exp_and_jacobian((now.L @ z.reshape(len(z), n, 6, 1))[..., 0])
         now = now._replace(z=z, T=now.seen @ D, B=Jr @ now.L, size=size)
         if over.any() or not b:
@@ -135,7 +135,7 @@ class _Going(NamedTuple):
     """Observations that do not rest yet."""
 
     which: NDArray[np.intp]
-    system: Compact
+    system: CompactEquations
     seen: Array
     L: Array
     T: Array
@@ -150,8 +150,11 @@ class _Going(NamedTuple):
 
 
 def _sorted(
-    system: Compact, seen: Array, done: list[tuple[NDArray[np.intp], tuple[Any, ...]]], trace: tuple[Turn, ...]
-) -> Nearest:
+    system: CompactEquations,
+    seen: Array,
+    done: list[tuple[NDArray[np.intp], tuple[Any, ...]]],
+    trace: tuple[SolverTurn, ...],
+) -> NearestGoals:
     """What ended at different turns, in the order of the observations."""
     if len(done) == 1:
         T, z, Jt, B, rest, finite = done[0][1]
@@ -160,7 +163,7 @@ def _sorted(
         T, z, Jt, B, rest, finite = (np.concatenate(x)[order] for x in zip(*(x for _, x in done), strict=True))
     if not finite.all():
         T, z = np.where(finite[:, None, None, None], T, seen), np.where(finite[:, None], z, 0.0)
-    return Nearest(T, z, system.residual(T), Jt, B, rest, finite, trace)
+    return NearestGoals(T, z, system.residual(T), Jt, B, rest, finite, trace)
 
 
 def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -187,10 +190,10 @@ def project(e: Array, Jt: Array, z: Array, soft_m: Array | None, turn: int) -> t
 
 def damping(gap2: Array, turn: int) -> Array:
     """mu as a part of the mean square of the rows of J; `gap2` is the mean e^2 in that unit."""
-    return np.maximum(DAMPING * np.minimum(np.minimum(gap2, 1.0), FALL**turn), FLOOR)
+    return np.maximum(DAMPING * np.minimum(np.minimum(gap2, 1.0), FALL**turn), SQUARED_GAP_FLOOR)
 
 
-def shortened(step: Array, L: Array) -> Array:
+def shortened_step(step: Array, L: Array) -> Array:
     """The same step, shortened for an observation in which a goal would turn further than `LARGEST_TURN`."""
     turned = (L[:, :, 3:] @ step.reshape(*L.shape[:2], 6, 1))[..., 0]
     largest = np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0))

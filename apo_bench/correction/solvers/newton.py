@@ -7,8 +7,8 @@ Two numbers that the paper does not give decide whether redundant directions sta
   directions that the contacts do fix.
 - The singular values of redundant directions vanish at consistent poses only. Away from them they grow with the
   noise: about 0.002 of the largest at 2 mm and 1 degree, now and then 0.02, where those that contacts fix stay above
-  0.03. `CUT_OFF` lies between. A descent with a cut-off of 1e-6 closes the gap as well, but parts travel centimetres
-  along directions of which the contacts say nothing.
+  0.03. `SINGULAR_CUT_OFF` lies between. A descent with a cut-off of 1e-6 closes the gap as well, but parts travel
+  centimetres along directions of which the contacts say nothing.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from apo_bench.geometry.arrays import Array
 
 LENGTH_M = 0.04
 """Way of a point per radian, at which a rotation weighs as much as a translation."""
-CUT_OFF = 0.02
+SINGULAR_CUT_OFF = 0.02
 """Singular values below this part of the largest one count as zero (w_l+1 .. w_n of Eq. 15)."""
 _TURNS = 30
 REST_M = 1e-9
@@ -48,12 +48,12 @@ class Solution:
     trace: tuple[Iterate, ...]
 
 
-def solve(
+def solve_newton(
     equations: Equations,
     goals: Array,
     free: Collection[int],
     *,
-    cut_off: float = CUT_OFF,
+    cut_off: float = SINGULAR_CUT_OFF,
     length_m: float = LENGTH_M,
     turns: int = _TURNS,
 ) -> Solution:
@@ -80,7 +80,7 @@ def descend(
     goals: Array,
     free: Collection[int],
     *,
-    cut_off: float = CUT_OFF,
+    cut_off: float = SINGULAR_CUT_OFF,
     length_m: float = LENGTH_M,
     turns: int = _TURNS,
     at_most: int | None = None,

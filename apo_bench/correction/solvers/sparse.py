@@ -15,7 +15,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.solvers.compact import Compact
+from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.geometry.arrays import Array
 
 WIDE = 240
@@ -68,13 +68,13 @@ class Incidence:
         return csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * self.c, 6 * self.n))
 
 
-def incidence(system: Compact) -> Incidence:
+def incidence(system: CompactEquations) -> Incidence:
     """The letters of a system that are unknown."""
     contact, letter = np.nonzero(system.columns < system.n)
     return Incidence(contact, letter, system.columns[contact, letter], len(system), system.n)
 
 
-def solver(where: Incidence) -> _Solver:
+def sparse_solver(where: Incidence) -> _Solver:
     """The way to solve for z that suits the graph; what depends on the graph alone is done once."""
     pairs = _pairs(where)
     if pairs is not None:
@@ -86,7 +86,7 @@ def solver(where: Incidence) -> _Solver:
     return _together(where)
 
 
-def rank(Jt: Any) -> int:
+def sparse_rank(Jt: Any) -> int:
     """The rank of a sparse matrix at a solution: eigenvalues of J J^t above rounding, by Sylvester's law of inertia."""
     from scipy.sparse import block_array, eye_array
     from scipy.sparse.linalg import splu

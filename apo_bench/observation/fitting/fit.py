@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Measured
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, MeasuredNoise
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.tails import Split, log_density_across, log_density_along, of_numbers
 
@@ -29,7 +29,7 @@ class Figures(NamedTuple):
     """Of Kolmogorov and Smirnov: the largest difference of the two cumulative distributions."""
 
 
-def fit(residuals: Residuals, source: str) -> Measured:
+def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
     """The noise that makes the residuals most likely.
 
     Errors are taken about the truth, not about their mean: a bias of the estimator is part of their size, and the noise
@@ -46,7 +46,7 @@ def fit(residuals: Residuals, source: str) -> Measured:
                 "needed for a fit, so give more images, or the truth of the same ones."
             )
     far = residuals.off_mm[found & ~inlier]
-    return Measured(
+    return MeasuredNoise(
         source=source,
         shift_mm=fit_split(residuals.shift_mm[inlier], INLIER_MM, "places"),
         turn_deg=fit_split(residuals.turn_deg[upright], TURNED_DEG, "rotations"),
@@ -87,7 +87,7 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
     return of_numbers(best.x, limit)
 
 
-def compared(residuals: Residuals, measured: Measured) -> tuple[Figures, ...]:
+def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
     """Goodness of fit: across and along the ray of inliers, and angles of those that are not turned."""
     inlier, upright = residuals.inlier, residuals.upright
     shift, turn = measured.shift_mm, measured.turn_deg

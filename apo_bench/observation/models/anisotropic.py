@@ -12,7 +12,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 _ELEVATION_DEG, _AZIMUTH_DEG = 40.0, 25.0
@@ -65,7 +65,7 @@ class Anisotropic:
         covariance = np.zeros((len(assembly), 6, 6))
         covariance[:, :3, :3] = _in_body(R, place @ place)
         covariance[:, 3:, 3:] = _in_body(R, turn @ turn)
-        return seen_at(assembly, shown, xi, covariance)
+        return observe_displaced(assembly, shown, xi, covariance)
 
 
 def line_of_sight() -> Array:

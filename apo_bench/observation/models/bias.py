@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 
@@ -39,4 +39,4 @@ class Bias:
         parts = sorted(assembly.solids)
         unit = dict(zip(parts, rng.standard_normal((len(parts), 6)), strict=True))
         xi = np.array([unit[operation.main] for operation in assembly.operations]).reshape(-1, 6) * sigma
-        return seen_at(assembly, shown, xi, np.diag(sigma**2))
+        return observe_displaced(assembly, shown, xi, np.diag(sigma**2))

@@ -13,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 
@@ -44,9 +44,9 @@ class BiasView:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit = rng.standard_normal(6)
         if not len(assembly):
-            return seen_at(assembly, shown, np.zeros((0, 6)), np.diag(sigma**2))
+            return observe_displaced(assembly, shown, np.zeros((0, 6)), np.diag(sigma**2))
         view = pose.adjoint(pose.inverse(shown.goals) @ self._middle(shown.goals))
-        return seen_at(assembly, shown, view @ (unit * sigma), self._covariance(view, sigma))
+        return observe_displaced(assembly, shown, view @ (unit * sigma), self._covariance(view, sigma))
 
     def _middle(self, goals: Array) -> Array:
         P = self.camera.T_world_camera.copy()

@@ -14,11 +14,11 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.rigid import rigid
+from apo_bench.geometry.rigid import is_rigid
 
-MIDDLE_M = np.array([0.12, 0.0, 0.03])
+WORKSPACE_MIDDLE_M = np.array([0.12, 0.0, 0.03])
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
-MIDDLE_M.flags.writeable = False
+WORKSPACE_MIDDLE_M.flags.writeable = False
 DISTANCE_M, ELEVATION_DEG, AZIMUTH_DEG = 0.9, 40.0, 25.0
 """How far from there it stands, how high above the table, and how far from the x axis of the world."""
 _BEHIND = 1e-9
@@ -32,7 +32,7 @@ def _default_pose() -> Array:
     x = np.array([-np.sin(round_z), np.cos(round_z), 0.0])
     T = np.eye(4)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    T[:3, 3] = MIDDLE_M - DISTANCE_M * z
+    T[:3, 3] = WORKSPACE_MIDDLE_M - DISTANCE_M * z
     return T
 
 
@@ -49,7 +49,7 @@ class Camera:
             T = frozen(self.T_world_camera, 4, 4)
         except (TypeError, ValueError) as error:
             raise InputError(f"the pose of a camera was given as something else: {error}.") from error
-        if not rigid(T[None])[0]:
+        if not is_rigid(T[None])[0]:
             raise InputError("the pose of a camera was given that is not rigid; give a rotation and a place in metres.")
         object.__setattr__(self, "T_world_camera", T)
 

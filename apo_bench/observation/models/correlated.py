@@ -13,7 +13,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 CORRELATION = 0.9
@@ -56,4 +56,4 @@ class Correlated:
         xi[:, 3:] = np.einsum("nji,nj->ni", shown.goals[:, :3, :3], turn[:, 0])
         R_seen = (shown.goals @ pose.exp(xi))[:, :3, :3]
         xi[:, :3] = np.einsum("nji,nj->ni", R_seen, place[:, 0])
-        return seen_at(assembly, shown, xi, np.diag(sigma**2))
+        return observe_displaced(assembly, shown, xi, np.diag(sigma**2))

@@ -14,10 +14,10 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.io.strict_csv import Row, read_csv
+from apo_bench.io.strict_csv import CsvRow, read_csv
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.fitted import UNITS, check_level, reported
+from apo_bench.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.residuals import Residuals
 
@@ -78,7 +78,7 @@ class Empirical:
     )
 
     def __post_init__(self) -> None:
-        check_level(self.level, self.sample.covariance)
+        check_measured_level(self.level, self.sample.covariance)
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         n, sample = len(assembly), self.sample
@@ -87,7 +87,7 @@ class Empirical:
         if len(sample.outliers):
             errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
         missed = chance[:, 2] < sample.missed
-        return reported(self.camera, self.level, shown, assembly, sign * errors, sample.covariance, missed)
+        return observe_in_ray_frames(self.camera, self.level, shown, assembly, sign * errors, sample.covariance, missed)
 
 
 def empirical_noise(path: Path, level: Level) -> Empirical:
@@ -152,7 +152,7 @@ def _read_once(path: Path, _changed: int, _size: int) -> Sample:
     return read_residuals(path)
 
 
-def _error(row: Row) -> list[float]:
+def _error(row: CsvRow) -> list[float]:
     return [row.number(name, _LARGEST_MM if name.endswith("_mm") else _LARGEST_DEG) for name in _ERRORS]
 
 
@@ -162,7 +162,7 @@ def _acting_where_seen(errors: list[list[float]]) -> Array:
     There a part that is turned by w is shifted by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d): so d
     is the shift that was measured, times the inverse of V(-w), and the pose that was estimated comes back exactly.
     """
-    measured = np.array(errors).reshape(-1, 6) * UNITS
+    measured = np.array(errors).reshape(-1, 6) * LEVEL_UNITS
     back = np.concatenate([np.zeros((len(measured), 3)), -measured[:, 3:]], axis=1)
     T = pose.exp(back)
     T[:, :3, 3] = measured[:, :3]

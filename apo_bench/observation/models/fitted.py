@@ -15,16 +15,16 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
-from apo_bench.observation.models.outliers import UNKNOWN, last_seen
+from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
 
 SMALLEST, LEAST_FREEDOM = 1e-4, 0.5
 """Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
 
 
-UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
+LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
 """[m] per mm and [rad] per degree."""
 LARGEST_M, LARGEST_RAD = 0.4, 2.0
 """A standard deviation per axis beyond which a level makes no sense."""
@@ -32,7 +32,7 @@ LARGEST_M, LARGEST_RAD = 0.4, 2.0
 
 @final
 @dataclass(frozen=True)
-class Measured:
+class MeasuredNoise:
     """The noise of a pose estimator, as a file states it."""
 
     source: str
@@ -59,7 +59,7 @@ class Fitted:
     inliers; an observation does not know which of its goals are outliers, and does not state them.
     """
 
-    measured: Measured
+    measured: MeasuredNoise
     level: Level
     camera: Camera = field(default_factory=Camera)
 
@@ -78,13 +78,13 @@ class Fitted:
     )
 
     def __post_init__(self) -> None:
-        check_level(self.level, self.covariance)
+        check_measured_level(self.level, self.covariance)
 
     @property
     def covariance(self) -> Array:
         """(6, 6), of inliers at level 1 in the frame of the ray, [m, rad]."""
         (across, along), (out, about) = self.measured.shift_mm.variances, self.measured.turn_deg.variances
-        return np.diag(np.array([across, across, along, out, out, about]) * UNITS**2)
+        return np.diag(np.array([across, across, along, out, out, about]) * LEVEL_UNITS**2)
 
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         n, measured = len(assembly), self.measured
@@ -92,10 +92,12 @@ class Fitted:
         gross, chance = _gross(measured, n, rng), rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
-        return reported(self.camera, self.level, shown, assembly, errors * UNITS, self.covariance, missed)
+        return observe_in_ray_frames(
+            self.camera, self.level, shown, assembly, errors * LEVEL_UNITS, self.covariance, missed
+        )
 
 
-def check_level(level: Level, covariance: Array) -> None:
+def check_measured_level(level: Level, covariance: Array) -> None:
     """Refuse a level at which what is measured would be worse than `LARGEST_M`, `LARGEST_RAD`.
 
     Args:
@@ -110,7 +112,7 @@ def check_level(level: Level, covariance: Array) -> None:
             )
 
 
-def reported(
+def observe_in_ray_frames(
     camera: Camera,
     level: Level,
     shown: Demonstration,
@@ -128,16 +130,16 @@ def reported(
     """
     scale = np.repeat([level.mm, level.deg], 3)
     xi = camera.twists(shown.goals, errors * scale)
-    found = seen_at(assembly, shown, xi, np.zeros((6, 6)))
-    made = seen_at(assembly, shown, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale)))
+    found = observe_displaced(assembly, shown, xi, np.zeros((6, 6)))
+    made = observe_displaced(assembly, shown, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale)))
     missed = missed & (max(level) > 0.0)
     goals, stated = made.goals.copy(), made.covariance.copy()
     goals[missed] = last_seen(assembly, shown.start, goals, ~missed)[missed]
-    stated[missed] = np.diag(UNKNOWN**2)
+    stated[missed] = np.diag(UNSEEN_DEVIATION**2)
     return replace(made, goals=goals, covariance=stated, seen=~missed)
 
 
-def _gross(measured: Measured, n: int, rng: np.random.Generator) -> Array:
+def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
     """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
     limit = measured.shift_mm.limit
     direction = rng.standard_normal((n, 3))

@@ -12,7 +12,7 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 FREEDOM = 5.0
@@ -49,4 +49,4 @@ class HeavyTailed:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit = rng.standard_normal((len(assembly), 6))
         scale = np.sqrt((self.freedom - 2.0) / rng.chisquare(self.freedom, (len(assembly), 1)))
-        return seen_at(assembly, shown, unit * scale * sigma, np.diag(sigma**2))
+        return observe_displaced(assembly, shown, unit * scale * sigma, np.diag(sigma**2))

@@ -14,9 +14,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.level import Level
 
-FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)
+COVARIANCE_FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)
 """Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
-FLOOR.flags.writeable = False
+COVARIANCE_FLOOR.flags.writeable = False
 
 
 @final
@@ -41,10 +41,10 @@ class Isotropic:
     def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         xi = rng.standard_normal((len(assembly), 6)) * sigma
-        return seen_at(assembly, shown, xi, np.diag(sigma**2))
+        return observe_displaced(assembly, shown, xi, np.diag(sigma**2))
 
 
-def seen_at(assembly: Assembly, shown: Demonstration, xi: Array, covariance: Array) -> Observation:
+def observe_displaced(assembly: Assembly, shown: Demonstration, xi: Array, covariance: Array) -> Observation:
     """Every goal seen at `T exp(xi)`; it states the covariance of xi, what carelessness adds, and at least the floor.
 
     Args:
@@ -57,11 +57,11 @@ def seen_at(assembly: Assembly, shown: Demonstration, xi: Array, covariance: Arr
 
 
 def floored(covariance: Array) -> Array:
-    """The least covariance (n, 6, 6) above the given one that says at least `FLOOR` in every direction.
+    """The least covariance (n, 6, 6) above the given one that says at least `COVARIANCE_FLOOR` in every direction.
 
     In units of the floor, eigenvalues below 1 are raised to 1, so the result is symmetric and positive definite.
     """
-    unit = np.outer(FLOOR, FLOOR)
+    unit = np.outer(COVARIANCE_FLOOR, COVARIANCE_FLOOR)
     w, V = np.linalg.eigh(covariance / unit)
     raised = unit * ((V * np.maximum(w, 1.0)[:, None]) @ np.swapaxes(V, -1, -2))
     return np.where(

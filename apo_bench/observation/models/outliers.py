@@ -14,16 +14,16 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 OUTLIERS, MISSES = 0.1, 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
 TIMES = 10.0
 """An outlier errs by so many times the level."""
-UNKNOWN = np.repeat([0.5, np.pi / 2.0], 3)
+UNSEEN_DEVIATION = np.repeat([0.5, np.pi / 2.0], 3)
 """Standard deviation that is stated of what was not seen, [m, rad]."""
-UNKNOWN.flags.writeable = False
+UNSEEN_DEVIATION.flags.writeable = False
 
 
 @final
@@ -55,8 +55,8 @@ class Outliers:
             f"{1.0 + OUTLIERS * (TIMES**2 - 1.0):g} times as large"
         ),
         notes=(
-            f"A missed operation has the pose at which its part was seen last, or started, with {UNKNOWN[0]:g} m and "
-            f"{np.degrees(UNKNOWN[3]):g} deg: no method carries it out",
+            f"A missed operation has the pose at which its part was seen last, or started, with "
+            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: no method carries it out",
             "At level 0 nothing is missed",
         ),
     )
@@ -77,11 +77,11 @@ class Outliers:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit, chance = rng.standard_normal((len(assembly), 6)), rng.random((len(assembly), 2))
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
-        made = seen_at(assembly, shown, unit * times * sigma, np.diag(sigma**2))
+        made = observe_displaced(assembly, shown, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
         goals, covariance = made.goals.copy(), made.covariance.copy()
         goals[missed] = last_seen(assembly, shown.start, goals, ~missed)[missed]
-        covariance[missed] = np.diag(UNKNOWN**2)
+        covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         return replace(made, goals=goals, covariance=covariance, seen=~missed)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 LEAST, MOST = 0.3, 4.0
@@ -45,7 +45,7 @@ class PerPart:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3) * np.array(
             [[factor[operation.main]] for operation in assembly.operations]
         ).reshape(-1, 1)
-        return seen_at(assembly, shown, unit * sigma, sigma[:, :, None] * np.eye(6) * sigma[:, None, :])
+        return observe_displaced(assembly, shown, unit * sigma, sigma[:, :, None] * np.eye(6) * sigma[:, None, :])
 
 
 def factors(parts: Iterable[str], rng: np.random.Generator) -> Mapping[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
-from apo_bench.files.bop import Located
+from apo_bench.files.bop import PoseRows
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 
@@ -72,7 +72,7 @@ class Residuals:
         return np.asarray(np.linalg.norm(self.turn_deg, axis=1))
 
 
-def compare(estimates: Located, truth: Located, scene: int | None = None) -> Residuals:
+def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = None) -> Residuals:
     """Match estimates to the truth and say how far off they are; of one scene, estimates of others do not count.
 
     Per image and object, every part that was there gets an estimate of its own so that the distances add up to the
@@ -81,7 +81,7 @@ def compare(estimates: Located, truth: Located, scene: int | None = None) -> Res
     """
     from scipy.spatial.transform import Rotation
 
-    partner = matched(estimates, truth)
+    partner = match_rows(estimates, truth)
     found, n = partner >= 0, len(partner)
     asked = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
     there = np.zeros((n, 4, 4))
@@ -111,7 +111,7 @@ def _nearest(R: Array) -> Array:
     return np.asarray(U @ Vt)
 
 
-def matched(estimates: Located, truth: Located) -> NDArray[np.int64]:
+def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     """The row of the estimates that belongs to each row of the truth, or -1, (n,)."""
     from scipy.optimize import linear_sum_assignment
 

@@ -10,9 +10,9 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.observation.models.anisotropic import ACROSS, ALONG, IN_IMAGE, OUT_OF_IMAGE
-from apo_bench.observation.models.camera import AZIMUTH_DEG, DISTANCE_M, ELEVATION_DEG, MIDDLE_M, Camera
+from apo_bench.observation.models.camera import AZIMUTH_DEG, DISTANCE_M, ELEVATION_DEG, WORKSPACE_MIDDLE_M, Camera
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 
@@ -42,8 +42,8 @@ class Sighted:
         frame="F of the ray from the camera to the origin of the part: the axes of the camera (OpenCV), turned the "
         "shortest way until z is the ray",
         parameters=(
-            f"camera = {DISTANCE_M:g} m from ({', '.join(f'{x:g}' for x in MIDDLE_M)}) m in the world, at which it "
-            f"looks, {ELEVATION_DEG:g} deg above the table and {AZIMUTH_DEG:g} deg from the x axis",
+            f"camera = {DISTANCE_M:g} m from ({', '.join(f'{x:g}' for x in WORKSPACE_MIDDLE_M)}) m in the world, at "
+            f"which it looks, {ELEVATION_DEG:g} deg above the table and {AZIMUTH_DEG:g} deg from the x axis",
             f"across = {ACROSS:g}, along = {ALONG:g}: of the position over the level, per axis",
             f"tilt = {OUT_OF_IMAGE:.3g}, about = {IN_IMAGE:g}: of the turn over the level, per axis out of the image, "
             "and in it",
@@ -56,5 +56,5 @@ class Sighted:
         mm, rad = self.level.mm * 1e-3, np.radians(self.level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
         xi = self.camera.twists(shown.goals, rng.standard_normal((len(assembly), 6)) * sigma)
-        seen = seen_at(assembly, shown, xi, np.zeros((6, 6)))
-        return seen_at(assembly, shown, xi, self.camera.covariance(seen.goals, np.diag(sigma**2)))
+        seen = observe_displaced(assembly, shown, xi, np.zeros((6, 6)))
+        return observe_displaced(assembly, shown, xi, self.camera.covariance(seen.goals, np.diag(sigma**2)))

@@ -12,9 +12,9 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import folds, nearest, symmetries
+from apo_bench.geometry.symmetry import folds, nearest_symmetry, symmetries
 from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.isotropic import seen_at
+from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Level
 
 WORSE, _MANY = 3.0, 3.0
@@ -68,9 +68,9 @@ class Symmetric:
             sigma, stated = self._deviations(folds(group))
             if np.any(unit[k] * sigma):
                 off = pose.exp(about @ (unit[k] * sigma))[None]
-                xi[k] = pose.log(off @ nearest(group, off))[0]
+                xi[k] = pose.log(off @ nearest_symmetry(group, off))[0]
             covariance[k] = about @ np.diag(stated**2) @ about.T
-        return seen_at(assembly, shown, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
+        return observe_displaced(assembly, shown, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 
     def _deviations(self, fold: Array) -> tuple[Array, Array]:
         """Those that are drawn and those that are stated, (6,) each, about the centre of volume, [m, rad]."""

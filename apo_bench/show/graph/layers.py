@@ -24,10 +24,10 @@ class Passing(NamedTuple):
     row: int
 
 
-Item = Node | Passing
-Chain = tuple[Item, ...]
-_Rows = tuple[tuple[Item, ...], ...]
-Links = list[tuple[Item, Item]]
+LayerItem = Node | Passing
+ArcChain = tuple[LayerItem, ...]
+_Rows = tuple[tuple[LayerItem, ...], ...]
+Links = list[tuple[LayerItem, LayerItem]]
 
 _NODE_WIDTH = 1.0
 _PASSING_WIDTH = 0.5
@@ -46,16 +46,16 @@ class Layers(NamedTuple):
     """The node below all rows, as wide as the picture: the work table."""
     rows: _Rows
     """From the lowest to the highest, each from left to right."""
-    chains: tuple[Chain, ...]
+    chains: tuple[ArcChain, ...]
     """The way of each arc from its manipulated to its environment node, the ground left out."""
 
 
-def layered(graph: Graph) -> Layers:
+def arrange_layers(graph: Graph) -> Layers:
     """Put every node into a row and order the rows."""
     ground = _ground(graph)
     heights = _heights(graph, ground)
     chains = tuple(_chain(i, arc, heights, ground) for i, arc in enumerate(graph.arcs))
-    rows: list[list[Item]] = [[] for _ in range(1 + max(heights.values(), default=-1))]
+    rows: list[list[LayerItem]] = [[] for _ in range(1 + max(heights.values(), default=-1))]
     for node, height in heights.items():
         rows[height].append(node)
     for item in dict.fromkeys(item for chain in chains for item in chain):
@@ -64,22 +64,22 @@ def layered(graph: Graph) -> Layers:
     return Layers(ground, _ordered(tuple(map(tuple, rows)), links_of(chains)), chains)
 
 
-def links_of(chains: Iterable[Chain]) -> Links:
+def links_of(chains: Iterable[ArcChain]) -> Links:
     """What stands one above the other in some chain."""
     return [pair for chain in chains for pair in pairwise(chain)]
 
 
-def abscissas(layers: Layers, rounds: int = 60) -> dict[Item, float]:
+def abscissas(layers: Layers, rounds: int = 60) -> dict[LayerItem, float]:
     """Where each item stands from left to right, in widths of a node: near what it is linked with, none overlapping.
 
     Rows take turns: each moves as little as possible, in squares, from the means of its neighbours; what has none
     closes up with the others. The leftmost item stands at half its width.
     """
-    near: dict[Item, list[Item]] = {item: [] for row in layers.rows for item in row}
+    near: dict[LayerItem, list[LayerItem]] = {item: [] for row in layers.rows for item in row}
     for a, b in links_of(layers.chains):
         near[a].append(b)
         near[b].append(a)
-    x: dict[Item, float] = {}
+    x: dict[LayerItem, float] = {}
     offsets = [_offsets(row) for row in layers.rows]
     for row, offset in zip(layers.rows, offsets, strict=True):
         x.update(zip(row, offset - offset[-1] / 2, strict=True))
@@ -93,7 +93,7 @@ def abscissas(layers: Layers, rounds: int = 60) -> dict[Item, float]:
     return {item: float(at - left) for item, at in x.items()}
 
 
-def width(item: Item) -> float:
+def width(item: LayerItem) -> float:
     """How much room an item takes, in widths of a node."""
     return _PASSING_WIDTH if isinstance(item, Passing) else _NODE_WIDTH
 
@@ -114,7 +114,7 @@ def _heights(graph: Graph, ground: Node | None) -> dict[Node, int]:
     return heights
 
 
-def _chain(i: int, arc: Arc, heights: dict[Node, int], ground: Node | None) -> Chain:
+def _chain(i: int, arc: Arc, heights: dict[Node, int], ground: Node | None) -> ArcChain:
     end = () if arc.environment == ground else (arc.environment,)
     below = heights[arc.environment] if end else -1
     passing = (Passing(i, row) for row in range(heights[arc.manipulated] - 1, below, -1))
@@ -155,7 +155,7 @@ def _cost(rows: _Rows, links: Links) -> tuple[int, float]:
     return crossings, sum((top - end) ** 2 for _, top, end in ends)
 
 
-def _offsets(row: tuple[Item, ...]) -> Array:
+def _offsets(row: tuple[LayerItem, ...]) -> Array:
     """How far right of the first item each one stands at least."""
     steps = [(width(a) + width(b)) / 2 + _SPACE for a, b in pairwise(row)]
     return np.concatenate([[0.0], np.cumsum(steps)])

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.assembly.graph import Graph, Node
 from apo_bench.geometry.arrays import Array
-from apo_bench.show.graph.layers import Chain, Item, Layers, Passing, abscissas, layered, width
+from apo_bench.show.graph.layers import ArcChain, LayerItem, Layers, Passing, abscissas, arrange_layers, width
 
 _NODE_HEIGHT = 0.5
 _GAP = 0.72
@@ -36,7 +36,7 @@ class Rectangle(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Layout:
+class GraphLayout:
     """A picture of a graph, yet to be drawn."""
 
     width: float
@@ -48,9 +48,9 @@ class Layout:
     """The room of the label of each arrow."""
 
 
-def arranged(graph: Graph, texts: Sequence[str]) -> Layout:
+def arrange(graph: Graph, texts: Sequence[str]) -> GraphLayout:
     """Lay out a graph whose arcs are labelled with these texts."""
-    layers = layered(graph)
+    layers = arrange_layers(graph)
     unit = max((_room(node) for node in graph.nodes), default=1.0)
     x = {item: unit * at for item, at in abscissas(layers).items()}
     wide = max((at + unit * width(item) / 2 for item, at in x.items()), default=unit)
@@ -59,7 +59,7 @@ def arranged(graph: Graph, texts: Sequence[str]) -> Layout:
         boxes[layers.ground] = Rectangle(wide / 2, _level(-1), wide, _NODE_HEIGHT)
     routes = tuple(_routes(layers, x, unit))
     height = _level(len(layers.rows) - 1) + _NODE_HEIGHT / 2
-    return Layout(wide, height, boxes, routes, tuple(_labels(routes, texts)))
+    return GraphLayout(wide, height, boxes, routes, tuple(_labels(routes, texts)))
 
 
 def _room(node: Node) -> float:
@@ -77,7 +77,7 @@ def _nodes(layers: Layers) -> Iterator[tuple[int, Node]]:
     return ((j, item) for j, row in enumerate(layers.rows) for item in row if isinstance(item, Node))
 
 
-def _routes(layers: Layers, x: Mapping[Item, float], unit: float) -> Iterator[Array]:
+def _routes(layers: Layers, x: Mapping[LayerItem, float], unit: float) -> Iterator[Array]:
     """Straight from row to row, upright past a row, upright to the ground."""
     rows = {item: j for j, row in enumerate(layers.rows) for item in row}
     leave = _ports(layers.chains, x, unit, 0, lambda chain: chain[1] if len(chain) > 1 else chain[0])
@@ -96,10 +96,14 @@ def _routes(layers: Layers, x: Mapping[Item, float], unit: float) -> Iterator[Ar
 
 
 def _ports(
-    chains: Sequence[Chain], x: Mapping[Item, float], unit: float, end: int, neighbour: Callable[[Chain], Item]
+    chains: Sequence[ArcChain],
+    x: Mapping[LayerItem, float],
+    unit: float,
+    end: int,
+    neighbour: Callable[[ArcChain], LayerItem],
 ) -> dict[int, float]:
     """Where each arrow meets the box at that end of its chain: side by side, in the order of where they come from."""
-    meeting: dict[Item, list[int]] = {}
+    meeting: dict[LayerItem, list[int]] = {}
     for i, chain in enumerate(chains):
         if isinstance(chain[end], Node) and (end == 0 or len(chain) > 1):
             meeting.setdefault(chain[end], []).append(i)
@@ -150,10 +154,10 @@ def _inside(room: Rectangle, points: Array) -> Array:
 
 def _hidden(room: Rectangle, others: Sequence[Rectangle]) -> float:
     """The area that a rectangle has in common with others, [square inches]."""
-    return sum(overlap(room, other) for other in others)
+    return sum(shared_area(room, other) for other in others)
 
 
-def overlap(a: Rectangle, b: Rectangle) -> float:
+def shared_area(a: Rectangle, b: Rectangle) -> float:
     """The area that two rectangles have in common, [square inches]."""
     wide = (a.width + b.width) / 2 - abs(a.x - b.x)
     high = (a.height + b.height) / 2 - abs(a.y - b.y)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from apo_bench.assembly.graph import Arc, Graph, Node, Residuals
-from apo_bench.show.graph.layout import Layout, arranged
+from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
+from apo_bench.show.graph.layout import GraphLayout, arrange
 
 _INK, _GONE, _ALARM = "#222222", "#8A8A8A", "#C8102E"
 _GROUND = "#E4E4E4"
@@ -25,7 +25,7 @@ def draw_graph(
     path: Path,
     *,
     title: str,
-    residuals: Residuals | None = None,
+    residuals: ArcResiduals | None = None,
     gap_m: float = 0.0,
     colors: _Colors | None = None,
 ) -> None:
@@ -41,7 +41,7 @@ def draw_graph(
 
     measured = [None] * len(graph.arcs) if residuals is None else list(residuals)
     texts = [_label(arc, residual, residuals is not None) for arc, residual in zip(graph.arcs, measured, strict=True)]
-    layout = arranged(graph, texts)
+    layout = arrange(graph, texts)
     words = _words(graph, residuals is not None, gap_m)
     width = max(layout.width, 0.078 * len(title), 0.06 * len(words)) + 2 * _MARGIN
     height = layout.height + 2 * _MARGIN + _HEAD + (_FOOT if words else 0.0)
@@ -58,7 +58,7 @@ def draw_graph(
         figure.savefig(path, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
 
 
-def _canvas(figure: Any, layout: Layout, width: float, height: float, words: bool) -> Any:
+def _canvas(figure: Any, layout: GraphLayout, width: float, height: float, words: bool) -> Any:
     """Axes over the whole figure, in inches, the graph in the middle."""
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     left = (width - layout.width) / 2
@@ -69,7 +69,7 @@ def _canvas(figure: Any, layout: Layout, width: float, height: float, words: boo
     return axes
 
 
-def _node(axes: Any, layout: Layout, node: Node, stands: bool, color: tuple[float, float, float] | None) -> None:
+def _node(axes: Any, layout: GraphLayout, node: Node, stands: bool, color: tuple[float, float, float] | None) -> None:
     from matplotlib.patches import FancyBboxPatch
 
     box = layout.boxes[node]
@@ -93,7 +93,7 @@ def _node(axes: Any, layout: Layout, node: Node, stands: bool, color: tuple[floa
     axes.text(box.x, box.y - 0.11, _formula(node), fontsize=9.5, **ink)
 
 
-def _arrow(axes: Any, layout: Layout, i: int, arc: Arc, text: str, alarming: bool) -> None:
+def _arrow(axes: Any, layout: GraphLayout, i: int, arc: Arc, text: str, alarming: bool) -> None:
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.path import Path as Outline
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from apo_bench.assembly.graph import Arc, Graph, Node, Residuals
+from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
 from apo_bench.assembly.topology import spelled
 
 _GRAPH = "apo-bench/graph/1"
@@ -16,7 +16,7 @@ def graph_title(scenario: str, graph: Graph) -> str:
     return f"{scenario} after operation {graph.step}"
 
 
-def graph_lines(scenario: str, graph: Graph, residuals: Residuals | None = None, gap_m: float = 0.0) -> list[str]:
+def graph_lines(scenario: str, graph: Graph, residuals: ArcResiduals | None = None, gap_m: float = 0.0) -> list[str]:
     """Every part at its placements with the ODL, then every arc: when it was made and lost, the faces, the residual."""
     nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
     arcs: list[tuple[str, ...]] = [(str(arc), _times(arc), f"[{' '.join(arc.pairs)}]") for arc in graph.arcs]
@@ -25,9 +25,9 @@ def graph_lines(scenario: str, graph: Graph, residuals: Residuals | None = None,
     return [graph_title(scenario, graph), "", *_columns(nodes), "", *_columns(arcs)]
 
 
-def graph_form(scenario: str, graph: Graph, residuals: Residuals | None = None) -> dict[str, Any]:
+def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals | None = None) -> dict[str, Any]:
     """What `json` can write: operations numbered from 1, residuals in mm (null where unknown)."""
-    measured: Residuals = [None] * len(graph.arcs) if residuals is None else residuals
+    measured: ArcResiduals = [None] * len(graph.arcs) if residuals is None else residuals
     return {
         "schema": _GRAPH,
         "scenario": scenario,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.fingers import change
-from apo_bench.simulation.execution.search import after, press_in
-from apo_bench.simulation.execution.transfer import ASIDE_M, UP, Grip, Transfer, aim
-from apo_bench.simulation.robot.paths import moved, smooth, steady
+from apo_bench.simulation.execution.search import after_search, press_in
+from apo_bench.simulation.execution.transfer import ASIDE_M, UP, Grip, Transfer, first_contact_pose
+from apo_bench.simulation.robot.paths import shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 
 _PLACE, _TOUCH, _INSERT, _SLIDE = 0.06, 0.01, 0.06, 0.005
@@ -43,21 +43,21 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
     robot.stage = "attach"
     guard, rise, found = Guard(t.into.way, t.insert_n), t.floats, None
     if t.into.left is not None and second is not None:
-        there = moved(moved(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
+        there = shifted(shifted(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
         left, found = press_in(robot, t, grip, there @ grip.T_part_tip, _INSERT, guard, ARRIVED_M)
         if left > ARRIVED_M:
             return left + t.into.left, grip
-        change(robot, t, grip, second, after(found, moved(there, UP, -rise) @ second.T_part_tip))
+        change(robot, t, grip, second, after_search(found, shifted(there, UP, -rise) @ second.T_part_tip))
         grip, rise = second, t.clearance
-        robot.follow(smooth(robot.T, moved(robot.T, UP, rise), 0.01))
-    goal = after(found, moved(aim(t) @ grip.T_part_tip, UP, rise))
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
+    goal = after_search(found, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if any(macro.name == "move-to-bottom" for macro in t.macros):
-        left, found = press_in(robot, t, grip, moved(goal, t.into.way, -_BOTTOM_M), _INSERT, guard, ARRIVED_M)
+        left, found = press_in(robot, t, grip, shifted(goal, t.into.way, -_BOTTOM_M), _INSERT, guard, ARRIVED_M)
         if left == 0.0:
-            robot.follow(steady(robot.T, after(found, moved(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard)
+            robot.follow(steady(robot.T, after_search(found, shifted(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard)
     else:
         left, _ = press_in(robot, t, grip, goal, _INSERT, guard, ARRIVED_M)
-    lower = moved(robot.T, UP, -rise - _OVERTRAVEL_M)
+    lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
     return left, grip
@@ -67,10 +67,10 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
     """From above, slowly where contact may come any moment, until the part stands; nothing of the line is left then."""
     robot.stage = "attach"
     down = Guard(t.into.way, t.place_n)
-    goal = aim(t) @ grip.T_part_tip
-    left, found = press_in(robot, t, grip, moved(goal, t.into.way, -t.slow), _PLACE, down, 0.0)
+    goal = first_contact_pose(t) @ grip.T_part_tip
+    left, found = press_in(robot, t, grip, shifted(goal, t.into.way, -t.slow), _PLACE, down, 0.0)
     if left == 0.0:
-        end = after(found, moved(goal, t.into.way, _OVERTRAVEL_M))
+        end = after_search(found, shifted(goal, t.into.way, _OVERTRAVEL_M))
         press_in(robot, t, grip, end, _TOUCH, down, _OVERTRAVEL_M + t.depth / 2)
     robot.wait(0.05)
     return 0.0
@@ -78,31 +78,31 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
 
 def _slide(robot: Robot, t: Transfer, side: Array) -> None:
     """Off the floor by a hair, sideways until it touches, and down again."""
-    robot.follow(smooth(robot.T, moved(robot.T, UP, _OFF_M), 0.01))
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
     robot.wait(0.05)
-    robot.follow(steady(robot.T, moved(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
-    robot.follow(steady(robot.T, moved(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))
+    robot.follow(steady(robot.T, shifted(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
+    robot.follow(steady(robot.T, shifted(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))
     robot.wait(0.05)
 
 
 def pull_out(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> Grip:
     """Backwards along the way of an insertion; returns the grip at its end."""
     robot.stage = "lift"
-    robot.follow(smooth(robot.T, moved(robot.T, UP, t.floats), 0.01))
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
     if t.out.left is None or second is None:
-        robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.travel), _PULL))
+        robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.travel), _PULL))
         return grip
-    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, -t.out.left), _PULL))
-    part = moved(t.T_world_start, t.out.way, -t.out.left)
+    robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.left), _PULL))
+    part = shifted(t.T_world_start, t.out.way, -t.out.left)
     change(robot, t, grip, second, part @ second.T_part_tip)
-    robot.follow(smooth(robot.T, moved(robot.T, UP, t.floats), 0.01))
-    robot.follow(smooth(robot.T, moved(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
+    robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
     return second
 
 
 def leave(robot: Robot, t: Transfer) -> None:
     """Off what the part touches at its side, before it is lifted."""
     if t.away:
-        robot.follow(smooth(robot.T, moved(robot.T, UP, _OFF_M), 0.01))
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
     for side in t.away:
-        robot.follow(smooth(robot.T, moved(robot.T, side, ASIDE_M), _LEAVE))
+        robot.follow(smooth(robot.T, shifted(robot.T, side, ASIDE_M), _LEAVE))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from apo_bench.simulation.execution.attach import ARRIVED_M, attach, leave, pull_out
-from apo_bench.simulation.execution.fingers import centre, check_grasp, depart, grasp, release
-from apo_bench.simulation.execution.transfer import UP, Grip, Transfer, aim
-from apo_bench.simulation.robot.paths import at_height, moved, smooth
+from apo_bench.simulation.execution.fingers import centre, check_hold, depart, grasp, release
+from apo_bench.simulation.execution.transfer import UP, Grip, Transfer, first_contact_pose
+from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
 _LIFT, _CARRY, _LOWER = 0.25, 0.35, 0.2
@@ -53,19 +53,19 @@ def _pick(robot: Robot, t: Transfer, grip: Grip) -> None:
 def _lift(robot: Robot, t: Transfer) -> None:
     robot.stage = "lift"
     if t.carried:
-        robot.follow(smooth(robot.T, moved(robot.T, UP, 0.004), 0.02))
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
     robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT))
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "carry"
-    before = moved(aim(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
+    before = shifted(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
     if t.into.level:
-        before = moved(before, UP, t.floats)
+        before = shifted(before, UP, t.floats)
     robot.go(at_height(before, max(t.safe, before[2, 3])), _CARRY)
     robot.follow(smooth(robot.T, before, _LOWER))
     robot.wait(0.1)
-    check_grasp(robot, grip)
+    check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.load() < _LOST_LOAD * t.weight_n:
         raise Halt("carry", "lost_grasp", " or ".join(t.carried))

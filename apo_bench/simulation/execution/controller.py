@@ -8,11 +8,11 @@ import numpy as np
 
 from apo_bench.assembly.goals import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step
 from apo_bench.geometry.arrays import Array
-from apo_bench.prediction.stability import unstable
+from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, moves, unreachable
-from apo_bench.simulation.execution.replay_cache import Branches, marks
+from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import sleeping, snapshot
@@ -35,7 +35,7 @@ def replay(
     watch: Watch | None = None,
     parts_at: Poses | None = None,
     fidelity: str = "full",
-    branches: Branches | None = None,
+    branches: ReplayCache | None = None,
     searches: bool = False,
     most_s: float = math.inf,
 ) -> ReplayResult:
@@ -54,8 +54,8 @@ def replay(
     too_long = len(plan.schedule) * _SHORTEST_STEP_S > most_s
     todo = () if too_long else moves(plan, scene, searches)
     refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
-    branches = Branches() if branches is None or watch is not None else branches
-    way = marks(scene, start, fidelity, todo)
+    branches = ReplayCache() if branches is None or watch is not None else branches
+    way = cache_keys(scene, start, fidelity, todo)
     ended = None if refused or not way or most_s < math.inf else branches.ended(way[-1])
     if ended is not None:
         return ended
@@ -79,7 +79,7 @@ def replay(
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
     for upto, goals in _stages(plan):
-        k = unstable(plan.assembly.first(upto), plan.start, goals[:upto])
+        k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return _outcome(plan, "plan", "unstable_goal", k)
     for move in todo:
@@ -106,7 +106,7 @@ def _carry_out(
     todo: tuple[Move, ...],
     after: list[Snapshot | None],
     timeline: list[tuple[Step, float]],
-    branches: Branches,
+    branches: ReplayCache,
     way: list[bytes],
     most_s: float,
 ) -> Outcome:

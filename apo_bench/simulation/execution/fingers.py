@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.execution.transfer import Grip, Transfer, hover
-from apo_bench.simulation.robot.paths import at_height, moved, smooth
+from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
+from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
 _FREE, _NEAR = 1.4, 0.55
@@ -18,7 +18,7 @@ _LOST_M = 0.002
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
-    above = at_height(at, hover(at))
+    above = at_height(at, hover_pose(at))
     robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
     robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=3.0)
     robot.handle(t.part)
@@ -30,7 +30,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
         robot.weld(t.part, True)
     else:
         robot.fingers(grip.half_width - robot.arm.squeeze_m, 0.25)
-    check_grasp(robot, grip)
+    check_hold(robot, grip)
 
 
 def release(robot: Robot, t: Transfer, grip: Grip) -> None:
@@ -43,7 +43,7 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
-    robot.follow(smooth(robot.T, moved(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
+    robot.follow(smooth(robot.T, shifted(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
     robot.handle(None)
     robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
 
@@ -66,6 +66,6 @@ def centre(robot: Robot, t: Transfer, grip: Grip) -> None:
     depart(robot, t)
 
 
-def check_grasp(robot: Robot, grip: Grip) -> None:
+def check_hold(robot: Robot, grip: Grip) -> None:
     if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - _LOST_M:
         raise Halt(robot.stage, "lost_grasp")

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import depths, upright
+from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
 from apo_bench.geometry.solid import Box, Solid
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.gripper import gripper_boxes
@@ -37,7 +37,7 @@ class Obstacle(NamedTuple):
     T: Array
 
 
-class Place(NamedTuple):
+class RestingPart(NamedTuple):
     """The part at rest, and what stands around it."""
 
     T: Array
@@ -67,20 +67,20 @@ def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str])
     return tuple(Obstacle(solid.boxes, poses[part]) for part, solid in solids.items() if part not in without)
 
 
-def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place]) -> Grasp:
+def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
     if _clear(scene, part, [preferred], places, _MARGINS_M[-1]):
         return preferred
     return _first_clear(scene, part, _candidates(scene, part, places[0].T), places) or preferred
 
 
-def clear_across(scene: Scene, part: str, across: Array, place: Place) -> Grasp | None:
+def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
     """The first clear grasp that closes along a direction of the part, or None."""
     able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ across) > 0.99]
     return _first_clear(scene, part, able, [place])
 
 
-def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Place], stroke: Stroke) -> Grips:
+def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
     """The grasp for a stroke; if the gripper would strike something on the way, one to begin and one to end with.
 
     Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
@@ -88,7 +88,7 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Plac
     Args:
         places: Where the part is picked up or put down besides, clear for the grasp that is used there.
     """
-    ends = (*places, Place(stroke.T, stroke.around))
+    ends = (*places, RestingPart(stroke.T, stroke.around))
     least = _MARGINS_M[-1]
     if _clear(scene, part, [preferred], ends, least) and not _nearest(scene, part, preferred, stroke, least):
         return Grips(preferred)
@@ -123,10 +123,10 @@ def _half_width(solid: Solid, grasp: Grasp) -> float:
 
 def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
     """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
-    goal = Place(stroke.T, stroke.around)
+    goal = RestingPart(stroke.T, stroke.around)
     last = _clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin)
     for left, first in able:
-        change = Place(_back(stroke, left), stroke.around)
+        change = RestingPart(_back(stroke, left), stroke.around)
         if 0.0 < left < _MOST_LEFT_M and _clear(scene, part, [first], [change], margin):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
             for second in _clear(scene, part, last, [change], margin):
@@ -153,7 +153,7 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
     return found
 
 
-def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place]) -> Grasp | None:
+def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart]) -> Grasp | None:
     """The first of those around which there is most room at every place, or None."""
     for margin in _MARGINS_M:
         clear = _clear(scene, part, grasps, places, margin)
@@ -162,7 +162,9 @@ def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Seque
     return None
 
 
-def _clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[Place], margin: float) -> list[Grasp]:
+def _clear(
+    scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
+) -> list[Grasp]:
     """Those at which the open gripper, about to close or having let go, strikes nothing at any place."""
     kept = []
     for across, those in groupby(grasps, key=lambda grasp: tuple(grasp.across)):
@@ -197,10 +199,12 @@ def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[O
     What its way does not come by counts as far away.
     """
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
-    low, high = upright(boxes, R, np.zeros(3))
+    low, high = upright_bounds(boxes, R, np.zeros(3))
     low, high = low + at.min(axis=0), high + at.max(axis=0)
-    met = [each for each in around if _overlap(low, high, *upright(each.boxes, each.T[:3, :3], each.T[:3, 3]))]
-    return np.max([np.full(len(at), -1.0), *(depths(boxes, R, at, each.boxes, each.T) for each in met)], axis=0)
+    met = [each for each in around if _overlap(low, high, *upright_bounds(each.boxes, each.T[:3, :3], each.T[:3, 3]))]
+    return np.max(
+        [np.full(len(at), -1.0), *(intrusion_depths(boxes, R, at, each.boxes, each.T) for each in met)], axis=0
+    )
 
 
 def _overlap(low: Array, high: Array, bottom: Array, top: Array) -> bool:

@@ -7,17 +7,17 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.line import Attach
-from apo_bench.simulation.execution.transfer import Line, Motion
+from apo_bench.simulation.execution.transfer import ApproachLine, Motion
 
 PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
 """How a part that was taken off is put down, in the world."""
 
 
-def line(found: Arrival, T: Array) -> Line:
+def arrival_line(found: Arrival, T: Array) -> ApproachLine:
     """The line on which a part arrives at T; straight down if it touches nothing there that is known of."""
     if not found.touched:
-        return Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
-    return Line(T[:3, :3] @ found.line.direction, found.line.travel_m)
+        return ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
+    return ApproachLine(T[:3, :3] @ found.line.direction, found.line.travel_m)
 
 
 def motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
@@ -27,7 +27,7 @@ def motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion,
     return (*made, *(Motion("slide-to-contact", side) for side in sides))
 
 
-def departing(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
+def departure_motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
     """The same backwards, for a part that leaves T: off its sides, the last first, then out of what encloses it."""
     out = [macro for macro in found.departs if macro.length_m is not None]
     drawn = [Motion(macro.name, T[:3, :3] @ found.own(macro.direction)) for macro in out]

@@ -12,12 +12,12 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import extent
-from apo_bench.insertion.surroundings import OVER_M, ends_of, later_walls, neighbours, slides, slow_before
-from apo_bench.scenario.nominal import understood
+from apo_bench.insertion.surroundings import OVER_M, ends_of, later_walls, neighbours, slide_directions, slow_before
+from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (
     Grips,
-    Place,
+    RestingPart,
     Stroke,
     clear_across,
     grasp_at,
@@ -25,8 +25,8 @@ from apo_bench.simulation.execution.grasping import (
     obstacles,
     tip_frame,
 )
-from apo_bench.simulation.execution.motions import PUT_DOWN, departing, line, motions
-from apo_bench.simulation.execution.transfer import SAFE_M, Grip, Line, Motion, Transfer, key_poses
+from apo_bench.simulation.execution.motions import PUT_DOWN, arrival_line, departure_motions, motions
+from apo_bench.simulation.execution.transfer import SAFE_M, ApproachLine, Grip, Motion, Transfer, key_poses
 from apo_bench.simulation.robot.paths import turn_from
 from apo_bench.simulation.scene.scene import Scene
 
@@ -119,15 +119,15 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: 
     part, start, target = operation.main, believed[operation.main], task.target
     T = target @ pose.inverse(start)
     after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
-    what = understood(scene.scenario)[k]
+    what = nominal_operations(scene.scenario)[k]
     leaves = what.after if undo or task.was == k else what.before
     comes = what.before if undo else what.after
     contacts = tuple(each.contact for each in comes.touched)
-    into, inserts = line(comes, target), any(macro.inserts for macro in comes.macros)
+    into, inserts = arrival_line(comes, target), any(macro.inserts for macro in comes.macros)
     if undo and not into.level:
-        into = Line(PUT_DOWN.direction, PUT_DOWN.travel_m)
-    grips, out, into = _grips(scene, task, part, line(leaves, start), into, believed, after)
-    macros = motions(comes, target, slides(plan.assembly, comes, after))
+        into = ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
+    grips, out, into = _grips(scene, task, part, arrival_line(leaves, start), into, believed, after)
+    macros = motions(comes, target, slide_directions(plan.assembly, comes, after))
     top, bottom = ends_of(plan.assembly, operation.moves, believed)
     hangs = float((start @ grips[0].T_part_tip)[2, 3]) - bottom
     weight = {p: _GRAVITY * _mass(scene, p) for p in scene.work.free}
@@ -142,7 +142,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: 
         centring=() if undo or into.level else _centring(plan.assembly, scene, k, grips[-1], macros, after),
         out=out,
         into=into,
-        departs=departing(leaves, start, slides(plan.assembly, leaves, believed)),
+        departs=departure_motions(leaves, start, slide_directions(plan.assembly, leaves, believed)),
         macros=macros,
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
@@ -170,27 +170,27 @@ def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: A
 
 
 def _is_level(plan: Plan, scene: Scene, k: int) -> bool:
-    return line(understood(scene.scenario)[k].after, plan.goals[k]).level
+    return arrival_line(nominal_operations(scene.scenario)[k].after, plan.goals[k]).level
 
 
 def _grips(
-    scene: Scene, task: _Task, part: str, out: Line, into: Line, believed: Poses, after: Poses
-) -> tuple[tuple[Grip, ...], Line, Line]:
+    scene: Scene, task: _Task, part: str, out: ApproachLine, into: ApproachLine, believed: Poses, after: Poses
+) -> tuple[tuple[Grip, ...], ApproachLine, ApproachLine]:
     """Where to hold the part, and both lines with the place where the grip changes."""
     solids, preferred = scene.scenario.assembly.solids, scene.scenario.grasps[task.step.operation]
     if task.was is not None and out.level:
         preferred = scene.scenario.grasps[task.was]
-    start = Place(believed[part], obstacles(solids, believed, (part,)))
-    goal = Place(after[part], obstacles(solids, after, (part,)))
+    start = RestingPart(believed[part], obstacles(solids, believed, (part,)))
+    goal = RestingPart(after[part], obstacles(solids, after, (part,)))
     if into.level:
         stroke = Stroke(goal.T, into.way, into.travel, goal.around)
         found = grips_along(scene, part, preferred, (start,), stroke)
-        into = Line(into.way, into.travel, found.left)
+        into = ApproachLine(into.way, into.travel, found.left)
     elif out.level:
         stroke = Stroke(start.T, out.way, out.travel, start.around)
         backwards = grips_along(scene, part, preferred, (goal,), stroke)
         found = Grips(backwards.second or backwards.first, backwards.left, backwards.first)
-        out = Line(out.way, out.travel, backwards.left)
+        out = ApproachLine(out.way, out.travel, backwards.left)
     else:
         found = Grips(grasp_at(scene, part, preferred, (start, goal)))
     grasps = (found.first, found.second) if found.left is not None and found.second is not None else (found.first,)
@@ -218,7 +218,7 @@ def _centring(
     part, T = assembly.operations[k].main, after[assembly.operations[k].main]
     sides = [macro.way for macro in macros if macro.name == "slide-to-contact"]
     settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
-    place = Place(T, obstacles(assembly.solids, after, (part,)))
+    place = RestingPart(T, obstacles(assembly.solids, after, (part,)))
     grips = []
     for wall in later_walls(assembly, k, part):
         if abs((T[:3, :3] @ wall)[2]) < 0.5 and all(abs(T[:3, :3] @ wall @ way) < 0.5 for way in settled):

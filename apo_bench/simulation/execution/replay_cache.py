@@ -21,7 +21,7 @@ from apo_bench.simulation.scene.world import awaken
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
-class Kept(NamedTuple):
+class SavedState(NamedTuple):
     """All that decides how a replay goes on."""
 
     state: Any
@@ -35,11 +35,11 @@ class Kept(NamedTuple):
 
 
 @final
-class Branches:
+class ReplayCache:
     """What the replays of one scene have in common, kept for the trials of one seed; they run in one process."""
 
     def __init__(self) -> None:
-        self._kept: dict[bytes, Kept] = {}
+        self._kept: dict[bytes, SavedState] = {}
         self._ended: dict[bytes, ReplayResult] = {}
 
     def ended(self, mark: bytes) -> ReplayResult | None:
@@ -63,11 +63,11 @@ class Branches:
             model, data = robot.model, robot.data
             state = np.zeros(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
-            self._kept[mark] = Kept(
+            self._kept[mark] = SavedState(
                 state, data.sensordata.copy(), model.eq_data.copy(), robot.memory(), grip, tuple(after), tuple(timeline)
             )
 
-    def resume(self, marks: Sequence[bytes], robot: Robot) -> tuple[int, Kept | None]:
+    def resume(self, marks: Sequence[bytes], robot: Robot) -> tuple[int, SavedState | None]:
         """Take up the furthest state that was kept; returns how many of the marks lie behind it, and what was kept."""
         for i in range(len(marks), 0, -1):
             kept = self._kept.get(marks[i - 1])
@@ -81,7 +81,7 @@ class Branches:
         return 0, None
 
 
-def marks(scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]]) -> list[bytes]:
+def cache_keys(scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]]) -> list[bytes]:
     """What has led to each state: two marks for each move, one when the part is lifted, one when the move is done."""
     digest = hashlib.sha256(_bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity)))
     found = []

@@ -11,7 +11,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
-from apo_bench.simulation.robot.paths import moved, smooth, steady
+from apo_bench.simulation.robot.paths import shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 
 _YAWS_DEG, _YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
@@ -42,24 +42,24 @@ def press_in(
     for _ in range(_SEARCHES):
         if left <= near or aside >= RADIUS_M:
             break
-        stopped = moved(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
-        more = search(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
+        stopped = shifted(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
+        more = search_hole(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
         if more is None:
             break
         guard = Guard(more[:3, :3] @ guard.way, guard.newton)
-        more = moved(more, _ease_in(robot, more @ end, guard), 1.0)
-        found, end = after(found, more), more @ end
+        more = shifted(more, _ease_in(robot, more @ end, guard), 1.0)
+        found, end = after_search(found, more), more @ end
         left = float((end - robot.T)[:3, 3] @ guard.way)
         aside = float(np.linalg.norm((end - meant)[:3, 3]))
     return left, found
 
 
-def after(found: Array | None, T: Array) -> Array:
+def after_search(found: Array | None, T: Array) -> Array:
     """A pose that was meant, as it has to be after a search."""
     return T if found is None else found @ T
 
 
-def search(robot: Robot, stopped: Array, front: Array, guard: Guard, press: float, radius: float) -> Array | None:
+def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press: float, radius: float) -> Array | None:
     """Look for the hole across a motion that was stopped; the tip is where it was stopped again if there is none.
 
     Args:
@@ -71,7 +71,7 @@ def search(robot: Robot, stopped: Array, front: Array, guard: Guard, press: floa
     Returns:
         What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
     """
-    off = moved(stopped, guard.way, -_BACK_M)
+    off = shifted(stopped, guard.way, -_BACK_M)
     for yaw in (0.0, *_YAWS_DEG):
         turn = _turned(yaw, front)
         _bring(robot, turn @ off, guard.way)
@@ -79,7 +79,7 @@ def search(robot: Robot, stopped: Array, front: Array, guard: Guard, press: floa
         spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
         robot.servo(spiral)
         if spiral.found:
-            return moved(turn, spiral.aside, 1.0)
+            return shifted(turn, spiral.aside, 1.0)
     _bring(robot, off, guard.way)
     robot.follow(smooth(robot.T, stopped, _BACK), guard)
     return None
@@ -98,7 +98,7 @@ def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
 
 def _bring(robot: Robot, T: Array, way: Array) -> None:
     """Back first, so that nothing is touched on the way."""
-    robot.follow(smooth(robot.T, moved(robot.T, way, -_BACK_M), _BACK))
+    robot.follow(smooth(robot.T, shifted(robot.T, way, -_BACK_M), _BACK))
     robot.follow(smooth(robot.T, T, _BRING))
 
 

@@ -8,9 +8,9 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.insertion.macros import Name
+from apo_bench.insertion.macros import MacroName
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
-from apo_bench.simulation.robot.paths import at_height, moved
+from apo_bench.simulation.robot.paths import at_height, shifted
 
 UP = np.array([0.0, 0.0, 1.0])
 SAFE_M = 0.15
@@ -32,7 +32,7 @@ class Grip(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Line:
+class ApproachLine:
     """A straight way of the part, in the direction in which the part is attached."""
 
     way: Array
@@ -49,7 +49,7 @@ class Line:
 class Motion(NamedTuple):
     """A macro of the plan, as the robot carries it out."""
 
-    name: Name
+    name: MacroName
     way: Array
     """Unit vector, (3,), world."""
 
@@ -65,9 +65,9 @@ class Transfer:
     T_world_goal: Array
     grips: tuple[Grip, ...]
     """In the order of their use; the next one at each change of grip."""
-    out: Line
+    out: ApproachLine
     """The way out of where it is, as it was once attached there: it is gone backwards."""
-    into: Line
+    into: ApproachLine
     centring: tuple[Grip, ...]
     """After it was put down, the fingers close and open again here: closing, they centre the part between them."""
     departs: tuple[Motion, ...]
@@ -115,9 +115,9 @@ class Transfer:
         return 0.5 * self.clearance
 
 
-def aim(t: Transfer) -> Array:
+def first_contact_pose(t: Transfer) -> Array:
     """Where the part first comes down: at its goal, or aside of what it shall touch."""
-    return moved(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
+    return shifted(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
 
 
 def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
@@ -125,11 +125,11 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     first, last = t.grips[0].T_part_tip, t.grips[-1].T_part_tip
     carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
     pick, goal = t.T_world_start @ first, t.T_world_goal @ last
-    free = moved(t.T_world_start @ carrying, t.out.way, -t.out.travel)
-    before = moved(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
+    free = shifted(t.T_world_start @ carrying, t.out.way, -t.out.travel)
+    before = shifted(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
     above, over = (at_height(T, max(t.safe, T[2, 3])) for T in (free, before))
-    return (at_height(pick, hover(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
+    return (at_height(pick, hover_pose(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
 
 
-def hover(grasp: Array) -> float:
+def hover_pose(grasp: Array) -> float:
     return float(grasp[2, 3]) + _HOVER_M

@@ -11,8 +11,8 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival
-from apo_bench.insertion.surroundings import OVER_M, ends_of, slides
-from apo_bench.scenario.nominal import understood
+from apo_bench.insertion.surroundings import OVER_M, ends_of, slide_directions
+from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Scenario
 
 _SIDE_M = 0.002
@@ -57,9 +57,9 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         stages: Where every part should be before the first operation and after each.
         late: Displaced parts that the other hand corrects.
     """
-    operation, what = scenario.assembly.operations[k], understood(scenario)[k]
+    operation, what = scenario.assembly.operations[k], nominal_operations(scenario)[k]
     way = target[:3, :3] @ what.after.line.direction
-    beside = _off(slides(scenario.assembly, what.after, stages[k + 1]))
+    beside = _off(slide_directions(scenario.assembly, what.after, stages[k + 1]))
     return Act(
         part=operation.main,
         carries=operation.carries,
@@ -85,7 +85,7 @@ def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
     way = poses[before.main][:3, :3] @ before.line.direction
     if before.touched and abs(way[2]) < 0.5:
         return np.asarray(-before.line.travel_m * way)
-    return _SIDE_M * _off(slides(assembly, before, poses))
+    return _SIDE_M * _off(slide_directions(assembly, before, poses))
 
 
 def _off(sides: tuple[Array, ...]) -> Array:

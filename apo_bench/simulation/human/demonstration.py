@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Layout, Reached, Snapshot
-from apo_bench.assembly.placement import placed
+from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.verdict import judge
 from apo_bench.records.outcomes import sentence
-from apo_bench.scenario.human_error import careless_covariance, spread
+from apo_bench.scenario.human_error import careless_covariance, spread_error
 from apo_bench.scenario.scenario import Carelessness
 from apo_bench.simulation.human.acts import act
-from apo_bench.simulation.human.hands import Hands, Watch
+from apo_bench.simulation.human.hands import Hands, Watcher
 from apo_bench.simulation.human.perform import REST_S, perform
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import snapshot, unstable
+from apo_bench.simulation.scene.world import has_failed, snapshot
 
 
 def demonstrate(
-    scene: Scene, layout: Layout, careless: float, rng: np.random.Generator, watch: Watch | None = None
+    scene: Scene, layout: Layout, careless: float, rng: np.random.Generator, watch: Watcher | None = None
 ) -> Demonstration:
     """Assemble by hand, with an error of `careless` times the scenario's carelessness.
 
@@ -34,8 +34,8 @@ def demonstrate(
         watch: Looks on; the demonstration is the same with and without it.
     """
     scenario = scene.scenario
-    error = spread(scenario, layout, _draw(scenario.careless, careless, rng))
-    stages = (layout.start, *placed(scenario.assembly, layout.start, layout.goals))
+    error = spread_error(scenario, layout, _draw(scenario.careless, careless, rng))
+    stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
     hands = Hands(scene.shown, layout.start, watch)
     hands.wait(0.05)
     goals, after = [], []
@@ -47,7 +47,7 @@ def demonstrate(
         goals.append(after[-1].poses[operation.main])
     hands.wait(REST_S)
     final = snapshot(scene.shown, hands.data, layout.start)
-    why = "the simulation became unstable" if unstable(hands.data) else _wrong(scene, layout, after, final)
+    why = "the simulation became unstable" if has_failed(hands.data) else _wrong(scene, layout, after, final)
     return Demonstration(
         assembly=scenario.assembly,
         start=layout.start,

@@ -10,12 +10,12 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.robot.paths import Line
+from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import HANDS
-from apo_bench.simulation.scene.world import World, fresh, part_pose
+from apo_bench.simulation.scene.world import World, initial_state, part_pose
 
 
-class Watch(Protocol):
+class Watcher(Protocol):
     """Looks on: called with the `MjData` at the start and every `period_s` of simulated time, it changes nothing."""
 
     period_s: float
@@ -26,9 +26,9 @@ class Watch(Protocol):
 class Hands:
     """Two hands and the parts before them; one demonstration long."""
 
-    def __init__(self, world: World, start: Poses, watch: Watch | None = None) -> None:
+    def __init__(self, world: World, start: Poses, watch: Watcher | None = None) -> None:
         self.world = world
-        self.data: Any = fresh(world, start)
+        self.data: Any = initial_state(world, start)
         self._watch, self._steps = watch, 0
         self._every = max(1, round(watch.period_s / world.model.opt.timestep)) if watch else 0
         if watch:
@@ -55,7 +55,7 @@ class Hands:
         for part in parts:
             self.data.eq_active[self._weld(hand, part)] = 0
 
-    def move(self, *moves: tuple[int, Line]) -> None:
+    def move(self, *moves: tuple[int, Trajectory]) -> None:
         """Move hands together; a hand whose line ends early waits at its end."""
         step = self.world.model.opt.timestep
         counts = [max(1, round(line.seconds / step)) for _, line in moves]

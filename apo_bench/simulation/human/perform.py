@@ -8,7 +8,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.human.acts import Act
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.robot.paths import Line, at_height, minimum_jerk, moved, smooth
+from apo_bench.simulation.robot.paths import Trajectory, at_height, minimum_jerk, shifted, smooth
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SPEED = 0.9
@@ -55,19 +55,19 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
 
 def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
     """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
-    raised = moved(T, _UP, clearance_m)
+    raised = shifted(T, _UP, clearance_m)
     hands.move((0, smooth(T, raised, _NUDGE)))
-    hands.move((0, smooth(raised, moved(raised, out, 1.0), _STROKE)))
-    return moved(raised, out, 1.0)
+    hands.move((0, smooth(raised, shifted(raised, out, 1.0), _STROKE)))
+    return shifted(raised, out, 1.0)
 
 
 def _ends(hands: Hands, act: Act, T: Array) -> tuple[Array, Array, Array]:
     """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go."""
     goal = act.target
     if act.from_above:
-        goal = moved(act.target, _UP, _DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
-    beside = moved(goal, act.aside, 1.0) if act.aside.any() else goal
-    return moved(moved(act.target, act.way, -act.travel), act.aside, 1.0), beside, goal
+        goal = shifted(act.target, _UP, _DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
+    beside = shifted(goal, act.aside, 1.0) if act.aside.any() else goal
+    return shifted(shifted(act.target, act.way, -act.travel), act.aside, 1.0), beside, goal
 
 
 def _rise(hands: Hands, act: Act, T: Array) -> float:
@@ -76,7 +76,7 @@ def _rise(hands: Hands, act: Act, T: Array) -> float:
     return max(float(act.true[part][2, 3] - (way @ hands.pose(part))[2, 3]) for part in act.bearing)
 
 
-def _bring(hands: Hands, act: Act, stroke: Line) -> None:
+def _bring(hands: Hands, act: Act, stroke: Trajectory) -> None:
     """The last motion; the other hand adjusts what is displaced on the way, the last of it while the part arrives."""
     standing = [part for part in act.late if part not in act.carries]
     for part in standing[:-1]:
@@ -102,19 +102,19 @@ def _shift_carried(hands: Hands, act: Act, part: str, clearance_m: float) -> Non
 
 
 def _adjust(
-    hands: Hands, part: str, true: Array, lift: float, meanwhile: tuple[tuple[int, Line], ...], held: bool = False
+    hands: Hands, part: str, true: Array, lift: float, meanwhile: tuple[tuple[int, Trajectory], ...], held: bool = False
 ) -> None:
     """Lift, shift and lower a part to its true place at the height where it is; the hand then still holds it."""
     here = hands.grab(1, part)
     if held:
         hands.let_go(0, part)
     there = at_height(true, here[2, 3])
-    hands.move((1, smooth(here, moved(here, _UP, lift), _NUDGE)))
-    hands.move((1, smooth(moved(here, _UP, lift), moved(there, _UP, lift), _SHIFT)), *meanwhile)
-    hands.move((1, smooth(moved(there, _UP, lift), there, _NUDGE)))
+    hands.move((1, smooth(here, shifted(here, _UP, lift), _NUDGE)))
+    hands.move((1, smooth(shifted(here, _UP, lift), shifted(there, _UP, lift), _SHIFT)), *meanwhile)
+    hands.move((1, smooth(shifted(there, _UP, lift), there, _NUDGE)))
 
 
-def _first(stroke: Line, fraction: float) -> Line:
+def _first(stroke: Trajectory, fraction: float) -> Trajectory:
     """The first part of a stroke, as a motion of its own."""
     end = stroke.poses(np.array([fraction]))[0]
-    return Line(stroke.start, end, stroke.seconds * 0.5, minimum_jerk)
+    return Trajectory(stroke.start, end, stroke.seconds * 0.5, minimum_jerk)

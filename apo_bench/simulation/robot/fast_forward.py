@@ -14,7 +14,7 @@ _TINY_S = 1e-4
 """Speeds of the tip are differences over this time."""
 
 
-def leap(
+def fast_forward(
     world: World,
     data: Any,
     forward: Any,

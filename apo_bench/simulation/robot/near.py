@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import depths, upright
+from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
 from apo_bench.geometry.solid import Box
-from apo_bench.simulation.robot.paths import Line
+from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import Ints, part_pose
 
@@ -44,7 +44,7 @@ class Moving(NamedTuple):
 
 
 def near_spans(
-    scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], line: Line, s: Array
+    scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], line: Trajectory, s: Array
 ) -> list[_Span]:
     """The stretches of a line along which something comes near, each with its run-up.
 
@@ -67,13 +67,13 @@ def near_spans(
 
 def clear(scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], T: Array) -> bool:
     """Whether nothing is near while the tip stands at T."""
-    return not near_spans(scene, data, moving, held, Line(T, T, 0.0, np.asarray), np.zeros(1))
+    return not near_spans(scene, data, moving, held, Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
 
 
 def _near(
     moving: Iterable[Moving],
     obstacles: Mapping[str, tuple[tuple[Box, ...], Array]],
-    line: Line,
+    line: Trajectory,
     s: Array,
     margin: float,
 ) -> _Flags:
@@ -85,17 +85,17 @@ def _near(
     R, tips = line.start[:3, :3], line.start[:3, 3] + s[:, None] * (line.end[:3, 3] - line.start[:3, 3])
     near = np.zeros(len(s), dtype=np.bool_)
     for boxes, T_tip in moving:
-        low, high = upright(boxes, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
+        low, high = upright_bounds(boxes, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
         if turning:
             low, high = _swept(low, high)
         for others, T in obstacles.values():
-            bottom, top = upright(others, T[:3, :3], T[:3, 3])
+            bottom, top = upright_bounds(others, T[:3, :3], T[:3, 3])
             may = ((tips + low < top + margin) & (tips + high > bottom - margin)).all(axis=1) & ~near
             if turning:
                 near |= may
             elif may.any():
                 at = tips[may] + R @ T_tip[:3, 3]
-                near[may] = depths(boxes, R @ T_tip[:3, :3], at, others, T) > -margin
+                near[may] = intrusion_depths(boxes, R @ T_tip[:3, :3], at, others, T) > -margin
     return near
 
 

@@ -20,7 +20,7 @@ _STRAIGHT = 1e-8
 
 @final
 @dataclass(frozen=True, eq=False)
-class Line:
+class Trajectory:
     """From one pose to another: position along a straight line, orientation about one fixed axis."""
 
     start: Array
@@ -44,18 +44,18 @@ class Line:
         return T
 
 
-def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5, shortest: float = 0.15) -> Line:
+def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5, shortest: float = 0.15) -> Trajectory:
     """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
     far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
     turn = float(np.linalg.norm(_turn_between(start, end)))
-    return Line(start, end, max(shortest, _PEAK * far / speed, _PEAK * turn / turn_speed), minimum_jerk)
+    return Trajectory(start, end, max(shortest, _PEAK * far / speed, _PEAK * turn / turn_speed), minimum_jerk)
 
 
-def steady(start: Array, end: Array, speed: float, ramp: float = 0.1) -> Line:
+def steady(start: Array, end: Array, speed: float, ramp: float = 0.1) -> Trajectory:
     """Constant speed [m/s] with a short ramp [s] at both ends, for motions that a guard may stop."""
     far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
     seconds = max(far / speed + ramp, 2.0 * ramp)
-    return Line(start, end, seconds, _Trapezoid(ramp / seconds))
+    return Trajectory(start, end, seconds, _Trapezoid(ramp / seconds))
 
 
 def minimum_jerk(t: Array) -> Array:
@@ -92,7 +92,7 @@ def turn_from(rest: Array, T: Array) -> float:
     return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
-def unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
+def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
     """Where to go through from start to end so that a wrist which began at rest does not wind up.
 
     The shorter way round may lead over a half turn away from the rest, where the wrist ends; then the other way is
@@ -109,7 +109,7 @@ def unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
     return (middle, end)
 
 
-def moved(T: Array, along: Array, by: float) -> Array:
+def shifted(T: Array, along: Array, by: float) -> Array:
     """The pose shifted in the world."""
     out = np.array(T)
     out[:3, 3] += by * np.asarray(along)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.robot.paths import Line
+from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.arm import Kinematics
 
 _KNOT_M, _KNOT_RAD = 0.03, 0.15
@@ -15,7 +15,7 @@ _FAR_M, _FAR_RAD = 0.1, 0.5
 """So densely where only the joint angles at the end are asked for."""
 
 
-def along(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | None:
+def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Array | None:
     """Joint angles, (k, joints), at places along a line; None where the arm does not reach.
 
     Args:
@@ -30,21 +30,21 @@ def along(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | Non
     return None if found is None else np.asarray(CubicSpline(at, found)(s))
 
 
-def at_end(kinematics: Kinematics, line: Line, begin: float, end: float, q: Array) -> Array | None:
+def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
     """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
     count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, _FAR_M, _FAR_RAD))))
     found = _angles(kinematics, line, np.linspace(begin, end, count), q)
     return None if found is None else np.asarray(found[-1])
 
 
-def _steps(line: Line, far: float, turn: float) -> float:
+def _steps(line: Trajectory, far: float, turn: float) -> float:
     """How many steps of these lengths, [m] and [rad], a line takes."""
     return max(
         float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3])) / far, float(np.linalg.norm(line.turn)) / turn
     )
 
 
-def _angles(kinematics: Kinematics, line: Line, s: Array, q: Array) -> Array | None:
+def _angles(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Array | None:
     path = [np.asarray(q)]
     for i, T in enumerate(line.poses(s[1:])):
         found = kinematics.inverse(T, 2 * path[-1] - path[-2] if i else path[-1])

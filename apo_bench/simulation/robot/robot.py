@@ -16,13 +16,13 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.robot.fast_forward import leap
+from apo_bench.simulation.robot.fast_forward import fast_forward
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import Moving, clear, near_spans
-from apo_bench.simulation.robot.paths import Line, moved, smooth, unwound
+from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
 from apo_bench.simulation.robot.reach import along, at_end
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import fresh, part_pose, timestep, unfelt, unstable
+from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
@@ -65,7 +65,7 @@ class Robot:
         self.peak_force_n = 0.0
         self._find_joints()
         self._net = np.zeros((3, self.model.nsensordata))
-        self.data: Any = fresh(scene.work, start)
+        self.data: Any = initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self.arm.home
         self.data.qpos[self._fingers] = self.arm.opening_m
         mujoco.mj_forward(self.model, self.data)
@@ -78,7 +78,7 @@ class Robot:
         self._forces = self.data.sensordata
         self._on_arm = self._forces.reshape(-1, 3)[len(scene.work.free) :]
 
-    def follow(self, line: Line, guard: Guard | None = None) -> float:
+    def follow(self, line: Trajectory, guard: Guard | None = None) -> float:
         """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.
 
         Raises:
@@ -105,7 +105,7 @@ class Robot:
 
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
-        for T in unwound(self._rest, self.T, end):
+        for T in waypoints_unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
     def servo(self, law: Callable[[Array], Array | None]) -> None:
@@ -127,12 +127,12 @@ class Robot:
             self._feel()
             if passed % self._every == 0:
                 self._look()
-        self.q, self.T = q + offset @ moves, moved(T, offset, 1.0)
+        self.q, self.T = q + offset @ moves, shifted(T, offset, 1.0)
 
     def _across(self, q: Array, T: Array, axis: Array) -> Array:
         """How the joints turn while the tip is shifted, (joints,), [rad/m]; as good as exact over some millimetres."""
         inverse = self.scene.kinematics.inverse
-        ends = [self._reached(inverse(moved(T, axis, by), q)) for by in (-_SHIFT_M, _SHIFT_M)]
+        ends = [self._reached(inverse(shifted(T, axis, by), q)) for by in (-_SHIFT_M, _SHIFT_M)]
         return np.asarray((ends[1] - ends[0]) / (2 * _SHIFT_M))
 
     def wait(self, seconds: float, parts: int = 1) -> None:
@@ -203,7 +203,7 @@ class Robot:
             self.model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *q, 1)
         self.data.eq_active[weld] = int(on)
 
-    def _spans(self, line: Line, s: Array) -> list[tuple[int, int]]:
+    def _spans(self, line: Trajectory, s: Array) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: all of them, or those where something is near; at last the end."""
         n = len(s) - 1
         if self.fidelity == "full":
@@ -220,7 +220,7 @@ class Robot:
     def _leap(self, q: Array, velocity: Array, steps: int) -> None:
         """Leave out steps on which nothing is near."""
         joints, forward = (self._qpos, self._dof), self.scene.kinematics.forward
-        leap(self.scene.work, self.data, forward, joints, q - self.q, velocity, self._held)
+        fast_forward(self.scene.work, self.data, forward, joints, q - self.q, velocity, self._held)
         self._pass(steps * self.step_s)
 
     def _may_open(self, to: float) -> bool:
@@ -271,7 +271,7 @@ class Robot:
 
     def _look(self) -> None:
         """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""
-        if unstable(self.data):
+        if has_failed(self.data):
             raise Halt(self.stage, "unstable_simulation")
         self._feel()
         struck, force = self._hardest_blow()

@@ -25,7 +25,7 @@ _NOWHERE, _UPRIGHT = np.zeros(3), np.eye(3).ravel()
 
 @final
 @dataclass(frozen=True, eq=False)
-class Shift:
+class ShiftArrows:
     """Two arrows that point away from each other along an axis."""
 
     center: Array
@@ -51,7 +51,7 @@ class Shift:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Turn:
+class TurnRing:
     """A ring about an axis that is open towards `away`, with a head at both ends."""
 
     center: Array
@@ -80,7 +80,7 @@ class Turn:
 class Marks:
     """What is drawn into a picture."""
 
-    marks: Sequence[Shift | Turn]
+    marks: Sequence[ShiftArrows | TurnRing]
     opacity: float = 1.0
     """Of the parts."""
 
@@ -90,19 +90,19 @@ class Marks:
             if geom.category == mujoco.mjtCatBit.mjCAT_DYNAMIC:
                 geom.rgba[3] *= self.opacity
         for mark in self.marks:
-            if isinstance(mark, Shift):
+            if isinstance(mark, ShiftArrows):
                 _shift(scene, mark)
             else:
                 _turn(scene, mark)
 
 
-def _shift(scene: Any, mark: Shift) -> None:
+def _shift(scene: Any, mark: ShiftArrows) -> None:
     for side in (-1.0, 1.0):
         tail, tip = (mark.center + side * far * mark.axis for far in (mark.inner_m, mark.outer_m))
         _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, tail, tip, mark.color)
 
 
-def _turn(scene: Any, mark: Turn) -> None:
+def _turn(scene: Any, mark: TurnRing) -> None:
     u, v = _frame(mark)
     angles = np.linspace(-_SWEEP_RAD / 2, _SWEEP_RAD / 2, _PIECES + 1)
     points = mark.center + mark.radius_m * (np.outer(np.cos(angles), u) + np.outer(np.sin(angles), v))
@@ -113,7 +113,7 @@ def _turn(scene: Any, mark: Turn) -> None:
         _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, end - 1e-3 * along, end + _HEAD_M * along, mark.color)
 
 
-def _frame(mark: Turn) -> tuple[Array, Array]:
+def _frame(mark: TurnRing) -> tuple[Array, Array]:
     """Two unit vectors across the axis, the first away from the opening."""
     u = mark.away - (mark.away @ mark.axis) * mark.axis
     if np.linalg.norm(u) < 1e-6:

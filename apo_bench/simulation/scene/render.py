@@ -16,7 +16,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, fresh, place
+from apo_bench.simulation.scene.world import World, initial_state, place
 
 _Image = NDArray[np.uint8]
 Camera = Any
@@ -184,7 +184,7 @@ def _drawn(
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
-    data = fresh(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
+    data = initial_state(world, {**scene.scenario.start, **{p: T for p, T in poses.items() if p in world.fixed}})
     for part in world.free:
         place(world, data, part, poses.get(part, scene.scenario.start[part]))
     data.mocap_pos[:, 2] = -1.0

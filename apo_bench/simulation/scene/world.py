@@ -66,7 +66,7 @@ def place(world: World, data: Any, part: str, T: Array) -> None:
     data.qvel[v : v + 6] = 0.0
 
 
-def fresh(world: World, start: Poses) -> Any:
+def initial_state(world: World, start: Poses) -> Any:
     """New `MjData` with every movable part at its start and every fixed part at its place."""
     for part in world.fixed:
         body = world.body[part]
@@ -88,7 +88,7 @@ def part_pose(world: World, data: Any, part: str) -> Array:
     return T
 
 
-def unstable(data: Any) -> bool:
+def has_failed(data: Any) -> bool:
     """Whether MuJoCo has warned of anything, or a number is no longer finite."""
     return bool(data.warning.number.any() or not np.isfinite(data.qpos).all())
 

@@ -8,8 +8,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.depth_camera.range_finder import MIDDLE_M
-from apo_bench.depth_camera.view import View, looking
+from apo_bench.depth_camera.range_finder import VIEWED_POINT_M
+from apo_bench.depth_camera.view import View, look_at
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.sensor.rays import Strike
 
@@ -23,7 +23,7 @@ _BACKGROUND = 0.9
 @lru_cache(maxsize=1)
 def _front_view() -> View:
     """Obliquely from the front, 160 x 120: a pixel is 6 mm wide, and a motion of some millimetres changes few."""
-    return View(looking((0.85, -0.35, 0.75), MIDDLE_M), 160, 120, 45.0)
+    return View(look_at((0.85, -0.35, 0.75), VIEWED_POINT_M), 160, 120, 45.0)
 
 
 @final

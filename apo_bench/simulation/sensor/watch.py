@@ -19,7 +19,7 @@ _STILL = 5e-5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Watched:
+class DemonstrationImages:
     """What the range finder saw without any error: before everything, and in every quiet spell."""
 
     finder: RangeFinder
@@ -31,7 +31,7 @@ class Watched:
 
 
 @final
-class Watcher:
+class DemonstrationCamera:
     """Pass it to `demonstrate` as `watch`: it is called with the `MjData` at every picture and changes nothing."""
 
     def __init__(
@@ -65,10 +65,10 @@ class Watcher:
         elif self._spell:
             self._keep(now - self.camera.late_s)
 
-    def watched(self) -> Watched:
+    def watched(self) -> DemonstrationImages:
         """What was kept, when the demonstration is over."""
         self._keep(np.inf)
-        return Watched(self.finder, tuple(self._images), tuple(self._times), tuple(self._pictures))
+        return DemonstrationImages(self.finder, tuple(self._images), tuple(self._times), tuple(self._pictures))
 
     def _picture(self, qpos: Array) -> Array:
         """The next picture of the TV camera; where nothing moved only its noise is new."""

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import Equations, largest
 from apo_bench.assembly.topology import Assembly
-from apo_bench.correction.posterior import LARGE, rank
-from apo_bench.correction.solvers.compact import Compact
-from apo_bench.correction.solvers.manifold import Nearest, Turn, project, settles, shortened
+from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
+from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.manifold import NearestGoals, SolverTurn, project, settles, shortened_step
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
@@ -40,7 +40,7 @@ _HARD, _SOFT = 0, 8
 
 @final
 @dataclass(frozen=True, eq=False)
-class Walls:
+class Inequalities:
     """m inequalities low <= e <= high, one per vertex."""
 
     system: Equations
@@ -52,10 +52,10 @@ class Walls:
     def __len__(self) -> int:
         return len(self.low)
 
-    def among(self, contacts: NDArray[np.bool_]) -> Walls:
+    def among(self, contacts: NDArray[np.bool_]) -> Inequalities:
         """The walls of some of the contacts that have any."""
         rows = contacts[self.system.contact]
-        return Walls(self.system.among(contacts), self.low[rows], self.high[rows])
+        return Inequalities(self.system.among(contacts), self.low[rows], self.high[rows])
 
     def overstepped(self, goals: Array) -> float:
         """By how much the worst vertex is beyond its walls at the goals, [m]; 0 if none is."""
@@ -63,24 +63,30 @@ class Walls:
         return float(np.maximum(self.low - e, e - self.high).max(initial=0.0))
 
 
-def left_open(
-    system: Equations, exact: NDArray[np.bool_], walls: Walls, goals: Array, kept: NDArray[np.bool_]
+def violation(
+    system: Equations, exact: NDArray[np.bool_], walls: Inequalities, goals: Array, kept: NDArray[np.bool_]
 ) -> float:
     """The largest |e| of the equations that are `kept`, (c,), [m]; of walls, by how much they are overstepped."""
     return max(largest(system.gaps(goals)[kept & exact]), walls.among(kept[~exact]).overstepped(goals))
 
 
-def asked(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Walls]:
+def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
     """What is demanded of each contact: shifted planes, (c,) whether it is an equation, and the walls of the others."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
     plane = np.array(system.plane)
     plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]
     walls = system.among(~exact)
-    return replace(system, plane=plane), exact, Walls(walls, low[~exact][walls.contact], high[~exact][walls.contact])
+    return (
+        replace(system, plane=plane),
+        exact,
+        Inequalities(walls, low[~exact][walls.contact], high[~exact][walls.contact]),
+    )
 
 
-def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest) -> Nearest:
+def nearest_between(
+    system: CompactEquations, walls: Inequalities, seen: Array, L: Array, start: NearestGoals
+) -> NearestGoals:
     """The nearest goals that satisfy the equations and stay between the walls.
 
     Args:
@@ -94,12 +100,12 @@ def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest
     Raises:
         InputError: Too many operations for a dense program.
     """
-    if 6 * system.n > LARGE:
+    if 6 * system.n > LARGEST_POSTERIOR:
         raise InputError(
-            f"walls with {system.n} operations were given, up to {LARGE // 6} are allowed; "
+            f"walls with {system.n} operations were given, up to {LARGEST_POSTERIOR // 6} are allowed; "
             'ask for "centred" contacts instead.'
         )
-    known, before, trace, pace = rank(start.Jt), np.inf, list(start.trace), 1.0
+    known, before, trace, pace = jacobian_rank(start.Jt), np.inf, list(start.trace), 1.0
     z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
     for _ in range(_TURNS):
         e, blocks = system.blocks(T, B)
@@ -112,20 +118,20 @@ def between(system: Compact, walls: Walls, seen: Array, L: Array, start: Nearest
         u, room = _program(J_wall, free, walls.low - ahead, walls.high - ahead)
         step = shortest + free @ u - z
         length = float(np.abs(step).max(initial=0.0))
-        trace.append(Turn(float(np.abs(e).max(initial=0.0)), length))
+        trace.append(SolverTurn(float(np.abs(e).max(initial=0.0)), length))
         over = bool(settles(np.array(length), np.array(before)))
         rest = over and room
         pace = _paced(pace, step, last)
-        last = step if rest else shortened(step[None], L[None])[0]
+        last = step if rest else shortened_step(step[None], L[None])[0]
         z = z + (step if rest else pace * last)
         D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
         T, B, before = seen @ D, Jr @ L, length
         if over:
             break
-    return Nearest(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
+    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
 
 
-def touching(Jt: Array, walls: Walls, found: Nearest) -> int:
+def active_rank(Jt: Array, walls: Inequalities, found: NearestGoals) -> int:
     """How many directions the walls that are touched fix beyond the equations.
 
     Args:
@@ -134,7 +140,7 @@ def touching(Jt: Array, walls: Walls, found: Nearest) -> int:
     e, J = walls.system.linearised(found.goals)
     at = (e <= walls.low + _TOUCH_M) | (e >= walls.high - _TOUCH_M)
     J = (J[at].reshape(int(at.sum()), len(found.B), 1, 6) @ found.B).reshape(int(at.sum()), len(found.z))
-    return rank(np.concatenate([Jt, J.T], axis=1)) - rank(Jt) if at.any() else 0
+    return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
 
 
 def _paced(pace: float, step: Array, last: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
-from apo_bench.depth_camera.follow import Event, Expected, follow
+from apo_bench.depth_camera.follow import Event, Expected, follow_demonstration
 from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import floored
@@ -22,7 +22,7 @@ _UNSEEN.flags.writeable = False
 
 @final
 @dataclass(frozen=True, eq=False)
-class RangeEye:
+class RangeSensor:
     """Called like a noise model, it measures poses instead of drawing them: `(assembly, shown, rng) -> Observation`.
 
     Of what was shown only the topology, where parts started and how careless people are is looked at; goals are
@@ -56,4 +56,6 @@ class RangeEye:
 
     def events(self, shown: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
         """What it makes of measured images, operation by operation."""
-        return follow(images, self.finder, self.level_m, Expected(shown.assembly, shown.start, self.turns, self.play_m))
+        return follow_demonstration(
+            images, self.finder, self.level_m, Expected(shown.assembly, shown.start, self.turns, self.play_m)
+        )
