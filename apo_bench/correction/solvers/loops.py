@@ -228,7 +228,7 @@ def linearise(
     blocks: _Array,
     behind: _Array,
 ) -> None:
-    """e, (3 c,), and its derivative, blocks (c, w, 3, 6) as in `CompactEquations`; `behind` (w + 1, 3, 4) is scratch."""
+    """e, (3 c,), and its derivative, blocks (c, w, 3, 6) as in `CompactEquations`; `behind` (w + 1, 3, 4) scratch."""
     letters, columns, inverse = words
     n = len(B)
     blocks[:] = 0.0
