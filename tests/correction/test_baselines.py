@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,16 +53,16 @@ def test_what_is_consistent_stays_as_it_is(method: str, within: float, name: str
     assert np.abs(made.goals - built.goals).max() < within
 
 
-@pytest.mark.parametrize("method", [*STATIC, "settle"])
-def test_an_operation_that_was_not_seen_is_refused(method: str) -> None:
+@pytest.mark.parametrize("method", [*STATIC, settle])
+def test_an_operation_that_was_not_seen_is_refused(method: Any) -> None:
     seen = noisy("bridge")
     made = correct(replace(seen, seen=np.array([True, False, True])), method)
     assert (made.status, made.sentence) == ("not_seen", "operation 2 was not seen")
     assert np.array_equal(made.goals, seen.goals)
 
 
-@pytest.mark.parametrize("method", [*STATIC, "settle"])
-def test_no_operations_make_no_goals(method: str) -> None:
+@pytest.mark.parametrize("method", [*STATIC, settle])
+def test_no_operations_make_no_goals(method: Any) -> None:
     built = scenes.bridge()
     none = scenes.Scene(Assembly(built.assembly.solids, (), frozenset(built.assembly.solids)), built.start, np.zeros(0))
     seen = Observation(none.assembly, none.start, np.zeros((0, 4, 4)), np.zeros((0, 6, 6)), np.zeros(0, dtype=np.bool_))
@@ -194,16 +195,16 @@ def test_parts_that_lie_right_settle_by_their_play_and_no_more(name: str) -> Non
     """A stick sinks by the clearance of 0.25 mm, a cube that holds it by that of both; runs are the same to the bit."""
     built = scenes.ALL[name]()
     seen = scenes.seen(built, built.goals)
-    made = correct(seen, "settle")
+    made = correct(seen, settle)
     assert made.ok
     assert np.linalg.norm(made.goals[:, :3, 3] - built.goals[:, :3, 3], axis=1).max() < 0.6e-3
-    assert np.array_equal(correct(seen, "settle").goals, made.goals)
+    assert np.array_equal(correct(seen, settle).goals, made.goals)
 
 
 @pytest.mark.parametrize("play_mm", [0.1, 1.0])
 def test_a_stick_sinks_by_the_play_that_is_stated(play_mm: float) -> None:
     built = scenes.stick_on_castles()
-    made = correct(replace(scenes.seen(built, built.goals), play_m=play_mm * 1e-3), "settle")
+    made = correct(replace(scenes.seen(built, built.goals), play_m=play_mm * 1e-3), settle)
     assert made.goals[2, 2, 3] == pytest.approx(built.goals[2, 2, 3] - play_mm * 1e-3, abs=0.03e-3)
 
 
@@ -219,6 +220,8 @@ def test_a_part_falls_onto_the_table_or_is_pushed_out_of_it(height_mm: float) ->
 
 ADAPTED = """
 from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.assembly.equations import equations

@@ -48,7 +48,7 @@ SEEN = scenes.seen(TOWER, TOWER.goals @ pose.exp(np.full(6, 1e-3)))
 HOSTILE = """
 import gc, json, os, signal, subprocess, sys, tempfile, time
 import numpy as np
-from apo_bench import judge
+from apo_bench.judging import verdict as judge
 from apo_bench.correction.contact import contact, contact_drop
 from apo_bench.correction.baselines.track import paper_track
 from apo_bench.assembly.goals import Correction, Layout
