@@ -1,6 +1,6 @@
 # Two commands do everything, on a machine with Python 3.11 or 3.12 and make:
 #   make sweep   set up, run a small benchmark, print the table, write the report
-#   make test    set up, check style and types, run every test
+#   make test    set up, check style and types, build the documentation, run every test
 # and one the table of the project (100 trials per cell take some 100 minutes on two cores):
 #   make headline [TRIALS=100] [FIDELITY=contact]
 
@@ -22,7 +22,7 @@ MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test numeric lowest clean
+.PHONY: sweep headline test numeric docs lowest clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
@@ -39,12 +39,17 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
+	$(BIN)/mkdocs --quiet build --strict --site-dir build/site
 	$(BIN)/pytest -q -n 2 --dist worksteal
 	$(NUMERIC)
 
 # the tests marked numeric, under every other kernel of OpenBLAS, NumPy and Numba that the processor allows
 numeric: $(VENV)/.installed-dev
 	$(NUMERIC)
+
+# the documentation as a site, at http://127.0.0.1:8000; what is built lies in build/site
+docs: $(VENV)/.installed-dev
+	$(BIN)/mkdocs serve --strict
 
 # the oldest versions that pyproject.toml allows, in an environment of their own
 lowest: $(BIN)/python

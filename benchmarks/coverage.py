@@ -3,7 +3,7 @@
 
 Sweeps are drawn from known rates, 0.05 to 0.95, with 50, 100 and 200 seeds, and the 95 % intervals are computed by the
 functions that reports use. `benchmarks/results/coverage.csv` has one line per setting, and the tables in
-`docs/statistics.md` are written anew. Every setting has its own stream of chance, so the result does not depend on
+`docs/how/statistics.md` are written anew. Every setting has its own stream of chance, so the result does not depend on
 the number of processes.
 """
 
@@ -44,7 +44,7 @@ ALIKE = (0.0, 0.5, 0.9)
 SHAPES = tuple(product(("logistic", "lapses", "normal", "early", "late"), (2.0, 6.0)))
 """Of curves that have a half level, and their steepness; `early` ones leave the ceiling early, `late` ones late."""
 HERE = Path(__file__).parent
-TABLE, PAGE = HERE / "results" / "coverage.csv", HERE.parent / "docs" / "statistics.md"
+TABLE, PAGE = HERE / "results" / "coverage.csv", HERE.parent / "docs" / "how" / "statistics.md"
 BEGIN, END = "<!-- tables: python benchmarks/coverage.py -->", "<!-- end of tables -->"
 
 

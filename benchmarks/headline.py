@@ -1,9 +1,9 @@
 """Keep the headline: `python benchmarks/headline.py runs/headline_contact [--full runs/headline_full]`.
 
 Takes a sweep of benchmarks/headline.toml (`make headline`) and writes benchmarks/results/headline/ (rows, table,
-figure, what was run), docs/headline.md and the table in README.md. With a second sweep, of the same grid at fidelity
-full, it also writes how far the verdicts of the two agree. `--trials N` takes the first N seeds of a sweep that is not
-at its end.
+what was run), docs/results/headline.md with its figure, and the table in README.md. With a second sweep, of the same
+grid at fidelity full, it also writes how far the verdicts of the two agree. `--trials N` takes the first N seeds of a
+sweep that is not at its end.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from apo_bench.statistics.rates import Cell, rank, tally, wilson
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"
-PAGE, README = ROOT / "docs" / "headline.md", ROOT / "README.md"
+PAGE, README = ROOT / "docs" / "results" / "headline.md", ROOT / "README.md"
+FIGURE = ROOT / "docs" / "pictures" / "headline.png"
 BEGIN, END = "<!-- written by benchmarks/headline.py -->", "<!-- until here -->"
 LEFT_OUT = ("reached", "thresholds")
 """Not kept of a row: the poses reached are most of its size, the thresholds are those of the scenario."""
@@ -71,7 +72,7 @@ def keep(folder: Path, full: Path | None) -> None:
     KEPT.mkdir(parents=True, exist_ok=True)
     shutil.copy(report(folder).table, KEPT / "table.csv")
     cells = tally(rows)
-    draw([cell for cell in cells if cell.method in METHODS and cell.level > 0], KEPT / "success_over_level.png")
+    draw([cell for cell in cells if cell.method in METHODS and cell.level > 0], FIGURE)
     ran = what_was_run(folder, rows)
     (KEPT / "run.json").write_text(json.dumps(ran, indent=2) + "\n", encoding="utf-8")
     lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)
@@ -142,19 +143,18 @@ def page(cells: Sequence[Cell], pairs: Sequence[Paired], ran: Mapping[str, Any],
         f"{ran['simulated_hours']} hours simulated or passed over in {ran['worker_hours'] / ran['workers']:.2f} hours "
         f"by {ran['workers']} processes on a machine with two cores, which did other work now and then. MuJoCo "
         f"{versions['mujoco']}, mink {versions['mink']}, NumPy {versions['numpy']}, Python {ran['python']}; everything "
-        "else in [run.json](../benchmarks/results/headline/run.json), rates with intervals in "
-        "[table.csv](../benchmarks/results/headline/table.csv), rows (without the poses reached) in `rows.jsonl.xz` "
-        "beside it.",
+        "else in `benchmarks/results/headline/run.json`, rates with intervals in `table.csv`, rows (without the poses "
+        "reached) in `rows.jsonl.xz` beside it.",
         "",
         "Success with a friction grasp and 0.25 mm clearance per side, Wilson's 95 % intervals: the finished assembly "
-        "is right ([the two verdicts](verdict.md)). A level of L is a standard deviation of L mm and L degrees per "
-        "axis; a careful human puts parts where they belong, a careless one adjusts them later, as in the paper. The "
-        "same seeds for every method. `search` replays what was seen, as `none` does, with a robot that feels for the "
-        "hole where an insertion is stopped.",
+        "is right ([the two verdicts](../how/judge.md)). A level of L is a standard deviation of L mm and L degrees "
+        "per axis; a careful human puts parts where they belong, a careless one adjusts them later, as in the paper. "
+        "The same seeds for every method. `search` replays what was seen, as `none` does, with a robot that feels for "
+        "the hole where an insertion is stopped.",
         "",
         f"{BY_CONSTRUCTION} What stands wrong to each other before anything is inserted cannot be searched away.",
         "",
-        "![Success over level](../benchmarks/results/headline/success_over_level.png)",
+        "![Success over level](../pictures/headline.png)",
         "",
         *table(main_cells, METHODS, counted),
         "",

@@ -1,7 +1,7 @@
-"""Where the time of a replay goes: `python benchmarks/profiling.py`; writes docs/speed.md and results/profile.json.
+"""Where the time of a replay goes: `python benchmarks/profiling.py`.
 
-The physics and the inverse kinematics are timed inside replays; shares of one run are compared, so a busy machine
-matters little.
+Writes docs/results/speed.md and results/profile.json. The physics and the inverse kinematics are timed inside replays;
+shares of one run are compared, so a busy machine matters little.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from apo_bench.trial.stages import see, show
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "profile.json"
-PAGE = ROOT / "docs" / "speed.md"
+PAGE = ROOT / "docs" / "results" / "speed.md"
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 METHODS = ("none", "paper", "paper-track")
 SEEDS = (0, 1, 2)

@@ -5,7 +5,7 @@ Every scenario, no robot. Each demonstration is simulated once and seen at every
 by careful and by careless humans, seen at all levels and recognised with both kinds of thresholds, the very first (10)
 twice; the others, up to 100, are seen at the levels up to 0.5. Results are written after each seed, so the run may be
 stopped: `benchmarks/results/recognition.csv` counts, `recognition.json` says which contacts were wrong,
-`recognition.png` draws, and the table in `docs/recognition.md` is written anew.
+`docs/pictures/recognition.png` draws, and the table in `docs/how/recognition.md` is written anew.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LOW = 0.5
 """The level up to which there are most seeds."""
 HERE = Path(__file__).parent
-RESULTS, PAGE = HERE / "results", HERE.parent / "docs" / "recognition.md"
+RESULTS, DOCS = HERE / "results", HERE.parent / "docs"
+PAGE, FIGURE = DOCS / "how" / "recognition.md", DOCS / "pictures" / "recognition.png"
 BEGIN, END = "<!-- table: python benchmarks/recognition.py -->", "<!-- end of table -->"
 
 
@@ -83,7 +84,7 @@ def written(rows: list[dict[str, Any]]) -> None:
     """Files, figure and page of what is known so far."""
     found = recognitions(rows)
     write_recognitions(found, RESULTS / "recognition.csv")
-    draw_recognitions(found, RESULTS / "recognition.png")
+    draw_recognitions(found, FIGURE)
     wrongs = {
         f"{kind}, careless {careless:g}, level {level:g}": {
             what: Counter(f"{row['scenario']} {contact}" for row in rows if place(row) == (kind, careless, level)

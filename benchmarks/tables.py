@@ -1,4 +1,4 @@
-"""Write docs/results.md from the rows that are kept: `python benchmarks/tables.py`."""
+"""Write docs/results/tables.md from the rows that are kept: `python benchmarks/tables.py`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from apo_bench.statistics.rates import Cell, tally
 
 ROOT = Path(__file__).parents[1]
 ROWS = ROOT / "benchmarks" / "results" / "rows.jsonl.gz"
-PAGE = ROOT / "docs" / "results.md"
+PAGE = ROOT / "docs" / "results" / "tables.md"
 
 ABLATIONS = ("last-only", "no-history", "no-disappeared")
 BASELINES = ("none", "snap", "settle", "penalty", "least-squares", "paper", "contact")
@@ -53,8 +53,8 @@ def main() -> None:
         "",
         "`anisotropic` and `camera` are worse along a line of sight, `per-part` differs from part to part, "
         "`megapose-tless-inliers` and `megapose-lmo-inliers` were measured, level 1 as measured "
-        "([empirical.md](empirical.md)); "
-        "the others: [noise.md](noise.md).",
+        "([how](../guide/noise.md)); "
+        "the others: [noise models](../reference/noise-models.md).",
         "",
         *crossed(
             [c for c in cells if c.noise not in ("isotropic", "range") and c.relations == "given"],
@@ -65,7 +65,7 @@ def main() -> None:
         "",
         "## Poses measured by a range finder",
         "",
-        "Depth images with a noise of so many mm per ray ([eye.md](eye.md)).",
+        "Depth images with a noise of so many mm per ray ([depth camera](../how/depth-camera.md)).",
         "",
         *crossed(
             [c for c in cells if c.noise == "range" and c.relations == "given"],
@@ -75,7 +75,7 @@ def main() -> None:
         "",
         "## Recognised contacts",
         "",
-        "`contact`, told of the contacts as they are or as they were recognised ([recognition.md](recognition.md)); on "
+        "`contact`, told of the contacts as they are or as they were recognised ([how](../how/recognition.md)); on "
         "the same seeds.",
         "",
         *told(rows),
@@ -96,7 +96,7 @@ def main() -> None:
         "",
         "Tuned on other seeds by `python benchmarks/tune.py`. `least-squares` minimises almost the same cost as "
         "`contact` and wins as often; what it lacks is an exact solution, its rank, its test and its speed "
-        "([corrector.md](corrector.md)).",
+        "([contact](../how/contact.md)).",
         "",
         "## Wrong relations",
         "",

@@ -2,7 +2,7 @@
 
 Reads the sweep of a headline, finished or not, and the verdicts of the headline before `success` came to mean the
 finished assembly (results/headline/before.jsonl.xz: of each row its key, verdict, stage and code). Writes
-docs/headline-verdicts.md and results/headline/verdicts.csv: per cell the old success, the new one, and what is
+docs/results/verdicts.md and results/headline/verdicts.csv: per cell the old success, the new one, and what is
 as demonstrated; seed by seed where the last two rules part, and where a success was lost because a corner of a part lay
 more than 1 mm from where it was put. `--pictures N` draws how the first N of those ended, `--draw
 stick_in_tower,paper,4,1,17` the trial of that scenario, method, level, carelessness and seed.
@@ -26,7 +26,7 @@ from apo_bench.statistics.rates import rank
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"
 BEFORE, TABLE = KEPT / "before.jsonl.xz", KEPT / "verdicts.csv"
-PAGE = ROOT / "docs" / "headline-verdicts.md"
+PAGE = ROOT / "docs" / "results" / "verdicts.md"
 KEY = ("scenario", "method", "level", "careless", "seed")
 CELL = KEY[:-1]
 COLUMNS = (*CELL, "trials", "before", "as_demonstrated", "success", "differ", "lost_at_corners")
@@ -161,8 +161,8 @@ def page(rows: Sequence[Row], before: Mapping[tuple[Any, ...], Row]) -> list[str
         f"Of {len(rows)} trials of the headline, seeds {min(seeds)} to {max(seeds)}; {paired} of them were in the "
         "headline before. *Before* is the success of then, which asked for every contact "
         "also when it was made. *As demonstrated* asks for that and for the finished assembly, *success* for the "
-        "finished assembly alone ([the rules](verdict.md)). All cells are in "
-        "[verdicts.csv](../benchmarks/results/headline/verdicts.csv).",
+        "finished assembly alone ([the rules](../how/judge.md)). All cells are in "
+        "`benchmarks/results/headline/verdicts.csv`.",
         "",
         f"## Cells in which the verdicts differ ({len(known)} of {sum(n.before is not None for n in every.values())})",
         "",

@@ -11,17 +11,18 @@ from apo_bench.show.graph.picture import draw_graph
 from apo_bench.show.graph.text import graph_title
 
 HERE = Path(__file__).parent
-PICTURE = "pictures/graph_{}.png"
+PAGE = HERE / "reference" / "scenarios.md"
+PICTURE = "../pictures/graph_{}.png"
 
 
 def main() -> None:
     scenarios = [load_scenario(name) for name in scenario_names()]
-    (HERE / "scenarios.md").write_text(cards(scenarios, "python docs/cards.py", PICTURE), encoding="utf-8")
+    PAGE.write_text(cards(scenarios, "python docs/cards.py", PICTURE), encoding="utf-8")
     for scenario in scenarios:
         graph = relation_graph(scenario.assembly)
         draw_graph(
             graph,
-            HERE / PICTURE.format(scenario.name),
+            PAGE.parent / PICTURE.format(scenario.name),
             title=graph_title(scenario.name, graph),
             colors=scenario.colors,
         )

@@ -20,7 +20,8 @@ from apo_bench.show.noise_card import (
 from apo_bench.show.noise_picture import draw_histogram
 
 HERE = Path(__file__).parent
-PICTURE = "pictures/noise_{}.png"
+PAGE = HERE / "reference" / "noise-models.md"
+PICTURE = "../pictures/noise_{}.png"
 LEVEL = Level(1.0, 1.0)
 INTRODUCTION = """
 A noise model is a function `noise(assembly, shown, rng) -> Observation`: from what was shown, without error, and
@@ -103,10 +104,10 @@ def main() -> None:
     for name in models:
         picture = PICTURE.format(name.replace("-", "_"))
         drawn = draw_errors(name, LEVEL)
-        draw_histogram(drawn, HERE / picture)
+        draw_histogram(drawn, PAGE.parent / picture)
         lines += ["", f'<a id="{name}"></a>', "", model_description(name, 2)]
         lines += [f"![Errors of {name}]({picture})", "", f"*{drawn_sentence(name, drawn, LEVEL)}.*"]
-    (HERE / "noise.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

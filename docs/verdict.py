@@ -1,4 +1,4 @@
-"""Write the audit of the judge into docs/verdict.md, below the rules, and draw its doubtful states (a minute)."""
+"""Write the audit of the judge into docs/how/judge.md, below the rules, and draw its doubtful states (a minute)."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import Camera, picture, view
 from apo_bench.simulation.scene.scene import build_scene
 from tests import audited_states as audited
-from tests import test_judge as first
 from tests.end_states import reached, verdict
+from tests.judging import test_verdict as first
 
 HERE = Path(__file__).parent
-PAGE, BEGIN = HERE / "verdict.md", "<!-- written by docs/verdict.py -->"
+PAGE, BEGIN = HERE / "how" / "judge.md", "<!-- written by docs/verdict.py -->"
 WIDTH, HEIGHT, QUALITY = 480, 320, 80
 NEAREST_M, AZIMUTH_DEG, ELEVATION_DEG = 0.28, -75.0, -28.0
 DOUBTFUL = {
@@ -81,8 +81,8 @@ def main() -> None:
     ]
     lines += ["", "Some that are open to doubt:", ""]
     for what, scenario in DOUBTFUL.items():
-        name = f"pictures/verdict_{list(DOUBTFUL).index(what) + 1}.jpg"
-        draw(states[what], scenario, HERE / name)
+        name = f"../pictures/verdict_{list(DOUBTFUL).index(what) + 1}.jpg"
+        draw(states[what], scenario, PAGE.parent / name)
         said = f"{what}: a person says {yes(states[what].right)}, `success` says {success(states[what])}."
         lines += [f"![{what}]({name})", "", said, ""]
     for title, group in GROUPS.items():

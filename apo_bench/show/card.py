@@ -23,7 +23,7 @@ def cards(scenarios: Sequence[Scenario], command: str, picture: str) -> str:
     """A page with the cards of all, written by `command`; `picture` is the path of a graph with `{}` for the name."""
     lines = [f"<!-- Written by `{command}`; change the scenarios, not this page. -->", "", "# Scenarios", ""]
     lines += [f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios]
-    lines += ["", "What is asked for under *Success*: [the two verdicts](verdict.md)."]
+    lines += ["", "What is asked for under *Success*: [the two verdicts](../how/judge.md)."]
     for s in scenarios:
         head, _, rest = scenario_card(s, 2).partition("\n\n")
         shown = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"

@@ -166,7 +166,7 @@ def test_the_printed_plan(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_page_on_plans_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    page = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how" / "plans.md").read_text(encoding="utf-8")
     assert run(capsys, "plan", "pocket_table")[1] in page
 
 

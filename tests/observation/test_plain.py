@@ -171,7 +171,7 @@ def test_a_card_prints_what_the_model_does(name: str, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("name", sorted([*NOISES, *presets()]))
 def test_the_page_of_cards_is_up_to_date(name: str) -> None:
     """Written by `python docs/noise.py`."""
-    page = (Path(__file__).parents[2] / "docs" / "noise.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "noise-models.md").read_text(encoding="utf-8")
     assert model_description(name, 2) in page
     card = page.split(f"![Errors of {name}]")[1]
     assert card.split("\n")[2].startswith(

@@ -10,7 +10,7 @@ import pytest
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.show.card import cards, scenario_card
 
-PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 
 
 def test_the_operations_of_fig_6() -> None:
@@ -61,5 +61,6 @@ def test_every_scenario_says_all_of_it(name: str) -> None:
 
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")
 def test_the_page_is_what_the_scenarios_say() -> None:
-    written = cards([load_scenario(name) for name in scenario_names()], "python docs/cards.py", "pictures/graph_{}.png")
+    scenarios = [load_scenario(name) for name in scenario_names()]
+    written = cards(scenarios, "python docs/cards.py", "../pictures/graph_{}.png")
     assert PAGE.read_text(encoding="utf-8") == written, "run: python docs/cards.py"

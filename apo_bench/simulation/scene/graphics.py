@@ -19,6 +19,8 @@ from typing import Any
 from apo_bench.errors import InputError
 
 _VARIABLE = "MUJOCO_GL"
+_SHADOW_TEXELS, _SHADOW_REACH = 4096, 0.5
+"""Texels of the shadow map along a side, and its half width over the size of the scene: 0.4 mm on the table each."""
 
 
 def import_mujoco() -> None:
@@ -86,6 +88,7 @@ def renderer(model: Any, width: int, height: int) -> Any:
             importlib.reload(gl_context)  # where somebody else imported MuJoCo it has chosen already
         if gl_context.GLContext.__module__ == "mujoco.glfw" and (why := _no_window()):
             raise RuntimeError(why)  # drawing without a display, MuJoCo ends the process at the second try
+        model.vis.quality.shadowsize, model.vis.map.shadowclip = _SHADOW_TEXELS, _SHADOW_REACH
         return mujoco.Renderer(model, height, width)
     except ValueError:
         raise

@@ -1,0 +1,280 @@
+"""The page of every key in scenario, part, noise, arm and sweep files, read from the program itself.
+
+Readers of TOML say which keys a table may have: they are listened to while they read the files of the package and the
+example of the guide. What a key means stands here; a key without a meaning, or a meaning without a key, is an error.
+Part files have a table of what is allowed, arms are a dataclass.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+from apo_bench.io.strict_json import JsonNode
+from apo_bench.observation.noise_file import presets, read_noise
+from apo_bench.parts.allowed import ELEMENT_RULES
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.simulation.scene.arm import Arm
+from apo_bench.sweeps.sweep_file import read_sweep
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "docs" / "guide" / "scenario.md", ROOT / "docs" / "guide" / "sweeps.md"
+POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; else `[0, 0, 0]`"}
+SHIFT = "axis of the part: `x`, `+y`, `-z`, ... or three numbers"
+MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
+    "Scenario files": {
+        "": {
+            "schema": "1",
+            "title": "what the task is, in a few words",
+            "paper": "where it stands in the paper",
+            "human": "what the simulated person does, for people who read the task card",
+            "success": "what is right at the end, for people who read the task card",
+            "clearance_mm": "room per side of parts that fit, 0 to 5; else 0.25",
+            "gap_mm": "below this gap a contact equation counts as solved, up to 5; else 0.1",
+            "parts": "one table per part: `[parts.NAME]`",
+            "operations": "one table per operation, in order: `[[operations]]`",
+            "site": "where the assembly stands; else at the origin of the table",
+            "careless": "the error of the person; else there is none",
+            "judge": "thresholds of the verdict",
+        },
+        "parts.NAME": {
+            "file": "a part of the package by name, or a part file relative to this file",
+            "fixed": "`true`: the part never moves",
+            "follows_site": "`true`: a fixed part that stands where the assembly stands",
+            "start": "pose in the world before the first operation; every part that is not fixed needs one",
+            "color": "red, green, blue, 0 to 1",
+        },
+        "pose: start, goal": POSE,
+        "operations": {
+            "move": "the part that is moved",
+            "carries": "parts that go with it",
+            "goal": "pose of the moved part in the frame of the assembly when the operation is over",
+            "contacts": "pairs `[face of what moves, part.face of what rests]`, or tables",
+            "attach": "a preference for the way to the goal; else it is found",
+            "grasp": "where the gripper takes the part; else above its middle",
+            "vary": "a shift that each trial draws, or a list of them (20 in a scenario at most)",
+        },
+        "operations, contacts": {
+            "faces": "the pair of faces",
+            "kind": "`centred` (else), `contact` or `clearance`",
+            "gap_mm": "of `clearance`: lowest and highest distance; else the play",
+        },
+        "operations, attach": {
+            "along": f"direction of the last motion, {SHIFT}",
+            "travel_mm": "length of the last motion",
+        },
+        "operations, grasp": {
+            "at_mm": "point between the fingers, frame of the part",
+            "across": f"axis along which the fingers close, level when the part is picked; {SHIFT}",
+        },
+        "operations, vary": {"along": SHIFT, "mm": "lowest and highest shift"},
+        "site": {
+            "center_mm": "middle of the places, x and y in the world",
+            "spread_mm": "how far from it in x and y, to either side",
+            "yaw_deg": "lowest and highest turn about the vertical",
+        },
+        "careless": {
+            "operation": "number of the operation that goes wrong, from 1",
+            "along": f"direction of the error, level at the goal; {SHIFT}",
+            "size_mm": "lowest and highest size, to either side; `careless` of a trial scales it",
+        },
+        "judge": {
+            "success": "`assembled` (else) or `as_demonstrated`: which verdict counts as success",
+            "fit_margin_mm": "gap of parts that fit beyond the clearance",
+            "support_mm": "gap of other contacts",
+            "overlap_fraction": "share of the true overlap that must be covered",
+            "penetration_mm": "depth of one part in another",
+            "pushed_mm": "displacement of a corner after its part was put down",
+            "rest_mm_s": "speed below which a part is at rest",
+            "rest_deg_s": "turning speed below which a part is at rest",
+            "loose_gap_mm": "gap of the loose verdict",
+            "loose_angle_deg": "angle of the loose verdict",
+        },
+    },
+    "Noise files": {
+        "": {
+            "schema": "`apo-bench/noise/1`",
+            "source": "whose errors these are",
+            "missed_rate": "share of parts that were not found, 0 to 1",
+            "outlier_rate": "share of outliers among those that were found, 0 to 1",
+            "outlier_farthest_mm": "outliers are off by `limit_mm` to this",
+            "shift": "errors of the position",
+            "turn": "errors of the turn",
+            "camera": "pose of the camera in the world, `{ at_mm, turn_deg }`; else the default one",
+        },
+        "shift": {
+            "limit_mm": "no error of an inlier is longer",
+            "across_scale_mm": "scale of the Student t across the ray",
+            "across_degrees_of_freedom": "its degrees of freedom, `inf` for a Gaussian",
+            "along_scale_mm": "scale of the Student t along the ray",
+            "along_degrees_of_freedom": "its degrees of freedom",
+        },
+        "turn": {
+            "limit_deg": "no turn of an inlier is larger",
+            "across_scale_deg": "scale of the Student t of turns about axes across the ray",
+            "across_degrees_of_freedom": "its degrees of freedom, `inf` for a Gaussian",
+            "along_scale_deg": "scale of the Student t of turns about the ray",
+            "along_degrees_of_freedom": "its degrees of freedom",
+        },
+    },
+    "Sweep files": {
+        "": {
+            "scenarios": "names, or scenario files",
+            "levels": "numbers, or pairs of mm and degrees",
+            "careless": "numbers from 0; else `[1]`",
+            "methods": "names, or `module:name`",
+            "noises": "noise models; else `['isotropic']`",
+            "relations": "what correctors are told of the contacts; else `['given']`",
+            "eyes": "`noise` or `range`; else `['noise']`",
+            "grasps": "`friction` or `weld`; else `['friction']`",
+            "clearances_mm": "clearances; else that of each scenario",
+            "trials": "seeds per cell, 1 to 1000000",
+            "seed": "the first seed; else 0",
+            "arm": "one for the whole sweep; else `six_axis`",
+            "timestep_ms": "one for the whole sweep; else 1",
+            "fidelity": "`full` (else) or `contact`, one for the whole sweep",
+            "also": "further grids, one table each: `[[also]]`. What a grid does not state is as above",
+        },
+    },
+}
+"""File -> table -> key -> what it means."""
+HEAD = """# File keys
+
+Every key of every file that you may write. In scenario, noise and sweep files lengths are in mm and angles in degrees;
+in part files, as always in MJCF, lengths are in metres. A key that is not listed is refused, with the nearest one that
+is. *Needed*: the file is refused without it.
+"""
+Keys = dict[str, tuple[frozenset[str], frozenset[str]]]
+"""Table -> keys that are needed, keys that are allowed."""
+
+
+def page() -> str:
+    """The page, as Markdown."""
+    found = {"Scenario files": scenario_keys(), "Noise files": noise_keys(), "Sweep files": sweep_keys()}
+    lines = [HEAD]
+    for file, tables in MEANINGS.items():
+        said, known = {t: set(keys) for t, keys in tables.items()}, {t: set(k[1]) for t, k in found[file].items()}
+        if said != known:
+            raise ValueError(f"docs/file_keys.py, {file}: {said} is explained, {known} is read.")
+        lines += ["", f"## {file}"]
+        for table, keys in tables.items():
+            needed = found[file][table][0]
+            lines += ["", f"### `{table}`" if table else "### At the top", ""]
+            lines += ["| key | needed | meaning |", "|---|---|---|"]
+            lines += [f"| `{key}` | {'yes' if key in needed else ''} | {means} |" for key, means in keys.items()]
+    return "\n".join([*lines, *part_lines(), *arm_lines()]) + "\n"
+
+
+def scenario_keys() -> Keys:
+    with listening() as heard, tempfile.TemporaryDirectory() as folder:
+        for name in scenario_names():
+            load_scenario(name)
+        own = Path(folder) / "own.toml"
+        own.write_text(example(EXAMPLES[0], "own.toml"), encoding="utf-8")
+        load_scenario(own)
+    return named(heard, scenario_table)
+
+
+def noise_keys() -> Keys:
+    with listening() as heard:
+        for path in presets().values():
+            read_noise(path)
+    return named(heard, lambda key: key)
+
+
+def sweep_keys() -> Keys:
+    with listening() as heard, tempfile.TemporaryDirectory() as folder:
+        mine = Path(folder) / "mine.toml"
+        mine.write_text(example(EXAMPLES[1], "mine.toml"), encoding="utf-8")
+        read_sweep(mine)
+    return named(heard, lambda key: "" if not key else None)
+
+
+def example(guide: Path, name: str) -> str:
+    """The example of a guide that has this title."""
+    found = re.search(rf'^```toml title="{re.escape(name)}"\n(.*?)^```', guide.read_text(encoding="utf-8"), re.M | re.S)
+    assert found is not None, f"{guide} has no example '{name}'"
+    return found.group(1)
+
+
+@contextmanager
+def listening() -> Iterator[list[tuple[str, tuple[str, ...], tuple[str, ...]]]]:
+    """Which keys readers ask of which place in a file, while they read."""
+    heard: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = []
+    fields = JsonNode.fields
+
+    def listened(self: JsonNode, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
+        heard.append((self.key, tuple(required), tuple(optional)))
+        return fields(self, required, optional)
+
+    with patch.object(JsonNode, "fields", listened):
+        yield heard
+
+
+def named(heard: Iterable[tuple[str, tuple[str, ...], tuple[str, ...]]], table_of: object) -> Keys:
+    assert callable(table_of)
+    tables: Keys = {}
+    for key, required, optional in heard:
+        table = table_of(key)
+        if table is not None:
+            tables[table] = frozenset(required), frozenset((*required, *optional))
+    return tables
+
+
+def scenario_table(key: str) -> str:
+    """`operation 2, contacts, contact 1` as the table that it is an entry of."""
+    words = [re.sub(r" \d+$", "", word) for word in key.split(", ")] if key else []
+    if words and words[-1] in ("start", "goal"):
+        return "pose: start, goal"
+    if words[:1] == ["parts"]:
+        return "parts.NAME"
+    if words[:1] == ["operation"]:
+        inside = [word for word in words[1:] if word in MEANINGS["Scenario files"]["operations"]]
+        return ", ".join(["operations", *dict.fromkeys(inside)])
+    return ", ".join(words)
+
+
+def part_lines() -> list[str]:
+    lines = ["", "## Part files", "", "A part file holds these elements and attributes, and nothing else."]
+    for place, allowed in ELEMENT_RULES.items():
+        outside, element = place.split("/") if "/" in place else ("", place)
+        lines += ["", f"### `<{element}>`" + (f" in `<{outside}>`" if outside else ""), ""]
+        if allowed.inside:
+            elements = ", ".join(f"`<{name}>` (at most {n})" for name, n in allowed.inside.items())
+            lines += [f"Elements: {elements}.", ""]
+        if allowed.attributes:
+            lines += ["| attribute | value |", "|---|---|"]
+            lines += [f"| `{name}` | {value.said()} |" for name, value in allowed.attributes.items()]
+    return lines
+
+
+def arm_lines() -> list[str]:
+    """The fields of `Arm`, with the sentences below them."""
+    lines = ["", "## Arms", "", "An arm is data: `--arm mymodule:my_arm`, where `my_arm` is an"]
+    lines[-1] += " `apo_bench.simulation.scene.arm.Arm` or a function that returns one. The site `tip` lies between the"
+    lines[-1] += " fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example."
+    lines += ["", "| field | meaning |", "|---|---|"]
+    body = ast.parse(inspect.getsource(Arm)).body[0]
+    assert isinstance(body, ast.ClassDef)
+    for field, below in zip(body.body, [*body.body[1:], None], strict=True):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            text = below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else ""
+            lines.append(f"| `{field.target.id}` | {' '.join(str(text).split()) or OBVIOUS[field.target.id]} |")
+    return lines
+
+
+OBVIOUS = {
+    "mjcf": "The file that describes the arm.",
+    "tip": "Name of the site between the fingertips.",
+}
+"""Fields of an arm that have no sentence of their own."""
+
+if __name__ == "__main__":
+    sys.stdout.write(page())
