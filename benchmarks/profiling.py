@@ -26,7 +26,7 @@ from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.arm import Kinematics
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import plan
-from apo_bench.trial.stages import see, show
+from apo_bench.trial.stages import observe_recording, record_demonstration
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "profile.json"
@@ -100,8 +100,8 @@ def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
 
 def planned(scene: Scene, method: str, seed: int) -> Any:
     """What a method would have the robot do."""
-    shown = show(scene, 1.0, seed)
-    made = plan(method, see(scene, shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals)
+    shown = record_demonstration(scene, 1.0, seed)
+    made = plan(method, observe_recording(shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals)
     assert made.plan is not None, made.refused
     return made.plan
 

@@ -33,7 +33,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.settling import settle
 from apo_bench.trial.pose_error import goal_errors
-from apo_bench.trial.stages import Shown, attempt, see, show
+from apo_bench.trial.stages import Recording, observe_recording, record_demonstration, replay_and_judge
 
 SCENARIOS, LEVELS, CARELESS, FIRST_SEED = ("stick_in_tower", "vanished_fixture"), (1.0, 2.0), 1.0, 100_000
 GRIDS: Mapping[str, tuple[Callable[..., Any], Mapping[str, tuple[float, ...]]]] = {
@@ -73,7 +73,7 @@ def main(seeds: int = 6) -> None:
     for name in SCENARIOS:
         scene = build_scene(load_scenario(name))
         for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-            shown = show(scene, CARELESS, seed)
+            shown = record_demonstration(scene, CARELESS, seed)
             for level, method in product(LEVELS, GRIDS):
                 for values in product(*GRIDS[method][1].values()):
                     replayed = _replayed(scene, shown, level, seed, _corrector(method, values))
@@ -95,11 +95,11 @@ def _corrector(method: str, values: Values) -> Callable[..., Any]:
     return partial(GRIDS[method][0], **_settings(method, values))
 
 
-def _replayed(scene: Scene, shown: Shown, level: float, seed: int, corrector: Callable[..., Any]) -> Replayed:
-    seen, truth = see(scene, shown, make_noise("isotropic", Level(level, level)), seed), shown.layout.goals
+def _replayed(scene: Scene, shown: Recording, level: float, seed: int, corrector: Callable[..., Any]) -> Replayed:
+    seen, truth = observe_recording(shown, make_noise("isotropic", Level(level, level)), seed), shown.layout.goals
     made = correct(seen, corrector)
     fixed_mm, free_mm = goal_errors(seen.assembly, seen.start, truth, made.goals)
-    won = made.ok and attempt(Plan(seen.assembly, seen.start, made.goals), scene, truth).verdict.success
+    won = made.ok and replay_and_judge(Plan(seen.assembly, seen.start, made.goals), scene, truth).verdict.success
     return Replayed(bool(won), made.gap_after_m * 1e3, fixed_mm, free_mm)
 
 

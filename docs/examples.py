@@ -24,7 +24,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import Camera, picture_with_arm, view
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import plan
-from apo_bench.trial.stages import attempt, see, show
+from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 5
@@ -113,8 +113,8 @@ def main(names: list[str]) -> None:
 
 def _draw(name: str, strip: Strip) -> None:
     scene = build_scene(load_scenario(name))
-    shown = show(scene, 1.0, SEED)
-    seen = see(scene, shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
+    shown = record_demonstration(scene, 1.0, SEED)
+    seen = observe_recording(shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
     raw, corrected = plan("none", seen, None).plan, plan(strip.method, seen, None).plan
     assert raw is not None, "everything was seen"
     assert corrected is not None, f"{strip.method} corrects {name}"
@@ -138,7 +138,7 @@ def _watched(scene: Scene, plan: Plan, reference: Array) -> tuple[ReplayResult, 
     def watch(data: Any) -> None:
         states.append((float(data.time), np.array(data.qpos)))
 
-    return attempt(plan, scene, reference, watch).result, states
+    return replay_and_judge(plan, scene, reference, watch).result, states
 
 
 def _state(watched: tuple[ReplayResult, list[tuple[float, Array]]], moment: Moment) -> Array:

@@ -21,7 +21,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.show.believed_picture import belief_panel, draw_beliefs
 from apo_bench.simulation.scene.render import Camera, picture_with_arm, view
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import attempt, see, show
+from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
 
 HERE = Path(__file__).parent / "pictures"
 SEED, LEVEL = 7, 2.0
@@ -33,8 +33,8 @@ HOLE_M, NEAR_M, HELD_M = 0.04, 0.01, 0.2
 
 def main() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
-    shown = show(scene, 1.0, SEED)
-    seen = see(scene, shown, make_noise("isotropic", Level(LEVEL, LEVEL)), SEED)
+    shown = record_demonstration(scene, 1.0, SEED)
+    seen = observe_recording(shown, make_noise("isotropic", Level(LEVEL, LEVEL)), SEED)
     corrected = correct(seen, "contact").goals
     panels = []
     for title, goals in (("As seen: jams", seen.goals), ("Corrected: it fits", corrected)):
@@ -61,7 +61,7 @@ def deepest(scene: Scene, plan: Plan, reference: Array) -> Array:
         if held and before_it and (not best or depth > best[-1][0]):
             best.append((depth, np.array(data.qpos)))
 
-    attempt(plan, scene, reference, watch)
+    replay_and_judge(plan, scene, reference, watch)
     return best[-1][1]
 
 

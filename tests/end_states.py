@@ -10,7 +10,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.judgement import Judgement
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records.thresholds import Criteria, Thresholds
 from tests import scenes
 
 CLEARANCE_MM = 0.25
@@ -90,7 +90,9 @@ def verdict(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds =
     """The judge's answer to that."""
     there = scenes.turned(scene, LAYOUT)
     snapshots = [snapshot(state) if state else None for state in reached(scene, edits)]
-    return judge(there.assembly, Reached(tuple(snapshots[:-1]), snapshots[-1]), there.goals, thresholds, CLEARANCE_MM)
+    return judge(
+        there.assembly, Reached(tuple(snapshots[:-1]), snapshots[-1]), there.goals, Criteria(thresholds, CLEARANCE_MM)
+    )
 
 
 def shown(scene: scenes.Scene, edits: Sequence[Edit], thresholds: Thresholds = Thresholds()) -> Judgement:  # noqa: B008

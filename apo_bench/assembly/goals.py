@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.records import copyable
 
@@ -59,6 +60,10 @@ class Demonstration:
     """`ok`, or `demonstration_failed`."""
     why: str = ""
     """What the judge found wrong, in words."""
+    gap_m: float = 1e-4
+    """Largest |e| at which the contact equations count as solved, [m]; what observes it passes it on."""
+    play_m: float = 0.0
+    """Clearance per side of the parts that fit, [m]; what observes it passes it on."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
@@ -97,6 +102,19 @@ class Observation:
             raise ValueError(f"`seen` needs shape ({n},), {seen.shape} was given")
         seen.flags.writeable = False
         object.__setattr__(self, "seen", seen)
+
+    def plan(self) -> Plan:
+        """What was seen, as it is: the plan of the method `none`.
+
+        Raises:
+            InputError: An operation was not seen.
+        """
+        if not self.seen.all():
+            raise InputError(
+                f"operation {int(np.argmin(self.seen)) + 1} was not seen, so the observation cannot be replayed as is; "
+                "observe the demonstration again."
+            )
+        return Plan(self.assembly, self.start, self.goals)
 
 
 class Step(NamedTuple):
@@ -242,6 +260,20 @@ class Correction:
     def ok(self) -> bool:
         return self.status == "converged"
 
+    def plan(self, observation: Observation) -> Plan:
+        """What the robot is to do after this correction of `observation`.
+
+        Raises:
+            InputError: The correction did not converge, so its goals are not meant to be executed.
+        """
+        if not self.ok:
+            raise InputError(
+                f"the correction ended as {self.status} ({self.sentence}), which no robot should carry out; look at "
+                "`correction.ok` first."
+            )
+        targets = np.zeros((0, 4, 4)) if self.targets is None else self.targets
+        return Plan(observation.assembly, observation.start, self.goals, self.schedule, targets)
+
 
 @final
 @copyable
@@ -267,14 +299,19 @@ class Snapshot:
 @final
 @dataclass(frozen=True)
 class Outcome:
-    """How a replay ended, as the robot knows it; whether the assembly is right is the judge's to say."""
+    """How a replay ended, as the robot knows it, or a whole trial, as the judge knows it."""
 
     stage: str
+    """`done`, or where it failed."""
     code: str
     """`ok`, or one of the codes in `apo_bench.records.outcomes`."""
     operation: int | None
     """Counted from 0."""
     sentence: str
+
+    @property
+    def failed(self) -> bool:
+        return self.stage != "done"
 
 
 @final

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Observation, Plan, Poses, Step
+from apo_bench.assembly.goals import Observation, Outcome, Plan, Poses, Step
 from apo_bench.assembly.topology import Assembly
 from apo_bench.envs.episode import Scenes, Settings, with_options
 from apo_bench.envs.nullable import predicted_info, whole
@@ -25,7 +25,17 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.stages import Ending, Shown, attempt, ending, foretold, misshown, see, show, through, unseen
+from apo_bench.trial.stages import (
+    Recording,
+    demonstration_failure,
+    observation_failure,
+    observe_recording,
+    predicted_outcome,
+    range_sensor,
+    record_demonstration,
+    replay_and_judge,
+    trial_outcome,
+)
 
 ROOM_M = 2.0
 """Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""
@@ -151,10 +161,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         )
         self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
         self._trial: int | None = None
-        self._shown: Shown | None = None
+        self._shown: Recording | None = None
         self._seen: Observation | None = None
         self._aim: Plan | None = None
-        self._refused: Ending | None = None
+        self._refused: Outcome | None = None
         self._over = False
         self._poses: Poses = self._scene.scenario.start
         self._state: Array | None = None
@@ -205,11 +215,11 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         super().reset(seed=seed)
         self._over = True
         self._trial, shown = self._watch_human(seed)
-        noise = through(self._scene, shown, self._now.level.mm) if self._eye == RANGE else self._noise
-        self._seen = see(self._scene, shown, noise, self._trial)
+        noise = range_sensor(self._scene, shown, self._now.level.mm) if self._eye == RANGE else self._noise
+        self._seen = observe_recording(shown, noise, self._trial)
         self._shown = replace(shown, watched=None)
         self.aim(self._seen.goals)
-        self._refused, self._over = unseen(self._seen), False
+        self._refused, self._over = observation_failure(self._seen), False
         self._poses, self._state = shown.layout.start, None
         return self._observation(), {"demonstration": shown.demonstration.code}
 
@@ -255,7 +265,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def refuse(self, code: str, why: str) -> None:
         """Do not replay at all: the next step fails at stage `correct`; for wrappers."""
-        self._refused = Ending("correct", code, None, why)
+        self._refused = Outcome("correct", code, None, why)
 
     def render(self) -> Any:
         """The scene as an array (480, 640, 3) of uint8; None in mode `human`, which shows the replay itself."""
@@ -282,11 +292,11 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._scene = self._scenes.of(now.clearance_mm)
         self._now, self._noise = now, noise
 
-    def _watch_human(self, seed: int | None) -> tuple[int, Shown]:
+    def _watch_human(self, seed: int | None) -> tuple[int, Recording]:
         """Trial `seed`, or the next one whose demonstration is right."""
         for _ in range(1 if seed is not None else MOST_TRIES):
             trial = int(seed) if seed is not None else self._next_trial()
-            shown = show(self._scene, self._now.careless, trial, self._eye)
+            shown = record_demonstration(self._scene, self._now.careless, trial, self._eye)
             if seed is not None or shown.demonstration.code == "ok":
                 return trial, shown
         raise InputError(
@@ -303,20 +313,20 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         goals = packed(self.seen.goals)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
-    def _replayed(self, shown: Shown, plan: Plan) -> tuple[dict[str, bool], Ending, dict[str, Any] | None]:
+    def _replayed(self, shown: Recording, plan: Plan) -> tuple[dict[str, bool], Outcome, dict[str, Any] | None]:
         """The verdicts, where it ended, and what the plan had said."""
         failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
         if shown.demonstration.code != "ok":
-            return failed, misshown(shown.demonstration), None
+            return failed, demonstration_failure(shown.demonstration), None
         if self._refused is not None:
             return failed, self._refused, None
-        said = foretold(plan, self._scene)
-        tried = attempt(plan, self._scene, shown.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
+        said = predicted_outcome(plan, self._scene)
+        tried = replay_and_judge(plan, self._scene, shown.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
         if tried.result.reached.final is not None:
             self._poses = tried.result.reached.final.poses
         judged = tried.verdict
         verdicts = (judged.success, judged.as_demonstrated, judged.loose_success)
-        return dict(zip(failed, verdicts, strict=True)), ending(tried), said
+        return dict(zip(failed, verdicts, strict=True)), trial_outcome(tried), said
 
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""

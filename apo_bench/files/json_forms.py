@@ -96,6 +96,8 @@ def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> De
         final=_poses(root["final"], found),
         careless=np.array([_covariance(entry["careless_mm_deg"], definite=False) for entry in entries]),
         code=root["code"].text(),
+        gap_m=found.gap_mm * 1e-3,
+        play_m=found.clearance_mm * 1e-3,
     )
 
 

@@ -13,7 +13,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.judging.demonstrated import judge_demonstrated
 from apo_bench.judging.finished import judge_finished
 from apo_bench.judging.judgement import Judgement
-from apo_bench.records.thresholds import Meaning, Thresholds
+from apo_bench.records.thresholds import Criteria, Meaning
 
 
 @final
@@ -49,14 +49,7 @@ class Verdict:
         return self.demonstrated if strict else self.finished
 
 
-def judge(
-    assembly: Assembly,
-    reached: Reached,
-    reference: Array,
-    thresholds: Thresholds,
-    clearance_mm: float,
-    meaning: Meaning = "assembled",
-) -> Verdict:
+def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Criteria) -> Verdict:
     """Judge what was reached.
 
     Args:
@@ -64,13 +57,12 @@ def judge(
             fails the assembly.
         reference: (n, 4, 4), the true goals, world frame, [m]; they say how large an overlap should be, and which of
             a part's symmetries is meant.
-        clearance_mm: Per side, of the parts that were used.
     """
     sound = Reached(after=tuple(map(_sound, reached.after)), final=_sound(reached.final))
     return Verdict(
-        meaning,
-        finished=judge_finished(assembly, sound, reference, thresholds, clearance_mm),
-        demonstrated=judge_demonstrated(assembly, sound, reference, thresholds, clearance_mm),
+        criteria.success_means,
+        finished=judge_finished(assembly, sound, reference, criteria.thresholds, criteria.clearance_mm),
+        demonstrated=judge_demonstrated(assembly, sound, reference, criteria.thresholds, criteria.clearance_mm),
     )
 
 

@@ -1,4 +1,4 @@
-"""Observe a demonstration: what was shown, seen through a noise model."""
+"""Observe a demonstration through a noise model."""
 
 from __future__ import annotations
 
@@ -11,43 +11,56 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import is_rigid
-from apo_bench.observation.noise import Noise
+from apo_bench.observation.noise import Level, Noise, make_noise
+from apo_bench.records.settings import level_pair
 
 
 def observe(
-    shown: Demonstration, noise: Noise, rng: np.random.Generator, gap_m: float = 1e-4, play_m: float = 0.0
+    demonstration: Demonstration,
+    noise: Noise | type | str,
+    rng: np.random.Generator,
+    *,
+    level: float | tuple[float, float] | None = None,
 ) -> Observation:
     """What the noise model makes of a demonstration, checked.
 
     Args:
-        noise: A function `(assembly, shown, rng) -> Observation`; `make_noise` finds one by name.
+        noise: A name, `"package.module:name"`, a noise file or a class, which are made with the level; or a function
+            `(assembly, demonstration, rng) -> Observation`. See `make_noise`.
         rng: The only source of chance.
-        gap_m: Largest |e| at which the contact equations will count as solved, [m].
-        play_m: Clearance per side of parts that fit, [m].
+        level: Standard deviation in mm and degrees, one number for both or a pair; 1 if it is not given.
 
     Raises:
-        InputError: The noise model raised an error, or returned what is not an observation of this demonstration.
+        InputError: There is no such noise model, it raised an error, it returned what is not an observation of this
+            demonstration, or a level was given for a noise model that is made already.
     """
+    if isinstance(noise, str | type):
+        noise = make_noise(noise, Level(*level_pair(1.0 if level is None else level)))
+    elif level is not None:
+        raise InputError(
+            f"the level {level!r} was given together with a noise model that is made already; leave the level out, or "
+            "give the name or the class of the model."
+        )
     name = getattr(noise, "__name__", type(noise).__name__)
     try:
-        seen = noise(shown.assembly, shown, rng)
-        complaint = _complaint(shown, seen)
+        seen = noise(demonstration.assembly, demonstration, rng)
+        complaint = _complaint(demonstration, seen)
     except InputError:
         raise
     except Exception as error:
         raise failed(f"the noise model '{name}'", error) from error
     if complaint:
         raise InputError(f"the noise model '{name}' {complaint}.")
-    return replace(seen, gap_m=gap_m, play_m=play_m)
+    return replace(seen, gap_m=demonstration.gap_m, play_m=demonstration.play_m)
 
 
-def _complaint(shown: Demonstration, seen: Any) -> str:
+def _complaint(demonstration: Demonstration, seen: Any) -> str:
     """What is wrong with what a noise model returned; empty if nothing is."""
     if not isinstance(seen, Observation):
         return f"returned {type(seen).__name__}; return an apo_bench.assembly.goals.Observation"
-    if seen.assembly is not shown.assembly:
+    if seen.assembly is not demonstration.assembly:
         return "changed the assembly, which is taken as certain; pass on the one it was given"
-    if set(seen.start) != set(shown.start):
+    if set(seen.start) != set(demonstration.start):
         return "changed which parts have a start pose; pass on `shown.start`"
     for wrong in np.flatnonzero(~is_rigid(seen.goals)):
         return (

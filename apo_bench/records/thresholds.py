@@ -33,3 +33,14 @@ class Thresholds:
     """Loose: a contact may be off by this."""
     loose_angle_deg: float = 5.0
     """Loose: the normals of touching faces may be off by this."""
+
+
+@final
+@dataclass(frozen=True)
+class Criteria:
+    """What the judge decides by: `Scene.criteria` has those of a scene."""
+
+    thresholds: Thresholds
+    clearance_mm: float
+    """Per side, of the parts that were used."""
+    success_means: Meaning = "assembled"

@@ -13,7 +13,14 @@ from apo_bench.records.settings import RANGE, check_careless, check_level, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages
-from apo_bench.trial.stages import OBSERVATION, Shown, misshown, show, stream, through
+from apo_bench.trial.stages import (
+    OBSERVATION,
+    Recording,
+    demonstration_failure,
+    range_sensor,
+    record_demonstration,
+    stream,
+)
 
 
 @final
@@ -23,7 +30,7 @@ class SensorRun:
 
     name: str
     """Of the scenario."""
-    shown: Shown
+    shown: Recording
     watched: DemonstrationImages
     images: tuple[Array, ...]
     """Measured range images, (views, height, width) each, [m]."""
@@ -41,11 +48,11 @@ def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> Se
     check_careless(careless)
     check_seed(seed)
     scene = build_scene(load_scenario(scenario))
-    shown = show(scene, careless, seed, RANGE)
+    shown = record_demonstration(scene, careless, seed, RANGE)
     if shown.demonstration.code != "ok":
-        raise RuntimeError(f"{misshown(shown.demonstration).sentence}; try another seed")
+        raise RuntimeError(f"{demonstration_failure(shown.demonstration).sentence}; try another seed")
     assert shown.watched is not None
-    eye = through(scene, shown, level_mm)
+    eye = range_sensor(scene, shown, level_mm)
     images = tuple(eye.sensed(stream(seed, OBSERVATION)))
     return SensorRun(scene.scenario.name, shown, shown.watched, images, eye.events(shown.demonstration, images))
 

@@ -28,8 +28,8 @@ from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.local.alone import Say, run_alone
 from apo_bench.sweeps.worker import lost, row_of
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.stages import Shown, misshown, see, show
-from apo_bench.trial.trial import MEASURED, eye_of, run_measured
+from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
+from apo_bench.trial.trial import MEASURED, noise_of, run_measured, scene_of
 
 MEASURED_AIR_M = 5e-3
 """A start that was measured may be wrong by so much: as far apart as `loose_success` lets faces be."""
@@ -87,14 +87,7 @@ def _run(request: Request, spec: TrialSettings, say: Say) -> None:
 
 
 def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say) -> None:
-    scenario = load_scenario(request.scenario)
-    scene = build_scene(
-        scenario,
-        clearance_mm=spec.clearance_mm,
-        grasp=spec.grasp,
-        arm=spec.arm,
-        timestep_s=spec.timestep_s,
-    )
+    scene = scene_of(spec)
     film = _film(scene) if request.video else None
     say("began")
     if request.observation:
@@ -153,19 +146,19 @@ def watched(request: Request) -> Observation:
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
     scene = build_scene(scenario, clearance_mm=spec.clearance_mm, grasp=spec.grasp, arm=spec.arm)
-    shown = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    shown = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if shown.demonstration.code != "ok":
-        raise RuntimeError(f"{misshown(shown.demonstration).sentence}; try another seed")
+        raise RuntimeError(f"{demonstration_failure(shown.demonstration).sentence}; try another seed")
     return look(spec, scene, shown)
 
 
-def look(spec: TrialSettings, scene: Scene, shown: Shown) -> Observation:
+def look(spec: TrialSettings, scene: Scene, shown: Recording) -> Observation:
     """The demonstration of a trial through its eye."""
-    return see(scene, shown, eye_of(spec, scene, shown), spec.seed, spec.salt)
+    return observe_recording(shown, noise_of(spec, scene, shown), spec.seed, spec.salt)
 
 
 def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
-    shown = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    shown = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, shown), name), request.save_observation)

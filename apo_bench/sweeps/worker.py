@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, final
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.goals import Observation, Outcome
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
@@ -21,13 +21,13 @@ from apo_bench.records.row import Row
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.row import head, result
-from apo_bench.trial.stages import Ending, Shown, show
-from apo_bench.trial.trial import run_trial
+from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.trial import run_trial, scene_of
 
 Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
@@ -72,7 +72,7 @@ class Worker:
         Raises:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
         """
-        demonstrations: dict[tuple[float, str], Shown] = {}
+        demonstrations: dict[tuple[float, str], Recording] = {}
         branches = ReplayCache()
         for spec in unit.trials:
             if stopped():
@@ -84,7 +84,7 @@ class Worker:
             began(spec)
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
-                demonstrations[key] = show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+                demonstrations[key] = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
             shown = time.perf_counter()
             row = row_of(spec, scene, demonstrations[key], content, method=method, branches=branches)
             spent = (ready - start, shown - ready, time.perf_counter() - shown)
@@ -104,20 +104,14 @@ class Worker:
     def _scene(self, spec: TrialSettings) -> tuple[Scene, str]:
         key = (spec.scenario, spec.clearance_mm, spec.grasp)
         if key not in self._scenes:
-            scene = build_scene(
-                load_scenario(spec.scenario),
-                clearance_mm=spec.clearance_mm,
-                grasp=spec.grasp,
-                arm=spec.arm,
-                timestep_s=spec.timestep_s,
-            )
+            scene = scene_of(spec)
             content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
             self._lock.check_content(spec.scenario, content)
             self._scenes[key] = (scene, content)
         return self._scenes[key]
 
 
-def row_of(spec: TrialSettings, scene: Scene, shown: Shown, content: str, **more: Any) -> Row:
+def row_of(spec: TrialSettings, scene: Scene, recording: Recording, content: str, **more: Any) -> Row:
     """The row of a trial, also of one whose corrector misbehaved.
 
     What code of somebody's own returned may be what no row can hold; that is its failure too.
@@ -129,14 +123,14 @@ def row_of(spec: TrialSettings, scene: Scene, shown: Shown, content: str, **more
         InputError: The request cannot be honoured.
     """
     try:
-        row = run_trial(spec, scene, shown=shown, content=content, **more)
+        row = run_trial(spec, scene, recording=recording, content=content, **more)
         wrong = unwritable(row) if ":" in spec.method else ""
         said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
     except CorrectorLost as error:
         return lost(spec, content, error.code, "corrector")
     except CorrectorMisbehaved as error:
         wrong = said = str(error)
-    return misbehaved(spec, content, shown.demonstration.code, said) if wrong else row
+    return misbehaved(spec, content, recording.demonstration.code, said) if wrong else row
 
 
 def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:
@@ -149,7 +143,7 @@ def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> R
         code: `worker_died` or `time_limit`.
         what: Whose process died or whose limit it was: `trial` or `corrector`.
     """
-    return _failed(spec, content, None, Ending("worker", code, None, sentence(code, what=what)))
+    return _failed(spec, content, None, Outcome("worker", code, None, sentence(code, what=what)))
 
 
 def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
@@ -157,7 +151,7 @@ def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
     took_s = (timing["demonstrate_s"] or 0.0) + (timing["trial_s"] or 0.0)
     if took_s <= limit_s or row["failure_stage"] == "worker":
         return row
-    late = Ending("worker", "time_limit", None, sentence("time_limit"))
+    late = Outcome("worker", "time_limit", None, sentence("time_limit"))
     return row | {"demonstration": None} | result(late, success=False)
 
 
@@ -168,7 +162,7 @@ def misbehaved(spec: TrialSettings, content: str, demonstration: str, said: str)
         said: What it did; addresses of objects, which differ from run to run, are left out.
     """
     said = ADDRESS.sub("0x...", said.encode(errors="replace").decode())
-    return _failed(spec, content, demonstration, Ending("correct", "raised", None, said))
+    return _failed(spec, content, demonstration, Outcome("correct", "raised", None, said))
 
 
 def timing(
@@ -189,6 +183,6 @@ def _raise(error: Exception, seen: Observation) -> None:
     raise error
 
 
-def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Ending) -> Row:
+def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Outcome) -> Row:
     first = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
     return first | {"demonstration": demonstration} | result(end, success=False)

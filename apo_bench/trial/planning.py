@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Correction, Observation, Plan, Try
+from apo_bench.assembly.goals import Correction, Observation, Outcome, Plan, Try
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
 from apo_bench.trial.methods import with_simulated
-from apo_bench.trial.stages import Ending, unseen
+from apo_bench.trial.stages import observation_failure
 
 
 @final
@@ -20,7 +20,7 @@ class Planned:
     """What a method made of an observation: a plan, or why there is none."""
 
     plan: Plan | None
-    refused: Ending | None
+    refused: Outcome | None
     freed: tuple[int, ...]
     tried: tuple[Try, ...]
     gap_before_m: float
@@ -43,11 +43,11 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
     if isinstance(method, str) and method == "oracle" and truth is not None:
         return _as_it_is(seen, truth, None)
     if isinstance(method, str) and method == "none":
-        return _as_it_is(seen, seen.goals, unseen(seen))
+        return _as_it_is(seen, seen.goals, observation_failure(seen))
     made = correct_named(seen if told is None else told, with_simulated(method))
     return Planned(
-        plan=planned(seen, made) if made.ok else None,
-        refused=None if made.ok else refusal(made),
+        plan=made.plan(seen) if made.ok else None,
+        refused=None if made.ok else Outcome("correct", made.status, None, made.sentence),
         freed=made.freed,
         tried=made.tried,
         gap_before_m=made.gap_before_m,
@@ -56,19 +56,7 @@ def plan(method: Any, seen: Observation, truth: Array | None, told: Observation 
     )
 
 
-def planned(seen: Observation, made: Correction) -> Plan:
-    """The plan that a correction makes."""
-    if made.targets is None:
-        return Plan(seen.assembly, seen.start, made.goals, made.schedule)
-    return Plan(seen.assembly, seen.start, made.goals, made.schedule, made.targets)
-
-
-def refusal(made: Correction) -> Ending:
-    """A correction that did not converge is not executed."""
-    return Ending("correct", made.status, None, made.sentence)
-
-
-def _as_it_is(seen: Observation, goals: Array, refused: Ending | None) -> Planned:
+def _as_it_is(seen: Observation, goals: Array, refused: Outcome | None) -> Planned:
     open_m = largest_gap(seen.assembly, seen.start, goals)
     if refused:
         return Planned(None, refused, (), (), open_m, math.nan)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+from apo_bench.assembly.goals import Outcome
 from apo_bench.io.plain_text import clean
 from apo_bench.records.row import LONGEST_SENTENCE, Row
 from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.confidence import UNKNOWN
 from apo_bench.trial.recognised import UNCOUNTED
-from apo_bench.trial.stages import Ending
 
 
 def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
@@ -42,7 +42,7 @@ def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
     }
 
 
-def result(end: Ending, *, success: bool | None) -> Row:
+def result(end: Outcome, *, success: bool | None) -> Row:
     """The rest of a row of which nothing but its ending is known."""
     return {
         "success": success,

@@ -13,20 +13,33 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, Noise, make_noise
-from apo_bench.observation.relations import make_relations
+from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.records.method import knows_relations, knows_truth, parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row, finite
 from apo_bench.records.settings import RANGE, TrialSettings
+from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.confidence import confidence
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.planning import Planned, plan
 from apo_bench.trial.pose_error import pose_errors
 from apo_bench.trial.recognised import counted, understood
 from apo_bench.trial.row import head, result
-from apo_bench.trial.stages import Shown, Tried, attempt, ending, foretold, misshown, see, show, tell, through
+from apo_bench.trial.stages import (
+    RELATIONS,
+    Attempt,
+    Recording,
+    demonstration_failure,
+    observe_recording,
+    predicted_outcome,
+    range_sensor,
+    record_demonstration,
+    replay_and_judge,
+    stream,
+    trial_outcome,
+)
 
 MEASURED = MappingProxyType({"level": None, "level_deg": None, "careless": None, "noise": "measured"})
 """What a row says of a trial that was not drawn."""
@@ -34,9 +47,9 @@ MEASURED = MappingProxyType({"level": None, "level_deg": None, "careless": None,
 
 def run_trial(
     spec: TrialSettings,
-    scene: Scene,
+    scene: Scene | None = None,
     *,
-    shown: Shown | None = None,
+    recording: Recording | None = None,
     content: str | None = None,
     method: Any = None,
     watch: Any = None,
@@ -45,8 +58,9 @@ def run_trial(
     """Run one trial.
 
     Args:
-        scene: Compiled for the scenario, clearance, grasp, arm and time step of `spec`.
-        shown: The demonstration of this seed and carelessness, if it is at hand.
+        scene: Compiled for the scenario, clearance, grasp, arm and time step of `spec`; compiled here if it is not at
+            hand.
+        recording: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
         method: What `OwnCorrectors.find` makes of the method of `spec`, if it is at hand.
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
@@ -55,23 +69,35 @@ def run_trial(
     Raises:
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
-    shown = shown or show(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    scene = scene or scene_of(spec)
+    recording = recording or record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    first = head(spec, scene.scenario, spec_hash(spec, content)) | {"demonstration": shown.demonstration.code}
-    if shown.demonstration.code != "ok":
-        return first | result(misshown(shown.demonstration), success=None)
-    seen = see(scene, shown, eye_of(spec, scene, shown), spec.seed, spec.salt)
-    told = _told(spec, seen, shown.layout.goals)
-    truth = shown.layout.goals
-    planned = plan(method or parsed(spec.method).plan, seen, truth, told)
-    said = confidence(planned, seen, told, truth)
-    return first | _carry_out(planned, scene, truth, truth, watch, spec, branches) | said | _contacts(spec, seen, told)
+    first = head(spec, scene.scenario, spec_hash(spec, content)) | {"demonstration": recording.demonstration.code}
+    if recording.demonstration.code != "ok":
+        return first | result(demonstration_failure(recording.demonstration), success=None)
+    seen = observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
+    truth = recording.layout.goals
+    given = _corrector_input(spec, seen, truth)
+    planned = plan(method or parsed(spec.method).plan, seen, truth, given)
+    said = confidence(planned, seen, given, truth)
+    return first | _carry_out(planned, scene, truth, truth, watch, spec, branches) | said | _contacts(spec, seen, given)
 
 
-def eye_of(spec: TrialSettings, scene: Scene, shown: Shown) -> Noise:
-    """The noise model of a trial, or the range finder that watched its demonstration."""
+def scene_of(spec: TrialSettings) -> Scene:
+    """The scene of a trial, compiled."""
+    return build_scene(
+        load_scenario(spec.scenario),
+        clearance_mm=spec.clearance_mm,
+        grasp=spec.grasp,
+        arm=spec.arm,
+        timestep_s=spec.timestep_s,
+    )
+
+
+def noise_of(spec: TrialSettings, scene: Scene, recording: Recording) -> Noise:
+    """The noise model of a trial, or the range finder that recorded its demonstration."""
     if spec.eye == RANGE:
-        return through(scene, shown, spec.level_mm)
+        return range_sensor(scene, recording, spec.level_mm)
     return make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
 
 
@@ -97,9 +123,9 @@ def run_measured(
         )
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     first = head(spec, scene.scenario, spec_hash(spec, content, text)) | {**MEASURED, "demonstration": "ok"}
-    told = _told(spec, seen, None)
-    planned = plan(method or parsed(spec.method).plan, seen, None, told)
-    said = confidence(planned, seen, told, None) | _contacts(spec, seen, told)
+    given = _corrector_input(spec, seen, None)
+    planned = plan(method or parsed(spec.method).plan, seen, None, given)
+    said = confidence(planned, seen, given, None) | _contacts(spec, seen, given)
     return (
         first
         | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch, spec, None)
@@ -116,18 +142,20 @@ def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
     return np.asarray(flat @ nominal)
 
 
-def _told(spec: TrialSettings, seen: Observation, truth: Array | None) -> Observation:
+def _corrector_input(spec: TrialSettings, seen: Observation, truth: Array | None) -> Observation:
     """The observation as a corrector gets it: with the relations as given, as recognised, or wrong ones."""
     if not knows_relations(spec.method):
         return seen
     if spec.relations in RECOGNISED:
         return understood(seen, spec.relations)
-    return seen if truth is None else tell(seen, make_relations(spec.relations), truth, spec.seed, spec.salt)
+    if truth is None:
+        return seen
+    return with_relations(seen, make_relations(spec.relations), truth, stream(spec.seed, RELATIONS, spec.salt))
 
 
-def _contacts(spec: TrialSettings, seen: Observation, told: Observation) -> Row:
-    """How many of the contacts that a method was told are right."""
-    return counted(seen.assembly, told.assembly) if knows_relations(spec.method) else {}
+def _contacts(spec: TrialSettings, seen: Observation, given: Observation) -> Row:
+    """How many of the contacts that a method was given are right."""
+    return counted(seen.assembly, given.assembly) if knows_relations(spec.method) else {}
 
 
 def _carry_out(
@@ -143,10 +171,11 @@ def _carry_out(
     if planned.plan is None:
         assert planned.refused is not None
         return result(planned.refused, success=False) | said
-    said |= {"predicted": foretold(planned.plan, scene)}
+    said |= {"predicted": predicted_outcome(planned.plan, scene)}
     searches = parsed(spec.method).searches
-    tried = attempt(planned.plan, scene, reference, watch, spec.fidelity, branches, searches)
-    return result(ending(tried), success=tried.verdict.success) | said | _physics(tried, planned.plan, truth)
+    attempt = replay_and_judge(planned.plan, scene, reference, watch, spec.fidelity, branches, searches)
+    end = result(trial_outcome(attempt), success=attempt.verdict.success)
+    return end | said | _physics(attempt, planned.plan, truth)
 
 
 def _correction(planned: Planned) -> Row:
@@ -168,8 +197,8 @@ def _numbers(operations: Iterable[int]) -> list[int]:
     return [int(k) + 1 for k in operations]
 
 
-def _physics(tried: Tried, plan: Plan, truth: Array | None) -> Row:
-    result, verdict = tried.result, tried.verdict
+def _physics(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
+    result, verdict = attempt.result, attempt.verdict
     fixed, free = None, None
     if truth is not None:
         fixed, free = pose_errors(plan.assembly, plan.start, truth, result.reached)

@@ -236,11 +236,11 @@ def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypa
     from apo_bench.sweeps import one
 
     def fails(*arguments: Any) -> Any:
-        shown = show(*arguments)
-        return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
+        recording = record(*arguments)
+        return replace(recording, demonstration=replace(recording.demonstration, code="demonstration_failed"))
 
-    show = one.show
-    monkeypatch.setattr(one, "show", fails)
+    record = one.record_demonstration
+    monkeypatch.setattr(one, "record_demonstration", fails)
     code, out, _ = run(capsys, *TRIAL, "--json")
     assert code == 1
     assert json.loads(out)["success"] is None

@@ -16,7 +16,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import LAYOUT, Tried, attempt, see, show, stream
+from apo_bench.trial.stages import LAYOUT, Attempt, observe_recording, record_demonstration, replay_and_judge, stream
 
 SCENES = (
     "block_on_block",
@@ -34,7 +34,7 @@ def scenes() -> Mapping[str, Scene]:
     return {name: build_scene(load_scenario(name)) for name in SCENES}
 
 
-def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Sequence[float]]) -> Tried:
+def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Sequence[float]]) -> Attempt:
     """Follow a schedule at the truth; operations done for the first time are `wrong_mm` off in the part's frame."""
     layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
     seen: set[int] = set()
@@ -47,7 +47,7 @@ def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Seque
         if undo:
             wrong_mm = {j: w for j, w in wrong_mm.items() if j != k}
     plan = Plan(scene.scenario.assembly, layout.start, layout.goals, schedule, np.array(targets))
-    return attempt(plan, scene, layout.goals)
+    return replay_and_judge(plan, scene, layout.goals)
 
 
 def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:
@@ -119,7 +119,7 @@ def test_the_paper_s_sets_are_tried_after_real_demonstrations(name: str) -> None
     scene = build_scene(load_scenario(name))
     step, sets = SETS[name]
     for seed in range(4):
-        seen = see(scene, show(scene, 1.0, seed), make_noise("isotropic", Level(0.0, 0.0)), seed)
+        seen = observe_recording(record_demonstration(scene, 1.0, seed), make_noise("isotropic", Level(0.0, 0.0)), seed)
         made = correct(seen, "paper-track")
         tried = [one for one in made.tried if one.step == step - 1]
         assert [tuple(k + 1 for k in one.free) for one in tried] == sets
@@ -129,7 +129,7 @@ def test_the_paper_s_sets_are_tried_after_real_demonstrations(name: str) -> None
 
 def test_fig_6_frees_all_but_operation_4() -> None:
     scene = build_scene(load_scenario("pocket_table"))
-    seen = see(scene, show(scene, 1.0, 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
+    seen = observe_recording(record_demonstration(scene, 1.0, 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
     assert [k + 1 for k in correct(seen, "paper").freed] == [6, 5, 3, 2, 1]
 
 
@@ -164,10 +164,10 @@ def test_tall_parts_are_carried_over_what_stands(tmp_path: Path) -> None:
     (tmp_path / "post.xml").write_text(TALL)
     (tmp_path / "past.toml").write_text(PAST)
     scene = build_scene(load_scenario(tmp_path / "past.toml"))
-    shown = show(scene, 0.0, 1)
+    shown = record_demonstration(scene, 0.0, 1)
     assert shown.demonstration.code == "ok"
     plan = Plan(scene.scenario.assembly, shown.layout.start, shown.layout.goals)
-    tried = attempt(plan, scene, shown.layout.goals)
+    tried = replay_and_judge(plan, scene, shown.layout.goals)
     assert (tried.result.outcome.code, tried.verdict.demonstrated.code) == ("ok", "ok")
     assert tried.verdict.success
 

@@ -31,7 +31,7 @@ from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.tv import Change, TvCamera
 from apo_bench.sweeps.grid import SweepSpec
-from apo_bench.trial.stages import OBSERVATION, Shown, see, show, stream, through
+from apo_bench.trial.stages import OBSERVATION, Recording, observe_recording, range_sensor, record_demonstration, stream
 from apo_bench.trial.trial import run_trial
 from tests import pages
 
@@ -44,13 +44,13 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def watched(name: str, seed: int = 3) -> Shown:
-    return show(scene(name), 1.0, seed, "range")
+def watched(name: str, seed: int = 3) -> Recording:
+    return record_demonstration(scene(name), 1.0, seed, "range")
 
 
 def observed(name: str, level_mm: float, seed: int = 3) -> Observation:
     shown = watched(name, seed)
-    return see(scene(name), shown, through(scene(name), shown, level_mm), seed)
+    return observe_recording(shown, range_sensor(scene(name), shown, level_mm), seed)
 
 
 def errors(name: str, seen: Observation, seed: int = 3) -> Array:
@@ -61,7 +61,7 @@ def errors(name: str, seen: Observation, seed: int = 3) -> Array:
 
 @pytest.mark.parametrize("name", TWO)
 def test_being_watched_changes_nothing(name: str) -> None:
-    alone, seen = show(scene(name), 1.0, 3).demonstration, watched(name).demonstration
+    alone, seen = record_demonstration(scene(name), 1.0, 3).demonstration, watched(name).demonstration
     assert alone.goals.tobytes() == seen.goals.tobytes()
     assert {part: T.tobytes() for part, T in alone.final.items()} == {
         part: T.tobytes() for part, T in seen.final.items()
@@ -133,7 +133,7 @@ def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
     assert one.covariance.tobytes() == again.covariance.tobytes()
     assert (one.goals != two.goals).any()
     assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
-    fresh = show(scene("stick_in_tower"), 1.0, 3, "range").watched
+    fresh = record_demonstration(scene("stick_in_tower"), 1.0, 3, "range").watched
     known = watched("stick_in_tower").watched
     assert fresh is not None
     assert known is not None
@@ -147,7 +147,7 @@ def test_the_small_motion_of_castle_2_stays_unnoticed(seed: int) -> None:
     shown = watched("stick_in_tower", seed)
     moved = (shown.demonstration.final["castle2"] - shown.demonstration.goals[1])[:3, 3]
     assert 1.4 < 1e3 * np.linalg.norm(moved) < 4.1
-    eye = through(scene("stick_in_tower"), shown, 1.0)
+    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
     events = eye.events(shown.demonstration, eye.sensed(stream(seed, OBSERVATION)))
     assert [event.moved for event in events] == [{"castle1"}, {"castle2"}, {"stick"}]
     seen = observed("stick_in_tower", 1.0, seed)
@@ -161,7 +161,7 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
     assembly = shown.demonstration.assembly
     short = replace(assembly.solids["stick"], boxes=assembly.solids["castle1"].boxes)
     wrong = replace(assembly, solids={**assembly.solids, "stick": short})
-    eye = through(scene("stick_in_tower"), shown, 1.0)
+    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
     seen = eye(wrong, replace(shown.demonstration, assembly=wrong), stream(3, OBSERVATION))
     assert seen.seen.tolist() == [True, True, False]
     assert seen.covariance[2][0, 0] > 0.005
@@ -170,17 +170,17 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
 
 def test_an_operation_that_no_image_shows_is_not_seen() -> None:
     shown = watched("stick_in_tower")
-    eye = through(scene("stick_in_tower"), shown, 1.0)
+    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
     blind = RangeSensor(eye.finder, eye.images[:2], eye.level_m, eye.turns, eye.play_m)
-    seen = see(scene("stick_in_tower"), shown, blind, 3)
+    seen = observe_recording(shown, blind, 3)
     assert seen.seen.tolist() == [True, False, False]
     none = RangeSensor(eye.finder, eye.images[:1], eye.level_m, eye.turns, eye.play_m)
-    assert not see(scene("stick_in_tower"), shown, none, 3).seen.any()
+    assert not observe_recording(shown, none, 3).seen.any()
 
 
 def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
     shown = watched("stick_in_tower")
-    eye = through(scene("stick_in_tower"), shown, 1.0)
+    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
     S = symmetries(shown.demonstration.assembly.solids["stick"])[3]
     turned = np.array(eye.turns)
     turned[2] = turned[2] @ S[:3, :3]
@@ -195,7 +195,7 @@ def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
 
 def test_a_trial_through_the_range_finder() -> None:
     spec = TrialSettings("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
-    row = run_trial(spec, scene("stick_in_tower"), shown=watched("stick_in_tower"))
+    row = run_trial(spec, scene("stick_in_tower"), recording=watched("stick_in_tower"))
     assert row["eye"] == "range"
     assert row["success"] is True
 
@@ -283,7 +283,9 @@ def test_a_sweep_has_both_eyes(tmp_path: Path, drawn: dict[str, set[str]]) -> No
 def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("apo_bench.show.eye_one.show", lambda *_: pytest.fail("the human demonstrated already"))
+    monkeypatch.setattr(
+        "apo_bench.show.eye_one.record_demonstration", lambda *_: pytest.fail("the human demonstrated already")
+    )
     assert main(["eye", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()
     assert said

@@ -283,7 +283,7 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
 ) -> None:
     import apo_bench.envs.apo_replay as module
 
-    real, calls = module.show, []
+    real, calls = module.record_demonstration, []
 
     def fails_at_first(scene: Any, careless: float, seed: int, eye: str) -> Any:
         calls.append(seed)
@@ -292,7 +292,7 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
             return shown
         return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
 
-    monkeypatch.setattr(module, "show", fails_at_first)
+    monkeypatch.setattr(module, "record_demonstration", fails_at_first)
     _, info = env.reset(seed=SEED)
     assert info["demonstration"] == "demonstration_failed"
     _, reward, terminated, _, info = env.step(zeros(env))
@@ -308,9 +308,9 @@ def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
 ) -> None:
     import apo_bench.envs.apo_replay as module
 
-    shown = module.show(env._scene, 1.0, SEED)
+    shown = module.record_demonstration(env._scene, 1.0, SEED)
     failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
-    monkeypatch.setattr(module, "show", lambda *_: failed)
+    monkeypatch.setattr(module, "record_demonstration", lambda *_: failed)
     with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row went wrong at carelessness"):
         env.reset()
 

@@ -18,7 +18,7 @@ from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import FAULTS
 from apo_bench.judging.verdict import judge
 from apo_bench.records.outcomes import CODES
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records.thresholds import Criteria, Thresholds
 from tests import scenes
 from tests.end_states import (
     BRIDGE,
@@ -326,7 +326,7 @@ def test_poses_that_are_not_finite_fail_without_a_crash() -> None:
     broken = snapshot(dict(poses[-1]))
     object.__setattr__(broken, "poses", {**poses[-1], "stick": np.full((4, 4), np.nan)})
     for reached in (Reached((*good[:2], broken), broken), Reached(tuple(good), broken)):
-        found = judge(scene.assembly, reached, scene.goals, Thresholds(), CLEARANCE_MM)
+        found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM))
         assert (found.success, found.as_demonstrated, found.loose_success) == (False, False, False)
         assert found.finished.code == found.demonstrated.code == "not_made"
 
@@ -375,7 +375,9 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
     for W in (np.eye(4), pose.exp(rng.standard_normal(6))):
         there = scenes.turned(scene, W)
         states = [snapshot(dict(p)) for p in placements(there.assembly, there.start, W @ goals)]
-        both = judge(there.assembly, Reached(tuple(states), states[-1]), there.goals, Thresholds(), CLEARANCE_MM)
+        both = judge(
+            there.assembly, Reached(tuple(states), states[-1]), there.goals, Criteria(Thresholds(), CLEARANCE_MM)
+        )
         found = (both.demonstrated, both.finished)
         numbers.append([x for f in found for x in (f.gap_mm, f.angle_deg, f.overlap, f.pushed_mm)])
     assert numbers[0] == pytest.approx(numbers[1], abs=1e-6)
@@ -428,7 +430,7 @@ def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:
     off[2]["castle2"] = off[2]["castle2"] @ scenes.mm(0, -0.9, 0)
     reached = Reached(tuple(map(snapshot, off)), snapshot(dict(poses[-1])))
     for meaning, right in (("assembled", True), ("as_demonstrated", False)):
-        found = judge(scene.assembly, reached, scene.goals, Thresholds(), CLEARANCE_MM, meaning)
+        found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM, meaning))
         assert (found.success, found.as_demonstrated) == (right, False)
         assert found.rests_on.code == ("ok" if right else "gap")
 

@@ -26,7 +26,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial import trial
 from apo_bench.trial.planning import plan
-from apo_bench.trial.stages import Shown, see, stream
+from apo_bench.trial.stages import Recording, observe_recording, stream
 from tests import scenes
 
 NAMES = sorted(NOISES)
@@ -205,20 +205,20 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     n = len(scenario.assembly)
     demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
     scene: Any = SimpleNamespace(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
-    shown = Shown(Layout(layout.goals, layout.start), demonstration)
+    shown = Recording(Layout(layout.goals, layout.start), demonstration)
     carried_out: list[Any] = []
 
     class Carried(Exception):
         pass
 
-    def attempt(plan: Any, *_: object) -> None:
+    def refuse(plan: Any, *_: object) -> None:
         carried_out.append(plan)
         raise Carried
 
-    monkeypatch.setattr(trial, "attempt", attempt)
+    monkeypatch.setattr(trial, "replay_and_judge", refuse)
     spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
     with pytest.raises(Carried):
-        trial.run_trial(spec, scene, shown=shown, content="any")
+        trial.run_trial(spec, scene, recording=shown, content="any")
     expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
     assert expected.seen.all()
     assert carried_out[0].goals.tobytes() == expected.goals.tobytes()
@@ -229,10 +229,9 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("name", NAMES)
 def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
-    scene: Any = SimpleNamespace(scenario=SimpleNamespace(gap_mm=0.1), clearance_mm=0.25)
-    shown = Shown(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
+    shown = Recording(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
     for seed in range(40):
-        seen = see(scene, shown, make_noise(name, LEVEL), seed)
+        seen = observe_recording(shown, make_noise(name, LEVEL), seed)
         planned = plan("none", seen, CYCLE.goals)
         if seen.seen.all():
             assert planned.plan is not None

@@ -118,12 +118,12 @@ def test_what_is_above_the_floor_is_left_alone() -> None:
 
 
 def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
-    shown = scenes.shown(TOWER)
-    seen = observe(shown, Isotropic(Level(1.0, 1.0)), np.random.default_rng(0), gap_m=3e-4)
+    shown = replace(scenes.shown(TOWER), gap_m=3e-4, play_m=2e-4)
+    seen = observe(shown, Isotropic(Level(1.0, 1.0)), np.random.default_rng(0))
     assert seen.assembly is shown.assembly
     assert dict(seen.start).keys() == dict(shown.start).keys()
     assert seen.seen.tolist() == [True, True, True]
-    assert seen.gap_m == 3e-4
+    assert (seen.gap_m, seen.play_m) == (3e-4, 2e-4)
 
 
 def test_make_noise_by_name_class_function_and_object() -> None:

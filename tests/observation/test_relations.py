@@ -27,7 +27,7 @@ from apo_bench.observation.relations import (
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.trial.planning import plan
-from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream, tell
+from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream
 from tests import scenes
 
 SEEDS = range(12)
@@ -116,7 +116,7 @@ def test_shared_faces_are_shifted_for_one_contact_only() -> None:
 def test_the_plan_and_those_who_do_not_ask_keep_the_right_relations() -> None:
     scene = scenes.stick_in_tower()
     seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(1), 1.0, 1.0))
-    wrong = tell(seen, Shifted(3e-3), scene.goals, 4)
+    wrong = with_relations(seen, Shifted(3e-3), scene.goals, stream(4, RELATIONS))
     assert wrong.goals.tobytes() == seen.goals.tobytes()
     for method in ("oracle", "none"):
         with_wrong, without = plan(method, seen, scene.goals, wrong), plan(method, seen, scene.goals)

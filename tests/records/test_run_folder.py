@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 
+from apo_bench.assembly.goals import Outcome
 from apo_bench.errors import InputError
 from apo_bench.records import run_folder
 from apo_bench.records.key import KEY
@@ -28,7 +29,6 @@ from apo_bench.records.settings import ROW
 from apo_bench.sweeps.environment_lock import versions
 from apo_bench.trial.code_version import code_files
 from apo_bench.trial.row import result
-from apo_bench.trial.stages import Ending
 
 GRID = {"scenarios": ["block_on_block"], "levels": [1.0], "trials": 60}
 CONTENT = {"block_on_block, scenario": "11", "block_on_block, part cube": "22"}
@@ -45,7 +45,7 @@ def run(**changed: Any) -> dict[str, Any]:
 
 def row(seed: int) -> dict[str, Any]:
     key = ("block_on_block", 0.25, seed, 1.0, 1.0, 1.0, "isotropic", "given", "friction", "none")
-    ended = {"demonstration": "ok", **result(Ending("done", "ok", None, "all was done"), success=True)}
+    ended = {"demonstration": "ok", **result(Outcome("done", "ok", None, "all was done"), success=True)}
     ended |= {"sim_seconds": 20.0, "extra_operations": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
     return {"schema": ROW, "spec_hash": "ab", **dict(zip(KEY, key, strict=True)), **ended, "reached": reached}

@@ -169,11 +169,11 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench.assembly.goals import Outcome
     from apo_bench.cli.terminal import print_row
     from apo_bench.trial.row import result
-    from apo_bench.trial.stages import Ending
 
-    end = result(Ending("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
+    end = result(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
     print_row(row("contact", 0, False, eye="noise") | end)
     assert "\\x1b[31mraised\\nmore" in capsys.readouterr().out
     assert end["sentence"] == "\\x1b[31mraised\\nmore"

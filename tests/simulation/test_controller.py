@@ -27,8 +27,7 @@ def shown(scene: Scene, seed: int, careless: float) -> Demonstration:
 def run(scene: Scene, seed: int, goals: Array, schedule: tuple[Step, ...] = ()) -> tuple[ReplayResult, Verdict]:
     truth = layout(scene, seed)
     result = replay(Plan(scene.scenario.assembly, truth.start, goals, schedule), scene)
-    scenario = scene.scenario
-    return result, judge(scenario.assembly, result.reached, truth.goals, scenario.thresholds, scene.clearance_mm)
+    return result, judge(scene.scenario.assembly, result.reached, truth.goals, scene.criteria)
 
 
 def off(truth: Array, goals: Array) -> Array:

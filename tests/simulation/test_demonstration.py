@@ -13,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import Shown, show
+from apo_bench.trial.stages import Recording, record_demonstration
 
 NAMES = scenario_names()
 CARELESS = sorted(name for name in NAMES if load_scenario(name).careless)
@@ -32,16 +32,16 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, careless: float, seed: int) -> Shown:
-    return show(scene(name), careless, seed)
+def shown(name: str, careless: float, seed: int) -> Recording:
+    return record_demonstration(scene(name), careless, seed)
 
 
-def off_mm(of: Shown) -> Array:
+def off_mm(of: Recording) -> Array:
     """How far each shown goal is from the truth, (n, 3), world."""
     return 1e3 * (of.demonstration.goals - of.layout.goals)[:, :3, 3]
 
 
-def end_mm(of: Shown, part: str) -> Array:
+def end_mm(of: Recording, part: str) -> Array:
     """How far a part ends from where it should be, (3,), world."""
     demonstration = of.demonstration
     true = placements(demonstration.assembly, of.layout.start, of.layout.goals)[-1][part]
@@ -95,9 +95,9 @@ def test_cubes_hang_on_the_stick_and_land_in_their_pockets():
 
 def test_a_group_leaves_nothing_behind_for_the_next_trial():
     """Where a hand holds a carried part is written into the shared model; the next trial must not see it."""
-    first = show(scene("pocket_table"), 1.0, 2).demonstration
-    show(scene("pocket_table"), 0.0, 5)
-    again = show(scene("pocket_table"), 1.0, 2).demonstration
+    first = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
+    record_demonstration(scene("pocket_table"), 0.0, 5)
+    again = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
     np.testing.assert_array_equal(first.goals, again.goals)
     for part, T in first.final.items():
         np.testing.assert_array_equal(T, again.final[part])
@@ -171,6 +171,6 @@ yaw_deg = [-20, 20]
 def test_a_stick_is_pulled_out_and_a_group_put_against_a_side(tmp_path: Path):
     path = tmp_path / "own.toml"
     path.write_text(OWN)
-    of = show(build_scene(load_scenario(path)), 0.0, 0)
+    of = record_demonstration(build_scene(load_scenario(path)), 0.0, 0)
     assert of.demonstration.code == "ok"
     assert np.abs(off_mm(of)[:, :2]).max() < LEVEL_MM

@@ -22,7 +22,7 @@ from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, 
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
-from apo_bench.trial.stages import show
+from apo_bench.trial.stages import record_demonstration
 from apo_bench.trial.trial import run_trial
 
 
@@ -33,12 +33,12 @@ def scene(name="stick_in_tower", grasp="friction"):
 
 @cache
 def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
-    return show(scene(name, grasp), careless, seed)
+    return record_demonstration(scene(name, grasp), careless, seed)
 
 
 def row(method, fidelity, *, grasp="friction", level=1.0, branches=None):
     spec = TrialSettings("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
-    return json.dumps(run_trial(spec, scene(grasp=grasp), shown=shown(grasp=grasp), branches=branches))
+    return json.dumps(run_trial(spec, scene(grasp=grasp), recording=shown(grasp=grasp), branches=branches))
 
 
 @pytest.mark.parametrize(("fidelity", "grasp"), [("full", "friction"), ("contact", "friction"), ("full", "weld")])

@@ -14,7 +14,7 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.stages import Tried, attempt
+from apo_bench.trial.stages import Attempt, replay_and_judge
 
 CUBE = (Path(__file__).parents[2] / "assets" / "parts" / "cube.xml").read_text(encoding="utf-8")
 BOTTOM = '<geom name="end" pos="0.0225 0 0" size="0.0025 0.01 0.01"/><site name="bottom" pos="0.02 0 0"/>'
@@ -38,12 +38,14 @@ def own(folder: Path, *operations: str, **parts: tuple[str, tuple[float, float, 
     return load_scenario(path)
 
 
-def done(scenario: Scenario, off_mm: tuple[float, float, float] = (0, 0, 0), schedule: tuple[Step, ...] = ()) -> Tried:
+def done(
+    scenario: Scenario, off_mm: tuple[float, float, float] = (0, 0, 0), schedule: tuple[Step, ...] = ()
+) -> Attempt:
     """Carried out at the truth, or beside it in the frame of the part."""
     scene = build_scene(scenario)
     layout = draw_layout(scenario, np.random.default_rng(1), scene.clearance_mm)
     goals = layout.goals @ pose.at(1e-3 * np.array(off_mm))
-    return attempt(Plan(scenario.assembly, layout.start, goals, schedule), scene, layout.goals)
+    return replay_and_judge(Plan(scenario.assembly, layout.start, goals, schedule), scene, layout.goals)
 
 
 def names(scenario: Scenario) -> list[list[str]]:

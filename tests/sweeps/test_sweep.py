@@ -20,6 +20,7 @@ from typing import Any
 
 import pytest
 
+from apo_bench.assembly.goals import Outcome
 from apo_bench.errors import InputError
 from apo_bench.records.key import KEY, row_key
 from apo_bench.records.run_folder import read_rows
@@ -32,7 +33,6 @@ from apo_bench.sweeps import worker
 from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, trial_key, units
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.row import result
-from apo_bench.trial.stages import Ending
 
 METHODS = ("oracle", "none", "paper")
 SPEC = SweepSpec(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)
@@ -45,28 +45,30 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """Trials without physics; counts what a worker did."""
     did: Counter[str] = Counter()
 
-    def build(scenario: Any, **_: Any) -> Any:
+    def compiled(spec: Any) -> Any:
         did["scene"] += 1
-        return SimpleNamespace(scenario=scenario, arm=find_arm("six_axis"))
+        return SimpleNamespace(scenario=LOAD(spec.scenario), arm=find_arm("six_axis"))
 
-    def show(scene: Any, careless: float, seed: int, eye: str, salt: Any) -> str:
+    def record(scene: Any, careless: float, seed: int, eye: str, salt: Any) -> str:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 
-    def run_trial(spec: Any, scene: Any, *, shown: str, content: str, method: Any, branches: Any) -> dict[str, Any]:
+    def run_trial(spec: Any, scene: Any, *, recording: str, content: str, method: Any, branches: Any) -> dict[str, Any]:
         did["trial"] += 1
         assert method == spec.method
-        assert shown == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
+        assert recording == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
         hashed, success = spec_hash(spec, content), spec.seed % 2 == 0
-        ended = result(Ending("done", "ok", None, "") if success else Ending("judge", "gap", None, ""), success=success)
+        ended = result(
+            Outcome("done", "ok", None, "") if success else Outcome("judge", "gap", None, ""), success=success
+        )
         ended |= {"demonstration": "ok", "sim_seconds": 1.0, "extra_operations": 0}
         return {"schema": ROW, "spec_hash": hashed, **dict(zip(KEY, key, strict=True)), **ended}
 
     monkeypatch.setattr("apo_bench.sweeps.grid.load_scenario", LOAD)
     monkeypatch.setattr(worker, "load_scenario", LOAD)
-    monkeypatch.setattr(worker, "build_scene", build)
-    monkeypatch.setattr(worker, "show", show)
+    monkeypatch.setattr(worker, "scene_of", compiled)
+    monkeypatch.setattr(worker, "record_demonstration", record)
     monkeypatch.setattr(worker, "run_trial", run_trial)
     return did
 

@@ -18,7 +18,7 @@ from apo_bench.report.tables.recognised import ALL, NONE, recognition_lines, rec
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.recognised import UNCOUNTED
-from apo_bench.trial.stages import Shown, show
+from apo_bench.trial.stages import Recording, record_demonstration
 from apo_bench.trial.trial import run_trial
 from tests import pages
 
@@ -32,8 +32,8 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def shown(scene: Scene) -> Shown:
-    return show(scene, 0.0, 4)
+def shown(scene: Scene) -> Recording:
+    return record_demonstration(scene, 0.0, 4)
 
 
 def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) -> dict[str, Any]:
@@ -45,21 +45,21 @@ def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) 
 
 
 @pytest.mark.parametrize("relations", RECOGNISED)
-def test_a_trial_says_how_many_contacts_were_recognised(scene: Scene, shown: Shown, relations: str) -> None:
-    made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
+def test_a_trial_says_how_many_contacts_were_recognised(scene: Scene, shown: Recording, relations: str) -> None:
+    made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, recording=shown)
     assert made["success"] is True
     assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (2, 0, 0)
     assert (made["relations"], made["wrong_relation"]) == (relations, None)
 
 
-def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: Shown) -> None:
-    made = run_trial(TrialSettings(**(asdict(SPEC) | {"method": "none"})), scene, shown=shown)
+def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: Recording) -> None:
+    made = run_trial(TrialSettings(**(asdict(SPEC) | {"method": "none"})), scene, recording=shown)
     assert {name: made[name] for name in UNCOUNTED} == dict(UNCOUNTED)
 
 
-def test_missed_and_false_relations_are_counted_like_recognised_ones(scene: Scene, shown: Shown) -> None:
+def test_missed_and_false_relations_are_counted_like_recognised_ones(scene: Scene, shown: Recording) -> None:
     for relations, counts in (("missed", (1, 1, 0)), ("false", (2, 0, 1)), ("given", (2, 0, 0))):
-        made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, shown=shown)
+        made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, recording=shown)
         assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == counts
 
 

@@ -21,7 +21,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import Shown, show
+from apo_bench.trial.stages import Recording, record_demonstration
 from apo_bench.trial.trial import run_trial
 
 RECORD = Path(__file__).with_name("success_rate.json")
@@ -55,14 +55,14 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, careless: float, seed: int) -> Shown:
+def shown(name: str, careless: float, seed: int) -> Recording:
     """The demonstration that methods share, as in a sweep."""
-    return show(scene(name), careless, seed)
+    return record_demonstration(scene(name), careless, seed)
 
 
 def trial(name: str, method: str, seed: int) -> Row:
     asked = spec(name, method, seed)
-    return run_trial(asked, scene(name), shown=shown(name, asked.careless, seed))
+    return run_trial(asked, scene(name), recording=shown(name, asked.careless, seed))
 
 
 def verdicts(name: str, method: str, seeds: Iterable[int] = SEEDS) -> str:

@@ -20,21 +20,21 @@ from apo_bench.simulation.scene.world import has_failed, snapshot
 
 
 def demonstrate(
-    scene: Scene, layout: Layout, careless: float, rng: np.random.Generator, watch: Watcher | None = None
+    scene: Scene, layout: Layout, human_error: float, rng: np.random.Generator, watch: Watcher | None = None
 ) -> Demonstration:
-    """Assemble by hand, with an error of `careless` times the scenario's carelessness.
+    """Assemble by hand, with an error of `human_error` times the scenario's carelessness.
 
     The error is put into the operation that the scenario names, and parts that are put against a displaced one follow
     it. At the last operation the other hand corrects all of them; those small motions show in `final`, not in the
     goals, since nobody looked at these parts again.
 
     Args:
-        careless: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
-        rng: Drawn from in the same way whatever `careless` is, so that hands of one seed differ in size only.
+        human_error: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
+        rng: Drawn from in the same way whatever `human_error` is, so that hands of one seed differ in size only.
         watch: Looks on; the demonstration is the same with and without it.
     """
     scenario = scene.scenario
-    error = spread_error(scenario, layout, _draw(scenario.careless, careless, rng))
+    error = spread_error(scenario, layout, _draw(scenario.careless, human_error, rng))
     stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
     hands = Hands(scene.shown, layout.start, watch)
     hands.wait(0.05)
@@ -53,18 +53,20 @@ def demonstrate(
         start=layout.start,
         goals=np.array(goals),
         final=final.poses,
-        careless=careless_covariance(scenario, careless),
+        careless=careless_covariance(scenario, human_error),
         code="demonstration_failed" if why else "ok",
         why=why,
+        gap_m=1e-3 * scenario.gap_mm,
+        play_m=1e-3 * scene.clearance_mm,
     )
 
 
-def _draw(how: Carelessness | None, careless: float, rng: np.random.Generator) -> Array:
+def _draw(how: Carelessness | None, human_error: float, rng: np.random.Generator) -> Array:
     """The offset of the careless operation, (3,) [m], in the part's own frame."""
     sign, size = rng.choice([-1.0, 1.0]), rng.uniform(0.0, 1.0)
     if how is None:
         return np.zeros(3)
-    return careless * sign * (how.low_m + size * (how.high_m - how.low_m)) * how.axis
+    return human_error * sign * (how.low_m + size * (how.high_m - how.low_m)) * how.axis
 
 
 def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> str:
@@ -73,8 +75,7 @@ def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot)
         scene.scenario.assembly,
         Reached(after=tuple(after), final=final),
         layout.goals,
-        scene.scenario.thresholds,
-        scene.clearance_mm,
+        scene.criteria,
     )
     found = verdict.demonstrated
     fault = next((fault for fault, there in found.conditions.items() if there and fault != "pushed"), None)

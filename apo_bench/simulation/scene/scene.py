@@ -14,6 +14,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import Box
 from apo_bench.parts import read_part
+from apo_bench.records.thresholds import Criteria
 from apo_bench.resources import folder
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
@@ -47,6 +48,11 @@ class Scene:
     work: World
     """Parts and arm: where the robot replays."""
     kinematics: Kinematics
+
+    @property
+    def criteria(self) -> Criteria:
+        """What the judge decides by."""
+        return Criteria(self.scenario.thresholds, self.clearance_mm, self.scenario.success_means)
 
 
 def build_scene(
