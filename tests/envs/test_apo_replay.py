@@ -14,7 +14,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import apo_bench
-from apo_bench.assembly.goals import Correction, Observation, Step
+from apo_bench.assembly.goals import Correction, Observation, Outcome, Step
 from apo_bench.correction.correctors import correct
 from apo_bench.envs import apo_replay as envs
 from apo_bench.envs.apo_replay import APOReplay
@@ -27,6 +27,7 @@ from apo_bench.simulation.execution import controller as replays
 from apo_bench.trial.trial import run_trial
 
 SEED = 5
+REPLAY = "apo_bench.envs.apo_replay.replay_and_judge"
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +121,7 @@ def _check_episode(env: Any, row: dict[str, Any]) -> None:
 
 def test_an_action_moves_each_goal_in_the_frame_of_its_part(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
+    monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
     env.reset(seed=SEED)
     twist = np.linspace(-0.09, 0.09, 18).reshape(3, 6)
     env.step(twist)
@@ -133,14 +134,14 @@ def test_an_action_moves_each_goal_in_the_frame_of_its_part(env: APOReplay, monk
 def _nothing() -> Any:
     from types import SimpleNamespace as Record
 
-    outcome = Record(stage="plan", code="unreachable", operation=0, sentence="the arm cannot reach it")
+    outcome = Outcome("plan", "unreachable", 0, "the arm cannot reach it")
     result = Record(outcome=outcome, reached=Record(final=None))
     return Record(result=result, verdict=Record(success=False, as_demonstrated=False, loose_success=False))
 
 
 def test_correction_aims_and_an_action_composes_on_top(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
+    monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
     corrected = apo_bench.Corrected(env, "apo_bench.correction.baselines.paper:paper")
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "converged"
@@ -155,7 +156,7 @@ def test_correction_aims_and_an_action_composes_on_top(env: APOReplay, monkeypat
 
 
 def test_a_correction_that_fails_is_not_executed(env: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda *_: pytest.fail("nothing may be replayed"))
+    monkeypatch.setattr(REPLAY, lambda *_: pytest.fail("nothing may be replayed"))
     corrected = apo_bench.Corrected(env, gives_up)
     seen, info = corrected.reset(seed=SEED)
     assert info["correction"] == "inconsistent"
@@ -178,7 +179,7 @@ def test_a_schedule_is_executed_and_an_action_acts_on_every_target(
     env: APOReplay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Any] = []
-    monkeypatch.setattr("apo_bench.envs.apo_replay.attempt", lambda plan, *_, **__: asked.append(plan) or _nothing())
+    monkeypatch.setattr(REPLAY, lambda plan, *_, **__: asked.append(plan) or _nothing())
     corrected = apo_bench.Corrected(env, rebuilds)
     corrected.reset(seed=SEED)
     made = rebuilds(env.seen)
