@@ -22,9 +22,10 @@ from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, find_arm
 from apo_bench.simulation.scene.physics import physics
+from apo_bench.sweeps.dispatch import check_limit
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
-from apo_bench.sweeps.local.pool import check_limit, spread
+from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.stopping import Check, listening
 from apo_bench.sweeps.worker import Emit, Timing, Worker, in_time
@@ -110,7 +111,11 @@ def _here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Check)
     worker = Worker(0, lock)
     try:
         for unit in work:
-            worker.run(unit, emit, began=lambda spec: check())
+            for kind, *said in worker.run(unit):
+                if kind == "row":
+                    emit(*said)
+                else:
+                    check()
     finally:
         worker.close()
     check()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, final
 
@@ -24,6 +24,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
+from apo_bench.sweeps.messages import Message
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.row import head, result
 from apo_bench.trial.stages import Recording, record_demonstration
@@ -48,26 +49,18 @@ class Worker:
             InputError: Packages of other versions are installed here.
         """
         lock.check_versions()
-        self.number = number
+        self._number = number
         self._lock = lock
         self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
         self._own = OwnCorrectors(lock.corrector_limit_s)
 
-    def run(
-        self,
-        unit: Unit,
-        emit: Emit,
-        stopped: Callable[[], bool] = lambda: False,
-        began: Callable[[TrialSettings], None] = lambda spec: None,
-    ) -> None:
-        """Run the trials of a unit in their order, and emit each row with its timing.
+    def run(self, unit: Unit, stopped: Callable[[], bool] = lambda: False) -> Iterator[Message]:
+        """Run the trials of a unit in their order: `began` and `row` for each, as in `messages`.
 
         Demonstrations and the beginnings of replays are shared.
 
         Args:
             stopped: Asked between trials; what is not begun then is left.
-            began: Told of each trial when its scene is compiled and its corrector imported: from here on its time
-                counts.
 
         Raises:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
@@ -80,15 +73,16 @@ class Worker:
             start = time.perf_counter()
             scene, content = self._scene(spec)
             method = self._method(parsed(spec.method).plan)
-            ready = time.perf_counter()
-            began(spec)
+            compile_s = time.perf_counter() - start
+            yield ("began",)
+            start = time.perf_counter()
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
                 demonstrations[key] = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
             shown = time.perf_counter()
             row = row_of(spec, scene, demonstrations[key], content, method=method, branches=branches)
-            spent = (ready - start, shown - ready, time.perf_counter() - shown)
-            emit(row, timing(row, self.number, *spent))
+            ended = time.perf_counter()
+            yield "row", row, timing(row, compile_s, shown - start, ended - shown, {"worker": self._number})
 
     def close(self) -> None:
         """End the processes of correctors."""
@@ -166,16 +160,20 @@ def misbehaved(spec: TrialSettings, content: str, demonstration: str, said: str)
 
 
 def timing(
-    row: Row, worker: int, compile_s: float | None, demonstrate_s: float | None, trial_s: float | None
+    row: Row, compile_s: float | None, demonstrate_s: float | None, trial_s: float | None, worker: Mapping[str, Any]
 ) -> Timing:
-    """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
+    """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them.
+
+    Args:
+        worker: The number of the worker, and where it is, if that is not here.
+    """
     return {
         **{key: row[key] for key in KEY},
         "compile_s": compile_s,
         "demonstrate_s": demonstrate_s,
         "trial_s": trial_s,
         "host": platform.node(),
-        "worker": worker,
+        **worker,
     }
 
 

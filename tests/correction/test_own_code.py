@@ -395,10 +395,9 @@ def worker(folder: Path) -> Iterator[Worker]:
 def rows(worker: Worker, *methods: str) -> dict[str, dict[str, Any]]:
     from apo_bench.sweeps.grid import Unit
 
-    found: dict[str, dict[str, Any]] = {}
     asked = [TrialSettings("block_on_block", careless=0.0, method=method, seed=424243) for method in methods]
-    worker.run(Unit(tuple(asked)), lambda row, timing: found.update({row["method"]: dict(row)}))
-    return found
+    made = [dict(said[0]) for kind, *said in worker.run(Unit(tuple(asked))) if kind == "row"]
+    return {row["method"]: row for row in made}
 
 
 def test_neither_truth_nor_seed_is_there(worker: Worker) -> None:

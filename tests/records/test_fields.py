@@ -40,7 +40,7 @@ def test_what_was_written_is_read_as_it_was(made: list[dict[str, Any]]) -> None:
     for row in made:
         line = json.dumps(row, allow_nan=False).encode()
         assert row_of(line, "line 1") == dict.fromkeys(ROW_FIELDS) | row
-        times = timing(row, 0, None, 0.1, 0.2)
+        times = timing(row, None, 0.1, 0.2, {"worker": 0})
         assert timing_of(json.dumps(times).encode(), "line 1") == times
         assert set(times) == set(TIMING_FIELDS)
 

@@ -29,8 +29,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
-from apo_bench.sweeps.local import member as crew_member
-from apo_bench.sweeps.local.pool import MOST_FALSE_STARTS, spread
+from apo_bench.sweeps.local import pool
+from apo_bench.sweeps.local.pool import FALSE_STARTS, spread
 from apo_bench.sweeps.stopping import Stopped, listening
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.worker import Worker, lost, misbehaved
@@ -267,9 +267,7 @@ def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
 def test_a_worker_with_other_code_or_packages_refuses() -> None:
     unit = Unit((TrialSettings("block_on_block", method="none"),))
     with pytest.raises(InputError, match="has other code or other files for 'block_on_block'"):
-        Worker(0, EnvironmentLock({"block_on_block": "0123456789abcdef"}, versions())).run(
-            unit, lambda row, timing: None
-        )
+        list(Worker(0, EnvironmentLock({"block_on_block": "0123456789abcdef"}, versions())).run(unit))
     with pytest.raises(
         InputError, match=r"has mujoco .*, the process that started the sweep 1\.2\.3; install the same"
     ):
@@ -298,7 +296,7 @@ def test_processes_that_cannot_begin_are_given_up() -> None:
     lock: Any = Deadly()
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
         spread(tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None)
-    assert MOST_FALSE_STARTS == 3
+    assert FALSE_STARTS == 3
 
 
 def test_a_corrector_that_removes_the_folder_of_the_rows(tmp_path: Path) -> None:
@@ -318,12 +316,12 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
     lock = EnvironmentLock({"block_on_block": content}, versions())
     asked_for: list[Any] = []
 
-    def start(target: Any, *given: Any) -> Any:
-        asked_for.append(target)
-        return real(target if len(asked_for) == 1 else os._exit, *given)
+    def start(work: Any, *given: Any) -> Any:
+        asked_for.append(work)
+        return real(work, *(given if len(asked_for) == 1 else [Deadly()]))
 
-    real = crew_member.start
-    monkeypatch.setattr(crew_member, "start", start)
+    real = pool.Process
+    monkeypatch.setattr(pool, "Process", start)
     rows: list[dict[str, Any]] = []
 
     def emit(row: Any, timing: Any) -> None:
@@ -344,9 +342,9 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
 
 PATIENT = """
 import sys
-from apo_bench.benchmark import crew
+from apo_bench.sweeps.local import pool
 from apo_bench.cli.app import main
-crew.GRACE_S = float(sys.argv[1])
+pool.GRACE_S = float(sys.argv[1])
 sys.exit(main(sys.argv[2:]))
 """
 

@@ -27,13 +27,14 @@ from apo_bench.records.key import row_key
 from apo_bench.records.row import Row
 from apo_bench.resources import folder
 from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.sweeps import dispatch
+from apo_bench.sweeps.dispatch import Dispatch
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
-from apo_bench.sweeps.ray import actor as ray_hand
 from apo_bench.sweeps.ray import backend as on_ray
-from apo_bench.sweeps.ray import pool as ray_crew
-from apo_bench.sweeps.ray.actor import refusal
-from apo_bench.sweeps.ray.runtime_files import parcel, wanted
+from apo_bench.sweeps.ray import pool, task
+from apo_bench.sweeps.ray.runtime_files import names, runtime_files
+from apo_bench.sweeps.ray.task import refusal
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.fingerprint import content_hash
 
@@ -132,10 +133,10 @@ def count(out: Path) -> int:
     return text_of(out / "trials.jsonl").count("\n")
 
 
-def hands(cluster: Any) -> list[int]:
-    """The processes of actors on the nodes of a cluster."""
+def workers(cluster: Any) -> list[int]:
+    """The processes that run tasks on the nodes of a cluster."""
     raylets = {info.process.pid for node in cluster.list_all_nodes() for info in node.all_processes["raylet"]}
-    return [pid for pid in processes("ray::Hand") if parent(pid) in raylets]
+    return [pid for pid in processes("ray::run_unit") if parent(pid) in raylets]
 
 
 def parent(pid: int) -> int | None:
@@ -198,7 +199,7 @@ def test_a_driver_that_is_stopped_or_killed_goes_on_later(cluster: Any, here: li
         if number == signal.SIGINT:
             assert process.returncode == 130
             assert (printed[0], printed[1].count("\n"), printed[1][:11]) == ("", 1, "apo-bench: ")
-        wait_for(lambda: not hands(cluster))
+        wait_for(lambda: not workers(cluster))
     assert len(cluster.list_all_nodes()) == 2
     assert 5 <= count(out) < len(here)
     last = start()
@@ -242,17 +243,13 @@ def test_nodes_with_other_packages_or_code_are_refused(cluster: Any) -> None:
         on_ray.spread(work, other, workers=1, limit_s=60.0, emit=refuse_row, address=cluster.address)
 
 
-def refuse_news(news: Any) -> None:
-    raise AssertionError("there was news")
-
-
 def refuse_row(row: Row, timing: dict[str, Any]) -> None:
     raise AssertionError("a row was made")
 
 
 def test_what_speaks_against_a_node_is_one_sentence(own: Path) -> None:
     work, lock = lock_of(replace(SPEC, methods=("code_of_mine:raises",)))
-    asked = wanted(work)
+    asked = names(work)
     assert refusal(pickle.dumps((lock, asked))) is None
     other = dict.fromkeys(lock.content, "0" * 16)
     changed = dict.fromkeys(asked.content, "0" * 16)
@@ -279,192 +276,143 @@ def test_files_below_the_current_folder_travel_and_no_others(
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
     scenarios = ("deep/mine.toml", str(far))
     spec = replace(SPEC, scenarios=scenarios, methods=("code_of_mine:raises",), noises=("noise.toml", "camera"))
-    travel = parcel(wanted(tuple(units([spec], load_all([spec])))))
+    travel = runtime_files(names(tuple(units([spec], load_all([spec])))))
     assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml", "code_of_mine.py", "helper_of_mine.py"}
     assert all((own / name).samefile(path) for name, path in travel.items())
 
 
-def test_news_are_told_again_until_they_have_arrived(monkeypatch: pytest.MonkeyPatch) -> None:
-    work, lock = lock_of(replace(SPEC, trials=1))
-    met = [threading.Event(), threading.Event()]
+def test_code_that_ends_its_process_is_no_error_of_the_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error would end the sweep; a process that ends costs a trial."""
+    work, _ = lock_of(replace(SPEC, trials=1))
+    ended: list[int] = []
 
-    class Quick:
-        def __init__(self, number: int, lock: EnvironmentLock) -> None:
-            pass
+    def leave(packed: bytes) -> Any:
+        sys.exit(0)
 
-        def run(self, unit: Unit, emit: Any, stopped: Any, began: Any) -> None:
-            for spec, go in zip(unit.trials, met, strict=True):
-                if stopped():
-                    return
-                began(spec)
-                go.wait(60.0)
-                emit({"method": spec.method}, {"host": "h"})
-
-    monkeypatch.setattr(ray_hand, "Worker", Quick)
-    hand = ray_hand.Hand(0, pickle.dumps((lock, wanted(work))), "node 1")
-    assert hand.news(0, 0.0) == []
-    hand.take(work[0])
-    assert hand.news(0, 60.0) == hand.news(0, 60.0) == [("began",)]
-    met[0].set()
-    row = ("row", {"method": "none"}, {"host": "h", "node": "node 1"})
-    wait_for(lambda: hand.news(1, 60.0) == [row, ("began",)])
-    assert hand.news(1, 0.0) == [row, ("began",)]
-    assert hand.news(2, 0.0) == [("began",)]
-    hand.stop()
-    met[1].set()
-    wait_for(lambda: [kind for kind, *_ in hand.news(3, 60.0)] == ["row", "done"])
-
-
-def test_code_that_ends_its_thread_ends_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A thread that ends would leave its worker waiting for nothing until the limit of the trial."""
-    work, lock = lock_of(replace(SPEC, trials=1))
-    ended = threading.Event()
-
-    class Leaving:
-        def __init__(self, number: int, lock: EnvironmentLock) -> None:
-            pass
-
-        def run(self, *_: Any) -> None:
-            sys.exit(0)
-
-    monkeypatch.setattr(ray_hand, "Worker", Leaving)
-    monkeypatch.setattr(ray_hand.os, "_exit", lambda code: ended.set())
-    ray_hand.Hand(0, pickle.dumps((lock, wanted(work))), "node 1").take(work[0])
-    assert ended.wait(60.0)
-
-
-class Away(Exception):
-    """An answer that was lost, or is late."""
+    monkeypatch.setattr(task, "_worker", leave)
+    monkeypatch.setattr(task.os, "_exit", ended.append)
+    assert list(task.messages(b"", work[0], "node 1")) == []
+    assert ended == [1]
 
 
 class Gone(Exception):
-    """An actor that is no more."""
-
-    preempted = False
+    """A worker that is no more."""
 
 
-class Call:
-    """Stands for an answer that will come, or not."""
+class NodeGone(Gone):
+    """A node that is no more."""
+
+
+class Messages:
+    """Stands for what a task yields; an error is raised, `...` never comes."""
 
     def __init__(self, answers: list[Any]) -> None:
-        self.answer = answers.pop(0)
+        self.answers = list(answers)
+
+    def __next__(self) -> Any:
+        if not self.answers:
+            raise StopIteration
+        return self.answers.pop(0)
 
 
 class Nodes:
-    """Stands for Ray: `answers` says what each next answer of an actor is; an error is raised, `...` never comes."""
+    """Stands for Ray: `tasks` says what each next task answers."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, answers: list[Any]) -> None:
-        self.answers, self.alive, self.killed, self.taken = answers, True, 0, []
-        names = {
-            "ActorUnavailableError": Away,
-            "ObjectLostError": Away,
-            "RayActorError": Gone,
-            "RayTaskError": KeyError,
-        }
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, tasks: list[list[Any]], spec: SweepSpec = SPEC) -> None:
+        self.tasks, self.taken, self.cancelled, self.rows = list(tasks), list[int](), 0, list[Any]()
+        names = {"NodeDiedError": NodeGone, "ObjectLostError": NodeGone, "RayError": Gone, "RayTaskError": KeyError}
         monkeypatch.setitem(sys.modules, "ray", self)
         monkeypatch.setitem(sys.modules, "ray.exceptions", SimpleNamespace(**names))
-        self.actor = SimpleNamespace(
-            where=SimpleNamespace(remote=lambda: Call(self.answers)),
-            news=SimpleNamespace(remote=lambda heard, wait_s: Call(self.answers)),
-            take=SimpleNamespace(remote=self.taken.append),
-        )
+        work, lock = lock_of(replace(spec, trials=1))
+        self.dispatch = Dispatch(work, lock, 60.0, self.emit, deaths=pool.DEATHS, false_starts=pool.FALSE_STARTS)
+        self.pool = pool.RayPool(self.dispatch, self.start, workers=1)
 
-    def wait(self, calls: list[Call], **_: Any) -> tuple[list[Call], list[Call]]:
-        return [call for call in calls if call.answer is not ...], []
+    def start(self, unit: bytes) -> Messages:
+        self.taken.append(len(pickle.loads(unit).trials))
+        return Messages(self.tasks.pop(0))
 
-    def get(self, call: Call) -> Any:
-        if isinstance(call.answer, Exception):
-            raise call.answer
-        return list(call.answer)
+    def emit(self, row: Row, timing: Any) -> None:
+        self.rows.append(row.get("failure_code", "row"))
 
-    def kill(self, actor: Any) -> None:
-        self.killed += 1
+    def wait(self, calls: list[Messages], **_: Any) -> tuple[list[Messages], list[Messages]]:
+        return [call for call in calls if call.answers[:1] != [...]], []
 
-    def nodes(self) -> list[dict[str, Any]]:
-        return [{"NodeID": "n", "Alive": self.alive}]
+    def get(self, answer: Any) -> Any:
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def cancel(self, messages: Messages, force: bool) -> None:
+        self.cancelled += 1
+
+    def turns(self, most: int = 99) -> None:
+        while self.pool.is_busy and most:
+            self.pool.turn()
+            most -= 1
 
 
-HELLO = ("n", "h", None)
-BEGAN = (("began",),)
-ENDED = (("row", {}, {}), ("began",), ("row", {}, {}), ("done",))
+HERE = ("here", {"host": "h", "node": "n", "worker": 7})
+BEGAN = ("began",)
+ENDED = ("row", {}, {})
+FINE = [HERE, BEGAN, ENDED, BEGAN, ENDED]
 
 
 @pytest.mark.parametrize(
-    ("answers", "told", "takes"),
+    ("tasks", "rows", "taken"),
     [
-        ([HELLO, ENDED, ...], ["row", "row"], [2]),
-        ([Away(), HELLO, Away(), BEGAN, Away(), ENDED, ...], ["row", "row"], [2]),
-        ([HELLO, BEGAN, Gone(), HELLO, ENDED, ...], ["row", "row"], [2, 2]),
-        ([HELLO, BEGAN, Gone(), HELLO, BEGAN, Gone(), HELLO, ENDED[2:], ...], ["worker_died", "row"], [2, 2, 1]),
-        ([HELLO, ENDED[:2], Gone(), HELLO, BEGAN, Gone()], ["row", "worker_died"], [2, 1]),
+        ([FINE], ["row", "row"], [2]),
+        ([[Gone()], FINE], ["row", "row"], [2, 2]),
+        ([[HERE, BEGAN, Gone()], FINE], ["row", "row"], [2, 2]),
+        ([[HERE, BEGAN, Gone()], [HERE, BEGAN, Gone()], FINE[3:]], ["worker_died", "row"], [2, 2, 1]),
+        ([[*FINE[:4], Gone()], [HERE, BEGAN, Gone()]], ["row", "worker_died"], [2, 1]),
+        ([[*FINE[:5], Gone()]], ["row", "row"], [2]),
+        ([[HERE, BEGAN, NodeGone()]] * 9 + [FINE], ["row", "row"], [2] * 10),
     ],
 )
-def test_each_trial_has_one_row_whatever_is_answered(
-    answers: list[Any], told: list[str], takes: list[int], monkeypatch: pytest.MonkeyPatch
+def test_each_trial_has_one_row_whatever_becomes_of_nodes_and_workers(
+    tasks: list[list[Any]], rows: list[str], taken: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
-    ray = Nodes(monkeypatch, list(answers))
-    heard: list[Any] = []
-    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
-    for _ in range(30):
-        if crew.busy:
-            crew.turn(heard.append)
-    kinds = [news[2] if news[0] == "lost" else news[0] for news in heard]
-    assert not crew.busy
-    assert kinds == told
-    assert [len(unit.trials) for unit in ray.taken] == takes
-
-
-def test_the_loss_of_a_node_is_no_fault_of_a_trial(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
-    ray = Nodes(monkeypatch, [HELLO, BEGAN, Gone()] * 9 + [HELLO, ENDED, ...])
-    ray.alive = False
-    heard: list[Any] = []
-    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
-    while crew.busy:
-        crew.turn(heard.append)
-    assert [news[0] for news in heard] == ["row", "row"]
+    """Two workers that die of a trial are its fault; nodes that are lost never are."""
+    ray = Nodes(monkeypatch, tasks)
+    ray.turns()
+    assert (ray.rows, ray.taken, ray.pool.is_busy) == (rows, taken, False)
 
 
 def test_workers_that_never_begin_end_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
-    ray = Nodes(monkeypatch, [Gone("no room")] * 9)
-    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
-    for _ in range(ray_crew.FALSE_STARTS - 1):
-        crew.turn(refuse_news)
+    ray = Nodes(monkeypatch, [[Gone("no room")]] * 9)
+    ray.turns(pool.FALSE_STARTS - 1)
     with pytest.raises(RuntimeError, match="end before they have begun a trial: no room"):
-        crew.turn(refuse_news)
+        ray.turns(1)
+    assert not ray.rows
 
 
 def test_workers_that_begin_no_more_cost_the_trials_of_own_correctors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
-    ray = Nodes(monkeypatch, [HELLO, ENDED[:2], *[Gone()] * (ray_crew.DEATHS - 1), *[HELLO, Gone()] * 9])
-    heard: list[Any] = []
-    spec = replace(SPEC, methods=("not_there:one", "not_there:two"), trials=1)
-    crew = ray_crew.Crew(lock_of(spec)[0], lambda number: ray.actor, lambda: 1, 60.0)
-    for _ in range(30):
-        if crew.busy:
-            crew.turn(heard.append)
-    assert [(news[0], *news[2:3]) for news in heard][1:] == [("lost", "worker_died")]
+    spec = replace(SPEC, methods=("not_there:one", "not_there:two"))
+    ray = Nodes(monkeypatch, [[*FINE[:3], Gone()], *[[HERE, Gone()]] * 9], spec)
+    ray.turns()
+    assert ray.rows == ["row", "worker_died"]
 
 
 def test_a_driver_that_was_asleep_finds_nobody_late(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_crew, "TURN_S", 0.0)
     now = [0.0]
-    monkeypatch.setattr(ray_crew.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(ray_crew, "TURN_S", 0.2)
-    ray = Nodes(monkeypatch, [HELLO, BEGAN, ..., HELLO, ENDED[2:], ...])
-    heard: list[Any] = []
-    crew = ray_crew.Crew(lock_of(replace(SPEC, trials=1))[0], lambda number: ray.actor, lambda: 1, 60.0)
+    monkeypatch.setattr(dispatch.time, "monotonic", lambda: now[0])
+    ray = Nodes(monkeypatch, [[HERE, BEGAN, ...], FINE[3:]])
     for seconds in (0.0, 0.0, 3600.0):
         now[0] += seconds
-        crew.turn(heard.append)
-    assert (heard, ray.killed) == ([], 0)
+        ray.turns(1)
+    assert (ray.rows, ray.cancelled) == ([], 0)
     for _ in range(70):
         now[0] += 1.0
-        if crew.busy:
-            crew.turn(heard.append)
-    assert [news[2] if news[0] == "lost" else news[0] for news in heard] == ["time_limit", "row"]
+        ray.turns(1)
+    assert (ray.rows, ray.cancelled) == (["time_limit", "row"], 1)
+
+
+def test_a_stop_keeps_the_rows_of_trials_that_end_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    ray = Nodes(monkeypatch, [FINE])
+    ray.turns(2)
+    ray.pool.stop()
+    ray.turns()
+    assert (ray.rows, ray.cancelled) == (["row"], 1)
 
 
 def refused(arguments: list[str], capsys: pytest.CaptureFixture[str], out: Path) -> str:

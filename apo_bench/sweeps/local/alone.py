@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import time
-import traceback
 from collections.abc import Callable
-from contextlib import suppress
-from multiprocessing import connection
 from typing import Any
 
-from apo_bench.errors import InputError
 from apo_bench.records.row import Row
-from apo_bench.sweeps.local.member import GOING_S, STARTING_S
-from apo_bench.sweeps.local.pool import check_limit
-from apo_bench.sweeps.local.process import enter, kill, speaker, start
+from apo_bench.sweeps.dispatch import STARTING_S, check_limit
+from apo_bench.sweeps.local.pool import GOING_S
+from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.stopping import Check, listening
 
-TURN_S = 0.1
-"""How often the clock and the signals are looked at."""
 Say = Callable[..., None]
 """Takes "began" when the time of the trial begins to count, and "row" with the row when it ends."""
 Work = Callable[[Say], Any]
@@ -38,65 +31,30 @@ def run_alone(work: Work, limit_s: float, lost: Callable[[str], Row]) -> Row:
     """
     check_limit(limit_s)
     with listening() as check:
-        process, pipe = start(_work, work)
+        process, patience_s = Process(_work, work), 0.0
         try:
-            row = _row(pipe, process, limit_s, check)
+            row = _row(process, limit_s, check)
             if isinstance(row, str):
                 return lost(row)
-            _listen(pipe, process, None, check)
-            process.join(GOING_S)
+            process.wait(check)
+            patience_s = GOING_S
             return row
         finally:
-            if process.is_alive():
-                kill(process)
-            process.join()
-            pipe.close()
+            process.end(patience_s)
 
 
-def _row(pipe: Any, process: Any, limit_s: float, check: Check) -> Row | str:
+def _row(process: Process, limit_s: float, check: Check) -> Row | str:
     """The row, or the code of a trial without one."""
-    news = _listen(pipe, process, time.monotonic() + STARTING_S, check)
-    if news is None:
-        how = "is not ready in time" if process.is_alive() else f"ends with exit code {process.exitcode}"
+    if process.wait(check, STARTING_S) is None:
+        code = process.exit_code
+        how = "is not ready in time" if code is None else f"ends with exit code {code}"
         raise RuntimeError(f"the process of the trial {how} before it has begun; see that memory is not short.")
     began = time.monotonic()
-    news = _listen(pipe, process, began + limit_s, check)
-    if news is None:
-        return "time_limit" if process.is_alive() else "worker_died"
-    return news[1] if time.monotonic() - began <= limit_s else "time_limit"
+    message = process.wait(check, limit_s)
+    if message is None and process.exit_code is not None:
+        return "worker_died"
+    return "time_limit" if message is None or time.monotonic() - began > limit_s else message[1]
 
 
-def _listen(pipe: Any, process: Any, deadline: float | None, check: Check) -> tuple[Any, ...] | None:
-    """The next thing that is said; None if the time is up, or nothing more will be said."""
-    while True:
-        check()
-        if pipe.poll():
-            try:
-                return _understood(*pipe.recv())
-            except (EOFError, OSError):
-                return None
-        if not process.is_alive() or (deadline is not None and time.monotonic() > deadline):
-            return None
-        connection.wait([pipe, process.sentinel], TURN_S)
-
-
-def _understood(kind: str, *said: Any) -> tuple[Any, ...]:
-    if kind == "refused":
-        raise InputError(said[0])
-    if kind == "failed":
-        raise RuntimeError(f"the trial could not be run:\n{said[0]}")
-    return (kind, *said)
-
-
-def _work(work: Work, pipe: Any) -> None:
-    """The life of the process."""
-    enter()
-    with suppress(OSError):
-        try:
-            work(speaker(pipe))
-        except InputError as error:
-            pipe.send(("refused", str(error)))
-        except Exception:
-            pipe.send(("failed", traceback.format_exc()))
-        except KeyboardInterrupt:
-            os._exit(1)  # signals are ignored here: it is a noise model's own, and ends its process as `sys.exit` does
+def _work(work: Work, say: Say, pipe: Any) -> None:
+    work(say)

@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections import deque
 from collections.abc import Sequence
 from multiprocessing import connection
+from typing import Any, final
 
-from apo_bench.errors import InputError
-from apo_bench.records.method import is_own
+from apo_bench.sweeps.dispatch import Dispatch, Job
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
-from apo_bench.sweeps.local.member import Member
+from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.stopping import Check, never
-from apo_bench.sweeps.worker import Emit, lost, timing
+from apo_bench.sweeps.worker import Emit, Worker
 
 TURN_S = 0.5
 """How often the clock and the signals are looked at while nothing else happens."""
 MOMENT_S = 0.25
 """Between a death and its row: whoever ends all of us at once has ended this process by then."""
+GOING_S = 2.0
+"""What a process without work gets to end by itself."""
 GRACE_S = 5.0
 """After a stop: what trials under way get to end."""
-MOST_FALSE_STARTS = 3
-LONGEST_TRIAL_S = 1e6
-
-
-def check_limit(limit_s: float) -> None:
-    """Raise an `InputError` unless a trial can have such a limit."""
-    if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_TRIAL_S):
-        raise InputError(
-            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {LONGEST_TRIAL_S:g} is allowed."
-        )
+FALSE_STARTS = 3
 
 
 def spread(
@@ -50,90 +41,106 @@ def spread(
         RuntimeError: A trial could not be run at all, or processes end before they have begun one.
         Stopped: Passed on after the rows of the trials that had ended were emitted.
     """
-    waiting = deque(work)
-    crew = [Member(number, lock) for number in range(min(workers, len(work)))]
+    dispatch = Dispatch(work, lock, limit_s, emit, deaths=1, false_starts=FALSE_STARTS)
+    members = [Member(number, lock, dispatch) for number in range(min(workers, len(work)))]
     try:
-        while waiting or any(member.unit for member in crew):
+        while dispatch.waiting or any(member.job for member in members):
             check()
-            for member in crew:
-                if member.unit is None and waiting:
-                    member.give(waiting.popleft())
-            _hear(crew, emit)
-            for member in crew:
-                if member.unit is not None and (not member.process.is_alive() or member.overdue(limit_s)):
-                    _replace(member, limit_s, waiting, emit, check, any(one.has_begun for one in crew))
+            for member in members:
+                if member.job is None and dispatch.waiting:
+                    member.begin(dispatch.waiting.popleft())
+            _hear(members, dispatch, TURN_S)
+            for member in members:
+                if member.job and (member.has_ended or dispatch.is_late(member.job)):
+                    member.replace(check)
     except KeyboardInterrupt:
-        _end_cleanly(crew, emit)
+        _end_cleanly(members, dispatch)
         raise
     finally:
-        for member in crew:
+        for member in members:
             member.end()
 
 
-def _hear(crew: Sequence[Member], emit: Emit) -> None:
-    """Wait a turn for messages, and take those that are there."""
-    busy = [member for member in crew if member.unit is not None]
-    connection.wait([sign for member in busy for sign in (member.pipe, member.process.sentinel)], TURN_S)
+@final
+class Member:
+    """One of the workers: a process where there is one, and the job that it has."""
+
+    def __init__(self, number: int, lock: EnvironmentLock, dispatch: Dispatch) -> None:
+        self._number, self._lock, self._dispatch = number, lock, dispatch
+        self.process: Process | None = None
+        self.job: Job | None = None
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether its process has."""
+        return self.process is None or self.process.exit_code is not None
+
+    def begin(self, job: Job) -> None:
+        """Have a job done, by a new process where none is there."""
+        self.process = self.process or Process(_work, self._number, self._lock)
+        self.job = job
+        self._dispatch.given(job)
+        self.process.send(job.unit)
+
+    def hear(self) -> None:
+        """Take all messages that are there."""
+        while self.job and self.process and (message := self.process.receive()) is not None:
+            self._dispatch.hear(self.job, message)
+            if message[0] == "done":
+                self.job = None
+
+    def replace(self, check: Check) -> None:
+        """End a process that is dead or too long at a trial, unless it has ended that meanwhile."""
+        assert self.process is not None
+        code = "worker_died" if self.has_ended else "time_limit"
+        if self.has_ended:
+            time.sleep(MOMENT_S)
+        check()
+        self.hear()
+        job = self.job
+        if job is None or (code == "time_limit" and not self._dispatch.is_late(job)):
+            return
+        how = f"end with exit code {self.process.exit_code}" if self.has_ended else "are not ready in time"
+        self.end()
+        why = (
+            f"worker processes {how} before they have begun a trial; use fewer of them if memory is short, and in a "
+            'script of your own start sweeps under `if __name__ == "__main__":`'
+        )
+        self._dispatch.ended(job, code, why, {"worker": self._number})
+
+    def end(self) -> None:
+        """Send its process home; by force if it is at work or does not go."""
+        if self.process is not None:
+            self.process.end(0.0 if self.job else GOING_S)
+        self.process = self.job = None
+
+
+def _hear(members: Sequence[Member], dispatch: Dispatch, seconds: float) -> None:
+    """Wait so long for messages, and take those that are there."""
+    busy = [member for member in members if member.job]
+    connection.wait([sign for member in busy if member.process for sign in member.process.signs], seconds)
+    dispatch.tick()
     for member in busy:
-        while member.unit is not None and member.hear(emit):
-            pass
+        member.hear()
 
 
-def _replace(
-    member: Member, limit_s: float, waiting: deque[Unit], emit: Emit, check: Check, begun_before: bool
-) -> None:
-    """End a process that is dead or too long at a trial: that trial is lost, the rest of its unit waits.
-
-    Args:
-        begun_before: Whether a process of this sweep has begun a trial.
-    """
-    code = "time_limit" if member.process.is_alive() else "worker_died"
-    if code == "worker_died":
-        time.sleep(MOMENT_S)
-    check()
-    while member.unit is not None and member.hear(emit):
-        pass
-    if member.unit is None or (code == "time_limit" and not member.overdue(limit_s)):
-        return
-    unit, done, since = member.unit, member.done, member.since
-    spec = unit.trials[done] if unit.trials[done:] else None
-    given_up = since is None and _gives_up(member, code, begun_before and spec is not None and is_own(spec.method))
-    member.end()
-    if spec is not None and (since is not None or given_up):
-        row = lost(spec, member.lock.content[spec.scenario], code)
-        emit(row, timing(row, member.number, None, None, None if since is None else time.monotonic() - since))
-        done += 1
-    if unit.trials[done:]:
-        waiting.appendleft(Unit(unit.trials[done:]))
-
-
-def _gives_up(member: Member, code: str, correctors_doing: bool) -> bool:
-    """Whether a process has ended too often before a trial began; if that is the corrector's doing, the trial is lost.
-
-    Args:
-        correctors_doing: Processes have begun trials before, and this one has a corrector of one's own.
-
-    Raises:
-        RuntimeError: It is not.
-    """
-    member.false_starts += 1
-    if member.false_starts < MOST_FALSE_STARTS:
-        return False
-    if correctors_doing:
-        member.false_starts = 0
-        return True
-    how = "are not ready in time" if code == "time_limit" else f"end with exit code {member.process.exitcode}"
-    raise RuntimeError(
-        f"worker processes {how} before they have begun a trial; use fewer of them if memory is short, and in a script "
-        'of your own start sweeps under `if __name__ == "__main__":`'
-    )
-
-
-def _end_cleanly(crew: Sequence[Member], emit: Emit) -> None:
+def _end_cleanly(members: Sequence[Member], dispatch: Dispatch) -> None:
     """After a stop: no new trials, and the rows of those that end in time."""
-    for member in crew:
-        if member.unit is not None:
-            member.stop()
+    for member in members:
+        if member.process is not None:
+            member.process.send(None)
     deadline = time.monotonic() + GRACE_S
-    while time.monotonic() < deadline and (busy := [m for m in crew if m.unit is not None and m.process.is_alive()]):
-        _hear(busy, emit)
+    while (left_s := deadline - time.monotonic()) > 0.0 and any(m.job and not m.has_ended for m in members):
+        _hear(members, dispatch, min(TURN_S, left_s))
+
+
+def _work(number: int, lock: EnvironmentLock, say: Any, pipe: Any) -> None:
+    """The life of a worker process: unit after unit."""
+    worker = Worker(number, lock)
+    try:
+        while (unit := pipe.recv()) is not None:
+            for message in worker.run(unit, stopped=pipe.poll):
+                say(*message)
+            say("done")
+    finally:
+        worker.close()

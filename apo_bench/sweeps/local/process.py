@@ -1,40 +1,114 @@
 """A process on this machine that works for this one: how it is started, what it does first, how it is ended.
 
 It has a pipe of its own, so that no other can take its messages along by dying; a session of its own, so that Ctrl-C is
-for the one who started it, who tells it; and it ends when that one does.
+for the one who started it, who tells it; and it ends when that one does. `pebble.ProcessPool` keeps none of this: what
+a task has started outlives its limit, a worker outlives a parent that is killed, and the exit code of a worker that
+dies before its first task is not said. Nor does `concurrent.futures`, where one death breaks the pool.
 """
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing import resource_tracker
-from typing import Any
+from multiprocessing import connection, resource_tracker
+from typing import Any, final
 
 from apo_bench.io.processes import end_descendants
-from apo_bench.sweeps.stopping import SIGNALS
+from apo_bench.sweeps.messages import Message, checked, last_message
+from apo_bench.sweeps.stopping import SIGNALS, Check
 
+TURN_S = 0.1
+"""How often the clock and the signals are looked at while nothing else happens."""
+CLOSING_S = 0.25
+"""Between the end of its pipe and that of a process."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def start(target: Callable[..., None], *given: Any) -> tuple[Any, Any]:
-    """A process that calls `target(*given, pipe)`, and our end of its pipe."""
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=target, args=(*given, theirs))
-    resource_tracker.ensure_running()
-    with _one_thread_each(), _undisturbed():
-        process.start()
-    theirs.close()
-    return process, ours
+@final
+class Process:
+    """A process that works for this one, as this one sees it."""
+
+    def __init__(self, work: Callable[..., None], *given: Any) -> None:
+        """Start it.
+
+        Args:
+            work: What it calls: `work(*given, say, pipe)`. `say` sends its arguments as one message, and what is sent
+                to the process comes out of `pipe`.
+        """
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_live, args=(work, given, theirs))
+        self._is_open = True
+        resource_tracker.ensure_running()
+        with _one_thread_each(), _undisturbed():
+            self._process.start()
+        theirs.close()
+
+    @property
+    def signs(self) -> list[Any]:
+        """What `connection.wait` waits for: a message, or the end of the process."""
+        return [self._pipe, self._process.sentinel] if self._is_open else [self._process.sentinel]
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while it is alive."""
+        return self._process.exitcode
+
+    def send(self, what: Any) -> None:
+        """Send it something; None asks it to end."""
+        with suppress(OSError):
+            self._pipe.send(what)
+
+    def receive(self) -> Message | None:
+        """The next message; None if there is none, or never will be."""
+        try:
+            return self._pipe.recv() if self._is_open and self._pipe.poll() else None
+        except (EOFError, OSError):
+            self._is_open = False
+            self._process.join(CLOSING_S)
+            return None
+
+    def wait(self, check: Check, seconds: float = math.inf) -> Message | None:
+        """The next message; None if there is none in that time, or never will be.
+
+        Raises:
+            InputError, RuntimeError: As `checked`.
+        """
+        deadline = time.monotonic() + seconds
+        while True:
+            check()
+            is_alive = self.exit_code is None
+            message = self.receive()
+            if message is not None:
+                return checked(message)
+            if not (is_alive and self._is_open) or time.monotonic() >= deadline:
+                return None
+            connection.wait(self.signs, TURN_S)
+
+    def end(self, patience_s: float = 0.0) -> None:
+        """Ask it to end; by force, with all that it started, if it does not in that time."""
+        self.send(None)
+        self._process.join(patience_s)
+        pid = self._process.pid
+        if self.exit_code is None and pid is not None:
+            end_descendants(pid)
+            with suppress(OSError, AttributeError):
+                if os.getpgid(pid) == pid:
+                    os.killpg(pid, signal.SIGKILL)
+            self._process.kill()
+        self._process.join()
+        self._process.close()
+        self._pipe.close()
 
 
-def enter() -> None:
-    """What such a process does first."""
+def _live(work: Callable[..., None], given: tuple[Any, ...], pipe: Any) -> None:
+    """The life of the process: its work, and why that ends if it does too early."""
     if hasattr(os, "setsid"):
         os.setsid()
     for one in SIGNALS:
@@ -42,27 +116,20 @@ def enter() -> None:
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def speaker(pipe: Any) -> Callable[..., None]:
-    """What sends its arguments as one message; code that forked and came back from both has one say."""
     own = os.getpid()
 
-    def say(*news: Any) -> None:
+    def say(*message: Any) -> None:
         if os.getpid() != own:
-            os._exit(1)
-        pipe.send(news)
+            os._exit(1)  # code that forked and came back from both is heard once
+        pipe.send(message)
 
-    return say
-
-
-def kill(process: Any) -> None:
-    """End a process with all that it started, and its session if it has one of its own by now."""
-    end_descendants(process.pid)
-    with suppress(OSError, AttributeError):
-        if os.getpgid(process.pid) == process.pid:
-            os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
+    with suppress(OSError):
+        try:
+            work(*given, say, pipe)
+        except Exception as error:
+            say(*last_message(error))
+        except KeyboardInterrupt:
+            os._exit(1)  # signals are ignored here: it is a noise model's own, and ends its process as `sys.exit` does
 
 
 def _end_with_parent() -> None:

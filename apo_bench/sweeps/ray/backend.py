@@ -1,31 +1,30 @@
-"""The work of a sweep on a Ray cluster, as the sweep sees it; Ray itself stays in another process (`ray_driver`)."""
+"""The work of a sweep on a Ray cluster, as the sweep sees it; Ray itself stays in another process (`driver`)."""
 
 from __future__ import annotations
 
 import importlib.util
 import math
-import multiprocessing
 import os
 import pickle
 import re
 import socket
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 from apo_bench.errors import InputError
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
-from apo_bench.sweeps.ray.driver import GRACE_S, Job, drive
-from apo_bench.sweeps.ray.runtime_files import parcel, wanted
+from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
+from apo_bench.sweeps.local.process import Process
+from apo_bench.sweeps.ray.driver import Plan, drive
+from apo_bench.sweeps.ray.runtime_files import names, runtime_files
 from apo_bench.sweeps.stopping import Check, never
-from apo_bench.sweeps.worker import Emit, lost, timing
-
-Take = Callable[[tuple[Any, ...]], bool]
+from apo_bench.sweeps.worker import Emit
 
 TURN_S = 0.2
 JOINING_S = 30.0
@@ -90,82 +89,59 @@ def spread(
     if not work:
         return
     check_ray(address)
-    asked = wanted(work)
-    job = Job(tuple(work), pickle.dumps((lock, asked)), parcel(asked), address, workers, limit_s)
-
-    def take(news: tuple[Any, ...]) -> bool:
-        """Emit what is a row, or what stands for one; False for anything else."""
-        kind, *said = news
-        if kind == "row":
-            emit(*said)
-        elif kind == "lost":
-            spec, code, number, seconds, place = said
-            row = lost(spec, lock.content[spec.scenario], code)
-            emit(row, timing(row, number, None, None, seconds) | place)
-        return kind in ("row", "lost")
-
+    named = names(work)
+    plan = Plan(tuple(work), lock, pickle.dumps((lock, named)), runtime_files(named), address, workers, limit_s)
     try:
-        _drive(job, take, check)
+        _drive(plan, emit, check)
     except _TokenWanted:
-        _drive(replace(job, token=True), take, check)
+        _drive(replace(plan, token=True), emit, check)
 
 
 class _TokenWanted(Exception):
     """The cluster does not let anybody in."""
 
 
-def _drive(job: Job, take: Take, check: Check) -> None:
-    context = multiprocessing.get_context("spawn")
-    here, there = context.Pipe()
+def _drive(plan: Plan, emit: Emit, check: Check) -> None:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "ray.log"
-        process = context.Process(target=drive, args=(there, job, str(log)))
-        process.start()
-        there.close()
+        driver, patience_s = Process(drive, plan, str(log)), 0.0
         try:
-            _listen(here, _Joining(process, job, log), take, check)
+            _listen(driver, _Joining(plan, log), emit, check)
+            patience_s = GOING_S
         except KeyboardInterrupt:
-            _end_cleanly(here, take)
+            _end_cleanly(driver, emit)
             raise
         finally:
-            here.close()
-            process.join(GRACE_S)
-            process.kill()
-            process.join()
+            driver.end(patience_s)
 
 
-def _listen(pipe: Any, joining: _Joining, take: Take, check: Check) -> None:
+def _listen(driver: Process, joining: _Joining, emit: Emit, check: Check) -> None:
     """Take rows until the last word."""
     while True:
-        check()
-        if not pipe.poll(TURN_S):
+        is_alive = driver.exit_code is None
+        kind, *said = driver.wait(check, TURN_S) or (None,)
+        if kind == "row":
+            emit(*said)
+        elif kind == "starting":
+            joining.give(STARTING_S)
+        elif kind == "connected":
+            joining.give(math.inf)
+        elif kind == "done":
+            return
+        elif is_alive:
             joining.look()
-            continue
-        try:
-            news = pipe.recv()
-        except (EOFError, OSError) as error:
+        else:
             raise RuntimeError(
                 f"the Ray cluster was lost{joining.last_line()}; finished rows are kept, and the same command goes on."
-            ) from error
-        if news[0] == "starting":
-            joining.give(STARTING_S)
-        elif news[0] == "connected":
-            joining.give(math.inf)
-        elif news[0] == "refused":
-            raise InputError(news[1])
-        elif news[0] == "failed":
-            raise RuntimeError(news[1])
-        elif not take(news):
-            return
+            )
 
 
 @final
 class _Joining:
     """Watches a process that may wait for a cluster for ever, and for one that does not let it in."""
 
-    def __init__(self, process: Any, job: Job, log: Path) -> None:
-        self._process, self._job, self._log = process, job, log
-        self._named = job.address or os.environ.get("RAY_ADDRESS")
+    def __init__(self, plan: Plan, log: Path) -> None:
+        self._plan, self._log = plan, log
         self.give(JOINING_S)
 
     def give(self, seconds: float) -> None:
@@ -173,20 +149,19 @@ class _Joining:
         self._seconds, self._deadline = seconds, time.monotonic() + seconds
 
     def look(self) -> None:
-        """Raise an `InputError` if there is no hope, after ending the process."""
+        """Raise an `InputError` if there is no hope."""
         if math.isinf(self._seconds):
             return
         if NO_TOKEN in self._text():
-            self._process.kill()
-            if not self._job.token and "RAY_AUTH_MODE" not in os.environ:
+            if not self._plan.token and "RAY_AUTH_MODE" not in os.environ:
                 raise _TokenWanted
             raise InputError(
                 "the Ray cluster wants another token; have the ~/.ray/auth_token of its head here, and "
                 "RAY_AUTH_MODE=token or unset."
             )
         if time.monotonic() > self._deadline:
-            self._process.kill()
-            where = f"at {self._named}" if self._named else "where one last ran on this machine (ray stop forgets it)"
+            named = self._plan.address or os.environ.get("RAY_ADDRESS")
+            where = f"at {named}" if named else "where one last ran on this machine (ray stop forgets it)"
             raise InputError(
                 f"no Ray cluster answered {where} within {self._seconds:g} s; look there with: ray status, or give "
                 "--address local for one of your own."
@@ -205,13 +180,13 @@ class _Joining:
             return ""
 
 
-def _end_cleanly(pipe: Any, take: Take) -> None:
+def _end_cleanly(driver: Process, emit: Emit) -> None:
     """After a stop: no new trials, and the rows of those that end in time."""
-    with suppress(EOFError, OSError):
-        pipe.send("stop")
-        deadline = time.monotonic() + 2 * GRACE_S
-        while time.monotonic() < deadline:
-            if pipe.poll(TURN_S):
-                news = pipe.recv()
-                if not take(news) and news[0] != "connected":
-                    return
+    driver.send(None)
+    deadline = time.monotonic() + 2 * GRACE_S
+    with suppress(InputError, RuntimeError):
+        while message := driver.wait(never, deadline - time.monotonic()):
+            if message[0] == "row":
+                emit(*message[1:])
+            elif message[0] == "done":
+                return

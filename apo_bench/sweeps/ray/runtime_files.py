@@ -33,7 +33,7 @@ NAMED_FOLDER = re.compile(r"""\b(?:mesh|texture|asset)dir\s*=\s*["']([^"']+)["']
 
 @final
 @dataclass(frozen=True)
-class Wanted:
+class Named:
     """All that the trials of a sweep name."""
 
     scenarios: tuple[str, ...]
@@ -45,14 +45,14 @@ class Wanted:
     """Hashes of noise files and of the user's own modules, where the sweep was started."""
 
 
-def wanted(work: Sequence[Unit]) -> Wanted:
+def names(work: Sequence[Unit]) -> Named:
     """What the units of a sweep name, each once."""
     trials = [trial for unit in work for trial in unit.trials]
 
-    def each(names: Iterable[str]) -> tuple[str, ...]:
-        return tuple(sorted(set(names)))
+    def each(given: Iterable[str]) -> tuple[str, ...]:
+        return tuple(sorted(set(given)))
 
-    asked = Wanted(
+    named = Named(
         scenarios=each(trial.scenario for trial in trials),
         arms=each(trial.arm for trial in trials),
         methods=each(trial.method for trial in trials),
@@ -60,51 +60,51 @@ def wanted(work: Sequence[Unit]) -> Wanted:
         noises=each(trial.noise for trial in trials if trial.eye != RANGE),
         content={},
     )
-    return replace(asked, content=_content(asked))
+    return replace(named, content=_content(named))
 
 
-def _content(asked: Wanted) -> dict[str, str]:
+def _content(named: Named) -> dict[str, str]:
     return {
-        **noise_content(*asked.noises),
-        **own_content("relations", *asked.relations),
-        **own_content("method", *asked.methods),
-        **own_content("arm", *asked.arms),
+        **noise_content(*named.noises),
+        **own_content("relations", *named.relations),
+        **own_content("method", *named.methods),
+        **own_content("arm", *named.arms),
     }
 
 
-def check_here(asked: Wanted) -> set[str]:
+def check_here(named: Named) -> set[str]:
     """Raise an `InputError` unless everything that is named can be had on this machine, from the same files.
 
     Returns:
         The files of the modules that correctors of one's own bring in.
     """
-    for scenario in asked.scenarios:
+    for scenario in named.scenarios:
         load_scenario(scenario)
-    for arm in asked.arms:
+    for arm in named.arms:
         find_arm(arm)
-    brought = check_correctors(with_simulated(parsed(method).plan) for method in asked.methods)
-    for relations in asked.relations:
+    brought = check_correctors(with_simulated(parsed(method).plan) for method in named.methods)
+    for relations in named.relations:
         if relations not in RECOGNISED:
             make_relations(relations)
-    for noise in asked.noises:
+    for noise in named.noises:
         make_noise(noise, Level(1.0, 1.0))
-    here = _content(asked)
-    for name, content in asked.content.items():
+    here = _content(named)
+    for name, content in named.content.items():
         if here.get(name) != content:
             raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
     return brought
 
 
-def parcel(asked: Wanted) -> dict[str, Path]:
+def runtime_files(named: Named) -> dict[str, Path]:
     """The user's files below the current folder: path from there -> file. What lies elsewhere does not travel.
 
     Scenario files and their parts, noise files, arms, and every Python module that importing what is named brought in.
     """
-    brought = check_here(asked)
-    files = [Path(name) for name in asked.scenarios if name not in scenario_names()]
-    files += [part for name in asked.scenarios for part in load_scenario(name).part_files.values()]
-    files += [path for name in asked.noises if (path := noise_path(name)) is not None]
-    for name in asked.arms:
+    brought = check_here(named)
+    files = [Path(name) for name in named.scenarios if name not in scenario_names()]
+    files += [part for name in named.scenarios for part in load_scenario(name).part_files.values()]
+    files += [path for name in named.noises if (path := noise_path(name)) is not None]
+    for name in named.arms:
         files += _with_named(find_arm(name).mjcf)
     files += [Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))]
     files += [path for name in brought if (path := Path(name)).is_file()]

@@ -1,0 +1,39 @@
+"""What a worker says while it works, whichever executor it has: tuples whose first item is a word.
+
+("began",)              a trial begins; its scene is compiled and its corrector imported, so its time counts now
+("row", row, timing)    it has ended
+("done",)               the unit of work has ended
+("refused", sentence)   the request cannot be honoured; nothing follows
+("failed", text)        a trial could not be run; nothing follows
+"""
+
+from __future__ import annotations
+
+import traceback
+from typing import Any
+
+from apo_bench.errors import InputError
+
+Message = tuple[Any, ...]
+
+
+def last_message(error: Exception) -> Message:
+    """What a worker says that cannot go on."""
+    if isinstance(error, InputError):
+        return "refused", str(error)
+    return "failed", f"a trial could not be run:\n{''.join(traceback.format_exception(error))}"
+
+
+def checked(message: Message) -> Message:
+    """The message, unless it is one after which nothing follows.
+
+    Raises:
+        InputError: The request cannot be honoured.
+        RuntimeError: A trial could not be run.
+    """
+    kind, *said = message
+    if kind == "refused":
+        raise InputError(*said)
+    if kind == "failed":
+        raise RuntimeError(*said)
+    return message

@@ -1,0 +1,94 @@
+"""What runs on the nodes of a Ray cluster: a task that runs one unit of work and yields messages."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import platform
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+
+from apo_bench.errors import InputError
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.sweeps.environment_lock import EnvironmentLock
+from apo_bench.sweeps.grid import Unit
+from apo_bench.sweeps.messages import Message, last_message
+from apo_bench.sweeps.ray.runtime_files import Named, check_here
+from apo_bench.sweeps.worker import Worker
+from apo_bench.trial.fingerprint import content_hash
+
+
+def made_task() -> Callable[[bytes, bytes], Iterator[Message]]:
+    """The task. It is made here, so that it travels as a whole, to nodes that may have no such package."""
+
+    def run_unit(packed: bytes, unit: bytes) -> Iterator[Message]:
+        import os
+        import platform
+        import sys
+
+        import ray
+
+        host, node = platform.node(), ray.get_runtime_context().get_node_id()
+        yield "here", {"host": host, "node": node, "worker": os.getpid()}
+        try:
+            from apo_bench.sweeps.ray.task import messages
+        except ImportError as error:
+            yield (
+                "refused",
+                f"the node '{host}' cannot import this version of apo_bench ({error}); "
+                f"install it for {sys.executable}, which Ray runs there.",
+            )
+        else:
+            yield from messages(packed, pickle.loads(unit), node)
+
+    return run_unit
+
+
+def messages(packed: bytes, unit: Unit, node: str) -> Iterator[Message]:
+    """What the worker of this process says of a unit.
+
+    Args:
+        packed: As in `refusal`.
+        node: The id of the node that it is on.
+    """
+    try:
+        for kind, *said in _worker(packed).run(unit):
+            yield (kind, said[0], said[1] | {"node": node}) if kind == "row" else (kind, *said)
+    except Exception as error:
+        yield last_message(error)
+    except (KeyboardInterrupt, SystemExit):
+        os._exit(1)  # code of the user's own that ends the process, as `sys.exit` does
+
+
+@lru_cache(maxsize=1)
+def _worker(packed: bytes) -> Worker:
+    """Ray gives its processes task after task: scenes are compiled and modules imported once in each."""
+    said = refusal(packed)
+    if said is not None:
+        raise InputError(said)
+    lock, _ = _unpacked(packed)
+    return Worker(os.getpid(), lock)
+
+
+def refusal(packed: bytes) -> str | None:
+    """Why trials cannot run on this machine as they do where the sweep was started; None if they can.
+
+    Args:
+        packed: The pickled `EnvironmentLock` and `Named` of the sweep.
+    """
+    try:
+        lock, named = _unpacked(packed)
+        lock.check_versions()
+        check_here(named)
+        for given in named.scenarios:
+            for arm in named.arms:
+                lock.check_content(given, content_hash(load_scenario(given), given, find_arm(arm).mjcf))
+    except InputError as error:
+        return f"the node '{platform.node()}' cannot work as this machine does: {error}"
+    return None
+
+
+def _unpacked(packed: bytes) -> tuple[EnvironmentLock, Named]:
+    lock, named = pickle.loads(packed)
+    return lock, named
