@@ -114,10 +114,10 @@ def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) 
     return tuple(largest(gaps[chosen]) for chosen in mine)
 
 
-def observed_residuals(seen: Observation, graph: Graph) -> tuple[float | None, ...]:
+def observed_residuals(observation: Observation, graph: Graph) -> tuple[float | None, ...]:
     """The same at what was seen; None for an arc whose equations need an operation that was not."""
-    residuals = arc_residuals(seen.assembly, seen.start, seen.goals, graph)
-    known = [all(seen.seen[k] for k in arc.operations) for arc in graph.arcs]
+    residuals = arc_residuals(observation.assembly, observation.start, observation.goals, graph)
+    known = [all(observation.seen[k] for k in arc.operations) for arc in graph.arcs]
     return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))
 
 

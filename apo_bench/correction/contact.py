@@ -45,7 +45,7 @@ class ContactCorrector:
         if not isinstance(self.level, float | int) or not 0.0 < self.level < 1.0:
             raise InputError(f"a test level of {self.level!r} was given; a number between 0 and 1 is allowed.")
 
-    def __call__(self, seen: Observation) -> Correction:
+    def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.
 
         Returns:
@@ -56,17 +56,17 @@ class ContactCorrector:
         Raises:
             InputError: The covariance of an operation is not positive definite.
         """
-        return self.given(seen, None)
+        return self.given(observation, None)
 
-    def given(self, seen: Observation, found: NearestGoals | None) -> Correction:
+    def given(self, observation: Observation, found: NearestGoals | None) -> Correction:
         """The same, if the nearest goals without walls are known already."""
-        if not seen.seen.all():
-            return refused_correction(seen)
-        asked = problem(seen, self.solver)
+        if not observation.seen.all():
+            return refused_correction(observation)
+        asked = problem(observation, self.solver)
         every = asked.without(())
         found, first = asked.solve(every, found)
         first = replace(first, level=self.level)
-        lost = not found.at_rest and asked.gap(found.goals, every) <= seen.gap_m
+        lost = not found.at_rest and asked.gap(found.goals, every) <= observation.gap_m
         if not first.passes and self.doubt != "apply" and found.finite and not lost:
             first = replace(first, suspects=asked.suspects(every))
         kept, dropped, tested = every, tuple[str, ...](), first

@@ -69,18 +69,20 @@ def checked_corrector(given: Any) -> Any:
     return chosen
 
 
-def _admitted(found: Any, seen: Observation, chosen: Any, name: str) -> Correction:
+def _admitted(found: Any, observation: Observation, chosen: Any, name: str) -> Correction:
     """What a corrector returned, as a `Correction` that makes sense."""
     if not isinstance(found, Correction):
-        return goals_as_given(seen, _bare(found, len(seen.goals), name), "the corrector returned goals and no status")
+        return goals_as_given(
+            observation, _bare(found, len(observation.goals), name), "the corrector returned goals and no status"
+        )
     if found.status not in _STATUSES:
         raise InputError(
             f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(_STATUSES)}."
         )
-    goals = _bare(found.goals, len(seen.goals), name)
-    found = check_correction(found, seen.assembly, name)
+    goals = _bare(found.goals, len(observation.goals), name)
+    found = check_correction(found, observation.assembly, name)
     if found.ok and not _ours(chosen):
-        before, after = gap_of(seen, seen.goals), gap_of(seen, goals)
+        before, after = gap_of(observation, observation.goals), gap_of(observation, goals)
         found = replace(found, gap_before_m=before, gap_after_m=after)
     return found
 

@@ -24,8 +24,8 @@ def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str
     return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
 
 
-def refused_correction(seen: Observation) -> Correction:
+def refused_correction(observation: Observation) -> Correction:
     """What was seen, unchanged: an operation without a pose has no motion parameter to start from."""
-    missing = int(np.argmin(seen.seen))
-    now = largest_gap(seen.assembly, seen.start, seen.goals)
-    return Correction(seen.goals, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)
+    missing = int(np.argmin(observation.seen))
+    now = largest_gap(observation.assembly, observation.start, observation.goals)
+    return Correction(observation.goals, "not_seen", outcomes.sentence("not_seen", operation=missing), (), now, now, 0)

@@ -89,7 +89,7 @@ def marginals(found: NearestGoals, free: Array) -> Array:
     return np.asarray(spread @ np.swapaxes(spread, 1, 2))
 
 
-def contains_truth(seen: Observation, made: Correction, truth: Array, level: float = 0.95) -> bool | None:
+def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:
     """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
 
     The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
@@ -100,23 +100,25 @@ def contains_truth(seen: Observation, made: Correction, truth: Array, level: flo
     """
     from scipy.special import chdtri
 
-    if made.covariance is None or not made.ok:
+    if correction.covariance is None or not correction.ok:
         return None
-    L = np.linalg.cholesky(seen.covariance)
-    xi = pose.log(pose.inverse(seen.goals) @ made.goals)
-    system = compact_equations(equations(seen.assembly, seen.start, seen.goals), len(made.goals))
-    system = system.among(_equal(seen, made.dropped))
-    _, blocks = system.blocks(made.goals, right_jacobian(xi) @ L)
+    L = np.linalg.cholesky(observation.covariance)
+    xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
+    system = compact_equations(
+        equations(observation.assembly, observation.start, observation.goals), len(correction.goals)
+    )
+    system = system.among(_equal(observation, correction.dropped))
+    _, blocks = system.blocks(correction.goals, right_jacobian(xi) @ L)
     known = freedom(system.gathered(blocks))
     if known is None or not known.free.shape[1]:
         return None
     free = known.free
-    true = pose.log(pose.inverse(seen.goals) @ truth)
+    true = pose.log(pose.inverse(observation.goals) @ truth)
     off = free.T @ np.linalg.solve(L, (true - xi)[..., None]).ravel()
     return bool(off @ off <= chdtri(free.shape[1], 1.0 - level))
 
 
-def _equal(seen: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
+def _equal(observation: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
     """The contacts that were equations, (c,): neither walls nor left out."""
-    low, high = seen.assembly.intervals(seen.play_m).T
-    return np.asarray(low == high) & seen.assembly.without(dropped)
+    low, high = observation.assembly.intervals(observation.play_m).T
+    return np.asarray(low == high) & observation.assembly.without(dropped)

@@ -104,15 +104,15 @@ class Problem:
         return violation(self.system, self.exact, self.walls, goals, kept)
 
 
-def problem(seen: Observation, solver: Solver) -> Problem:
+def problem(observation: Observation, solver: Solver) -> Problem:
     """What an observation asks.
 
     Raises:
         InputError: The covariance of an operation is not positive definite.
     """
-    L = scales(seen.covariance)
-    plain = equations(seen.assembly, seen.start, seen.goals)
-    system, exact, walls = demanded(plain, seen.assembly, seen.play_m)
-    every = compact_equations(system, len(seen.goals))
-    fits = np.array([seen.assembly.is_fit(r.contact) for r in seen.assembly.relations()], dtype=np.bool_)
-    return Problem(seen, system, every, exact, walls, L, fit_deviation(fits, every, seen.play_m), solver)
+    L = scales(observation.covariance)
+    plain = equations(observation.assembly, observation.start, observation.goals)
+    system, exact, walls = demanded(plain, observation.assembly, observation.play_m)
+    every = compact_equations(system, len(observation.goals))
+    fits = np.array([observation.assembly.is_fit(r.contact) for r in observation.assembly.relations()], dtype=np.bool_)
+    return Problem(observation, system, every, exact, walls, L, fit_deviation(fits, every, observation.play_m), solver)

@@ -40,22 +40,25 @@ class RangeSensor:
     play_m: float
     """Clearance per side, as the models are those of the parts as they are made."""
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        events = self.events(shown, self.sensed(rng))
-        goals = np.array([shown.start[operation.main] for operation in assembly.operations])
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        events = self.events(demonstration, self.sensed(rng))
+        goals = np.array([demonstration.start[operation.main] for operation in assembly.operations])
         covariance, seen = np.repeat(_UNSEEN[None], len(assembly), axis=0), np.zeros(len(assembly), dtype=np.bool_)
         for event in events:
             if event.found is not None and event.operation is not None:
                 k = event.operation
                 goals[k], covariance[k], seen[k] = event.found.T, event.found.covariance, True
-        return Observation(assembly, shown.start, goals, floored(covariance + shown.careless), seen)
+        return Observation(assembly, demonstration.start, goals, floored(covariance + demonstration.careless), seen)
 
     def sensed(self, rng: np.random.Generator) -> list[Array]:
         """The images with the errors of the sensor, (views, height, width) each, [m]."""
         return [self.finder.sense(image, self.level_m, rng) for image in self.images]
 
-    def events(self, shown: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
+    def events(self, demonstration: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
         """What it makes of measured images, operation by operation."""
         return follow_demonstration(
-            images, self.finder, self.level_m, Expected(shown.assembly, shown.start, self.turns, self.play_m)
+            images,
+            self.finder,
+            self.level_m,
+            Expected(demonstration.assembly, demonstration.start, self.turns, self.play_m),
         )

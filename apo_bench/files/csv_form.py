@@ -75,7 +75,7 @@ def read_table(
     shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
     turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
     stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
-    seen = Observation(
+    observation = Observation(
         assembly=assembly,
         start=layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
         goals=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
@@ -86,7 +86,7 @@ def read_table(
         gap_m=scenario.gap_mm * 1e-3,
         play_m=_play(ordered, scenario.clearance_mm * 1e-3),
     )
-    return seen, not stated
+    return observation, not stated
 
 
 def table(assembly: Assembly, goals: Array) -> str:

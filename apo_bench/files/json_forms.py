@@ -37,28 +37,28 @@ Form = dict[str, Any]
 """What `json` can write."""
 
 
-def demonstration_form(shown: Demonstration, scenario: str) -> Form:
+def demonstration_form(demonstration: Demonstration, scenario: str) -> Form:
     """The JSON form of a demonstration; `scenario` is a name or a path that `load_scenario` knows."""
-    careless = [{"careless_mm_deg": _covariance_form(C)} for C in shown.careless]
+    careless = [{"careless_mm_deg": _covariance_form(C)} for C in demonstration.careless]
     return {
-        **_head(DEMONSTRATION, scenario, shown.start),
-        "operations": _operations_form(shown.assembly, shown.goals, careless),
-        "final": _poses_form(shown.final),
-        "code": shown.code,
+        **_head(DEMONSTRATION, scenario, demonstration.start),
+        "operations": _operations_form(demonstration.assembly, demonstration.goals, careless),
+        "final": _poses_form(demonstration.final),
+        "code": demonstration.code,
     }
 
 
-def observation_form(seen: Observation, scenario: str) -> Form:
+def observation_form(observation: Observation, scenario: str) -> Form:
     """The JSON form of an observation."""
     extra = [
         {"covariance_mm_deg": _covariance_form(C), "seen": bool(s)}
-        for C, s in zip(seen.covariance, seen.seen, strict=True)
+        for C, s in zip(observation.covariance, observation.seen, strict=True)
     ]
     return {
-        **_head(OBSERVATION, scenario, seen.start),
-        "gap_mm": seen.gap_m * 1e3,
-        "play_mm": seen.play_m * 1e3,
-        "operations": _operations_form(seen.assembly, seen.goals, extra),
+        **_head(OBSERVATION, scenario, observation.start),
+        "gap_mm": observation.gap_m * 1e3,
+        "play_mm": observation.play_m * 1e3,
+        "operations": _operations_form(observation.assembly, observation.goals, extra),
     }
 
 
@@ -130,7 +130,7 @@ def read_json_observed(
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], found.assembly, (), stated)
-    seen = Observation(
+    observation = Observation(
         assembly=found.assembly,
         start=_poses(root["start"], found) if "start" in root else _own_start(found),
         goals=np.array([_pose(entry) for entry in entries]).reshape(-1, 4, 4),
@@ -140,7 +140,7 @@ def read_json_observed(
         play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
     )
     complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
-    return seen, not complete
+    return observation, not complete
 
 
 def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:

@@ -78,15 +78,15 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
     if Path(path).suffix.lower() != ".csv":
         from apo_bench.files import json_forms as files
 
-        seen = files.read_json_observation(path, scenario)
-        _check_near(path, seen)
-        return seen
-    seen, _, assumed = read_observation_file(path, scenario)
+        observation = files.read_json_observation(path, scenario)
+        _check_near(path, observation)
+        return observation
+    observation, _, assumed = read_observation_file(path, scenario)
     if assumed:
         raise InputError(
             f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row."
         )
-    return seen
+    return observation
 
 
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
@@ -105,9 +105,9 @@ def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) ->
     )
 
 
-def _check_near(path: str | Path, seen: Observation) -> None:
+def _check_near(path: str | Path, observation: Observation) -> None:
     """Refuse poses so far away that nothing can be computed with them; a CSV file is checked cell by cell."""
-    for k, T in enumerate(seen.goals):
+    for k, T in enumerate(observation.goals):
         if np.abs(T[:3, 3]).max() > FARTHEST_M:
             raise InputError(
                 f"{path}, operation {k + 1}, position_mm: numbers of at most {FARTHEST_M * 1e3:g} are needed, "

@@ -60,7 +60,7 @@ def make_relations(given: Any) -> Relations | None:
 
 
 def with_relations(
-    seen: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator
+    observation: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator
 ) -> Observation:
     """The same observation with wrong relations.
 
@@ -71,18 +71,18 @@ def with_relations(
         InputError: The function raised an error, or returned something other than an assembly of the same operations.
     """
     if relations is None:
-        return seen
+        return observation
     name = getattr(relations, "__name__", type(relations).__name__)
     try:
-        wrong = relations(seen.assembly, seen.start, truth, rng)
-        complaint = _complaint(seen.assembly, wrong)
+        wrong = relations(observation.assembly, observation.start, truth, rng)
+        complaint = _complaint(observation.assembly, wrong)
     except InputError:
         raise
     except Exception as error:
         raise failed(f"the relations '{name}'", error) from error
     if complaint:
         raise InputError(f"the relations '{name}' {complaint}.")
-    return replace(seen, assembly=wrong)
+    return replace(observation, assembly=wrong)
 
 
 def _complaint(right: Assembly, wrong: Any) -> str:

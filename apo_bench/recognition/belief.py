@@ -69,9 +69,9 @@ class Belief:
         return Belief(self.assembly, self.start, goals, (covariance + covariance.T) / 2)
 
 
-def initial_belief(seen: Observation) -> Belief:
+def initial_belief(observation: Observation) -> Belief:
     """What an observation says before any contact is known: goals are wrong independently of each other."""
-    n = len(seen.goals)
+    n = len(observation.goals)
     covariance = np.zeros((n, 6, n, 6))
-    covariance[np.arange(n), :, np.arange(n)] = seen.covariance
-    return Belief(seen.assembly, seen.start, seen.goals, covariance.reshape(6 * n, 6 * n))
+    covariance[np.arange(n), :, np.arange(n)] = observation.covariance
+    return Belief(observation.assembly, observation.start, observation.goals, covariance.reshape(6 * n, 6 * n))

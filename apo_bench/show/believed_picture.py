@@ -39,17 +39,19 @@ class BeliefPanel(NamedTuple):
     """What else is wrong with it: what the test says, and the failure that is foretold."""
 
 
-def belief_panel(title: str, seen: Observation, goals: Array, step: int, warning: str = "") -> BeliefPanel:
+def belief_panel(title: str, observation: Observation, goals: Array, step: int, warning: str = "") -> BeliefPanel:
     """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
-    graph = relation_graph(seen.assembly, step)
-    residuals = arc_residuals(seen.assembly, seen.start, goals, graph)
+    graph = relation_graph(observation.assembly, step)
+    residuals = arc_residuals(observation.assembly, observation.start, goals, graph)
     found = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
     wrong = tuple(
-        f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}" for e, arc in found if e > seen.gap_m
+        f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}"
+        for e, arc in found
+        if e > observation.gap_m
     )
-    poses = placements(seen.assembly.first(step), seen.start, goals[:step])[-1]
+    poses = placements(observation.assembly.first(step), observation.start, goals[:step])[-1]
     standing = [arc for arc in graph.arcs if arc.lost is None]
-    beside = tuple(f"{arc}: beside it" for arc in standing if not _covered(seen.assembly, arc.contacts, poses))
+    beside = tuple(f"{arc}: beside it" for arc in standing if not _covered(observation.assembly, arc.contacts, poses))
     return BeliefPanel(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
 
 

@@ -19,32 +19,34 @@ _TESTED = 3
 """... if at least so many degrees of freedom are tested."""
 
 
-def correction_lines(seen: Observation, made: Correction, found: Explanation | None) -> list[tuple[str, str]]:
+def correction_lines(
+    observation: Observation, correction: Correction, found: Explanation | None
+) -> list[tuple[str, str]]:
     """How it ended, the gaps, the test, what is free: name and text of each line."""
-    lines = [("ended", f"{'' if made.ok else f'{made.status}: '}{made.sentence}")]
-    lines.append(("contact gap", _gaps(made)))
-    if made.test is not None:
-        lines.append(("test", _test(made.test, made.status == "inconsistent")))
-    if made.dropped:
-        lines.append(("left out", ", ".join(made.dropped)))
-    if made.test_after is not None:
-        lines.append(("test without", _test(made.test_after, made.status == "inconsistent")))
+    lines = [("ended", f"{'' if correction.ok else f'{correction.status}: '}{correction.sentence}")]
+    lines.append(("contact gap", _gaps(correction)))
+    if correction.test is not None:
+        lines.append(("test", _test(correction.test, correction.status == "inconsistent")))
+    if correction.dropped:
+        lines.append(("left out", ", ".join(correction.dropped)))
+    if correction.test_after is not None:
+        lines.append(("test without", _test(correction.test_after, correction.status == "inconsistent")))
     if found is not None:
         lines.append(("contacts", total(found)))
         lines += [("" if i else "free", sentence) for i, sentence in enumerate(sentences(found))]
     return lines
 
 
-def pose_table(seen: Observation, made: Correction) -> Any:
+def pose_table(observation: Observation, correction: Correction) -> Any:
     """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
     from rich.table import Table
 
     found = Table("", "part", box=None, pad_edge=False)
     for name in ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg"):
         found.add_column(name, justify="right")
-    moved = _moved(seen, made)
-    for k, operation in enumerate(seen.assembly.operations):
-        packed = pose.pack(made.goals[k])
+    moved = _moved(observation, correction)
+    for k, operation in enumerate(observation.assembly.operations):
+        packed = pose.pack(correction.goals[k])
         places = (*(_short(x, 3) for x in packed[:3] * 1e3), *(_short(q, 6) for q in packed[3:]))
         found.add_row(str(k + 1), operation.main, *places, *(f"{x:.3f}" for x in moved[k]))
     return found
@@ -67,35 +69,40 @@ def suspect_table(test: Consistency) -> Any:
 
 
 def correction_form(
-    scenario: str, method: str, seen: Observation, made: Correction, found: Explanation | None, assumed: bool
+    scenario: str,
+    method: str,
+    observation: Observation,
+    correction: Correction,
+    found: Explanation | None,
+    assumed: bool,
 ) -> dict[str, Any]:
     """What `json` can write: mm, degrees, wxyz, operations from 1; poses only of a correction that converged."""
     return {
         "schema": _CORRECTION,
         "scenario": scenario,
         "method": method,
-        "status": made.status,
-        "sentence": made.sentence,
-        "gap_before_mm": _number(made.gap_before_m * 1e3),
-        "gap_after_mm": _number(made.gap_after_m * 1e3) if made.ok else None,
-        "rank": made.rank,
+        "status": correction.status,
+        "sentence": correction.sentence,
+        "gap_before_mm": _number(correction.gap_before_m * 1e3),
+        "gap_after_mm": _number(correction.gap_after_m * 1e3) if correction.ok else None,
+        "rank": correction.rank,
         "freedom": None if found is None else found.freedom,
         "deviations_assumed": assumed,
-        "operations": _operations_form(seen, made) if made.ok else None,
-        "test": None if made.test is None else _test_form(made.test),
-        "test_after": None if made.test_after is None else _test_form(made.test_after),
-        "dropped": list(made.dropped),
+        "operations": _operations_form(observation, correction) if correction.ok else None,
+        "test": None if correction.test is None else _test_form(correction.test),
+        "test_after": None if correction.test_after is None else _test_form(correction.test_after),
+        "dropped": list(correction.dropped),
         "explanation": None if found is None else explanation_form(scenario, found),
     }
 
 
-def _gaps(made: Correction) -> str:
+def _gaps(correction: Correction) -> str:
     """The largest gap before and, of a correction that converged, after."""
-    said = f"{made.gap_before_m * 1e3:.3f} mm as seen"
-    if not made.ok:
+    said = f"{correction.gap_before_m * 1e3:.3f} mm as seen"
+    if not correction.ok:
         return said
-    of = ", relations that were left out counted too" if made.dropped else ""
-    return f"{said}, {made.gap_after_m * 1e3:.3f} mm corrected{of}"
+    of = ", relations that were left out counted too" if correction.dropped else ""
+    return f"{said}, {correction.gap_after_m * 1e3:.3f} mm corrected{of}"
 
 
 def _test(test: Consistency, contradictory: bool) -> str:
@@ -119,15 +126,15 @@ def shown_p(p: float, level: float) -> str:
     return next(text for text in texts if (float(text) >= level) == (p >= level))
 
 
-def _moved(seen: Observation, made: Correction) -> Array:
+def _moved(observation: Observation, correction: Correction) -> Array:
     """How far each goal was moved and turned, (n, 2), [mm, degrees]."""
-    D = pose.inverse(seen.goals) @ made.goals
+    D = pose.inverse(observation.goals) @ correction.goals
     turned = np.linalg.norm(pose.log(D)[..., 3:], axis=-1)
     return np.column_stack([np.linalg.norm(D[..., :3, 3], axis=-1) * 1e3, np.degrees(turned)])
 
 
-def _operations_form(seen: Observation, made: Correction) -> list[dict[str, Any]]:
-    packed, moved = pose.pack(made.goals), _moved(seen, made)
+def _operations_form(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
+    packed, moved = pose.pack(correction.goals), _moved(observation, correction)
     return [
         {
             "operation": k + 1,
@@ -136,9 +143,9 @@ def _operations_form(seen: Observation, made: Correction) -> list[dict[str, Any]
             "quaternion_wxyz": packed[k, 3:].tolist(),
             "moved_mm": float(moved[k, 0]),
             "turned_deg": float(moved[k, 1]),
-            "covariance_mm_deg": None if made.covariance is None else covariance_form(made.covariance[k]),
+            "covariance_mm_deg": None if correction.covariance is None else covariance_form(correction.covariance[k]),
         }
-        for k, operation in enumerate(seen.assembly.operations)
+        for k, operation in enumerate(observation.assembly.operations)
     ]
 
 

@@ -37,7 +37,7 @@ class _Drawn(NamedTuple):
     operation: OperationExplanation
 
 
-def draw_explanation(scenario: Scenario, seen: Observation, found: Explanation, out: str | Path) -> None:
+def draw_explanation(scenario: Scenario, observation: Observation, found: Explanation, out: str | Path) -> None:
     """Write a PNG picture.
 
     Raises:
@@ -53,7 +53,7 @@ def draw_explanation(scenario: Scenario, seen: Observation, found: Explanation, 
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
     camera = view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
     marks = [mark for one in drawn for mark in _marks(one, -_looking(azimuth))]
-    poses = {**seen.start, **{part.part: part.pose for part in found.parts}}
+    poses = {**observation.start, **{part.part: part.pose for part in found.parts}}
     image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks(marks))
     fovy = float(scene.shown.model.vis.global_.fovy)
     names = [(mark, pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)) for mark in marks]

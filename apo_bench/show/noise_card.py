@@ -68,13 +68,15 @@ def draw_errors(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     noise, shown, camera, rng = make_noise(given, level), nominal_demonstration(), Camera(), np.random.default_rng(0)
     errors, variances, missed = [], [], 0
     for _ in range(draws):
-        seen = observe(shown, noise, rng)
-        Q = np.zeros((len(seen.goals), 6, 6))
-        Q[:, :3, :3] = Q[:, 3:, 3:] = np.swapaxes(camera.frames(seen.goals), 1, 2) @ seen.goals[:, :3, :3]
-        xi = (Q @ pose.log(pose.inverse(shown.goals) @ seen.goals)[..., None])[..., 0]
-        errors.append(xi[seen.seen])
-        variances.append(np.diagonal(Q @ seen.covariance @ np.swapaxes(Q, 1, 2), axis1=1, axis2=2)[seen.seen])
-        missed += int(np.sum(~seen.seen))
+        observation = observe(shown, noise, rng)
+        Q = np.zeros((len(observation.goals), 6, 6))
+        Q[:, :3, :3] = Q[:, 3:, 3:] = np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3]
+        xi = (Q @ pose.log(pose.inverse(shown.goals) @ observation.goals)[..., None])[..., 0]
+        errors.append(xi[observation.seen])
+        variances.append(
+            np.diagonal(Q @ observation.covariance @ np.swapaxes(Q, 1, 2), axis1=1, axis2=2)[observation.seen]
+        )
+        missed += int(np.sum(~observation.seen))
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
     some = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
     stated = np.concatenate(variances)[:, [0, 2, 3, 5]]

@@ -40,9 +40,9 @@ def evidence_table(found: Recognised, right: Assembly) -> Any:
     return table
 
 
-def difference_lines(seen: Observation, found: Recognised) -> list[str]:
+def difference_lines(observation: Observation, found: Recognised) -> list[str]:
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
-    right = seen.assembly
+    right = observation.assembly
     count = counted(right, found.assembly)
     missed = [f"missed: {made + 1}: {contact}" for made, contact in _missed(right, found)]
     total = count["contacts_right"] + count["contacts_missed"]
@@ -52,9 +52,11 @@ def difference_lines(seen: Observation, found: Recognised) -> list[str]:
     return [f"{line}, and {count['contacts_false']} that it does not have", *missed]
 
 
-def recognition_form(name: str, kind: str, seen: Observation, found: Recognised, assumed: bool) -> dict[str, Any]:
+def recognition_form(
+    name: str, kind: str, observation: Observation, found: Recognised, assumed: bool
+) -> dict[str, Any]:
     """Everything, in mm and degrees; operations from 1."""
-    there = {(relation.made, relation.contact) for relation in seen.assembly.relations()}
+    there = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
     return {
         "schema": _SCHEMA,
         "scenario": name,
@@ -63,9 +65,9 @@ def recognition_form(name: str, kind: str, seen: Observation, found: Recognised,
         "contacts": [{**_evidence_form(e), "in_scenario": (e.made, e.contact) in there} for e in found.evidence],
         "missed": [
             {"operation": made + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
-            for made, contact in _missed(seen.assembly, found)
+            for made, contact in _missed(observation.assembly, found)
         ],
-        **counted(seen.assembly, found.assembly),
+        **counted(observation.assembly, found.assembly),
     }
 
 

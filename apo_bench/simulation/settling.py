@@ -41,23 +41,23 @@ _SLOW = np.repeat([1e-3, np.radians(1.0)], 3)
 _SLOW.flags.writeable = False
 
 
-def settle(seen: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
+def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | Array:
     """Where the parts come to rest, (n, 4, 4), world frame, [m].
 
     Returns:
         Bare goals, to be measured by whoever asked; a `Correction` with the status `not_seen` and unknown gaps where an
         operation was not seen; what was seen, from the operation on at which the simulation became unstable.
     """
-    if not seen.seen.all():
-        missing = int(np.argmin(seen.seen))
-        return Correction(seen.goals, "not_seen", sentence("not_seen", operation=missing), (), np.nan, np.nan, 0)
-    goals = np.array(seen.goals)
+    if not observation.seen.all():
+        missing = int(np.argmin(observation.seen))
+        return Correction(observation.goals, "not_seen", sentence("not_seen", operation=missing), (), np.nan, np.nan, 0)
+    goals = np.array(observation.goals)
     if not len(goals):
         return goals
-    scene = _world(seen)
-    data = initial_state(scene, seen.start)
-    for k, operation in enumerate(seen.assembly.operations):
-        _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ seen.goals[k])
+    scene = _world(observation)
+    data = initial_state(scene, observation.start)
+    for k, operation in enumerate(observation.assembly.operations):
+        _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ observation.goals[k])
         _rest(scene, data)
         if has_failed(data):
             break
@@ -86,12 +86,12 @@ def _rest(scene: World, data: mujoco.MjData) -> None:
         quiet = quiet + model.opt.timestep if still else 0.0
 
 
-def _world(seen: Observation) -> World:
+def _world(observation: Observation) -> World:
     """The parts of an assembly as boxes, and nothing else; parts that no operation moves are fixed."""
-    moved = {part for operation in seen.assembly.operations for part in operation.moves}
-    free = tuple(part for part in seen.assembly.solids if part in moved)
-    fixed = tuple(part for part in seen.assembly.solids if part not in moved)
-    xml = _xml(seen.assembly.solids, free, seen.play_m or CLEARANCE_M, physics())
+    moved = {part for operation in observation.assembly.operations for part in operation.moves}
+    free = tuple(part for part in observation.assembly.solids if part in moved)
+    fixed = tuple(part for part in observation.assembly.solids if part not in moved)
+    xml = _xml(observation.assembly.solids, free, observation.play_m or CLEARANCE_M, physics())
     model = mujoco.MjModel.from_xml_string(xml)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return world(model, xml, free, fixed)

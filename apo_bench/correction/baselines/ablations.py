@@ -15,14 +15,14 @@ MOST_SETS = 255
 """Sets that `minimal` tries at a step: every set of 8 candidates; of more, the smallest ones."""
 
 
-def last_only(seen: Observation) -> Correction:
+def last_only(observation: Observation) -> Correction:
     """Tracking that never reaches back: only the motion parameter of the newest operation may change."""
-    return track_operations(seen, lambda chosen: (chosen[:1],))
+    return track_operations(observation, lambda chosen: (chosen[:1],))
 
 
-def minimal(seen: Observation) -> Correction:
+def minimal(observation: Observation) -> Correction:
     """Tracking with the smallest set of candidates that suffices, the most recent one of that size."""
-    return track_operations(seen, smallest)
+    return track_operations(observation, smallest)
 
 
 def smallest(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
@@ -33,9 +33,11 @@ def smallest(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
         yield chosen
 
 
-def no_disappeared(seen: Observation) -> Correction:
+def no_disappeared(observation: Observation) -> Correction:
     """All at once without the contacts that were lost by the end: not in the graph, not in the joint equations.
 
     Goals that are no candidates are still settled for what they make, lost contacts too.
     """
-    return at_once(seen, np.array([relation.lost is None for relation in seen.assembly.relations()], dtype=np.bool_))
+    return at_once(
+        observation, np.array([relation.lost is None for relation in observation.assembly.relations()], dtype=np.bool_)
+    )

@@ -39,7 +39,7 @@ class _NoSolution(Exception):
     """CadQuery's solver gave up."""
 
 
-def cadquery(seen: Observation) -> Correction:
+def cadquery(observation: Observation) -> Correction:
     """The goals with which the parts end where CadQuery puts them.
 
     Returns:
@@ -51,10 +51,12 @@ def cadquery(seen: Observation) -> Correction:
     """
     module = _module()
     try:
-        return as_it_ends(seen, lambda seen: _mated(module, seen), "the mates of the last poses were solved")
+        return as_it_ends(
+            observation, lambda observation: _mated(module, observation), "the mates of the last poses were solved"
+        )
     except _NoSolution:
-        now = largest_gap(seen.assembly, seen.start, seen.goals)
-        return Correction(seen.goals, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
+        now = largest_gap(observation.assembly, observation.start, observation.goals)
+        return Correction(observation.goals, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
 
 
 def _module() -> Any:
@@ -73,31 +75,33 @@ def _module() -> Any:
     return module
 
 
-def _mated(cq: Any, seen: Observation) -> Array:
+def _mated(cq: Any, observation: Observation) -> Array:
     """The seen goals (n, 4, 4), those of parts that were last moved as the main part replaced."""
-    operations, goals = seen.assembly.operations, np.array(seen.goals)
-    standing = [relation for relation in seen.assembly.relations() if relation.lost is None]
+    operations, goals = observation.assembly.operations, np.array(observation.goals)
+    standing = [relation for relation in observation.assembly.relations() if relation.lost is None]
     last = {part: k for k, operation in enumerate(operations) for part in operation.moves}
     if not any(end.part in last for relation in standing for end in relation.contact):
         return goals
-    found = _solved(cq, seen, placements(seen.assembly, seen.start, goals)[-1], standing, set(last))
+    found = _solved(
+        cq, observation, placements(observation.assembly, observation.start, goals)[-1], standing, set(last)
+    )
     for part, T in found.items():
         if operations[last[part]].main == part:
             goals[last[part]] = T
     return goals
 
 
-def _solved(cq: Any, seen: Observation, poses: Poses, standing: list[Relation], moved: set[str]) -> Poses:
+def _solved(cq: Any, observation: Observation, poses: Poses, standing: list[Relation], moved: set[str]) -> Poses:
     """Where the parts that were moved and touch something stand after the solve."""
     mated = {end.part: None for relation in standing for end in relation.contact}
     assembly = cq.Assembly(name="assembly")
     for part in mated:
-        boxes = [_box(cq, box.center * _MM, box.half * _MM) for box in seen.assembly.solids[part].boxes]
+        boxes = [_box(cq, box.center * _MM, box.half * _MM) for box in observation.assembly.solids[part].boxes]
         assembly.add(cq.Compound.makeCompound(boxes), name=part, loc=_location(cq, poses[part]))
         if part not in moved:
             assembly.constrain(part, "Fixed")
     for contact, _, _ in standing:
-        ends = [(end.part, _patch(cq, seen, end)) for end in contact]
+        ends = [(end.part, _patch(cq, observation, end)) for end in contact]
         for kind, param in (("PointInPlane", 0), ("Axis", 180)):
             assembly.constrain(*ends[0], *ends[1], kind, param)
     assembly.solve()
@@ -110,9 +114,9 @@ def _box(cq: Any, center: Array, half: Array) -> Any:
     return cq.Solid.makeBox(*(2 * half), cq.Vector(*(center - half)))
 
 
-def _patch(cq: Any, seen: Observation, of: PartFace) -> Any:
+def _patch(cq: Any, observation: Observation, of: PartFace) -> Any:
     """A square at the middle of the corners of a face, looking the same way, in the frame of the part."""
-    face = seen.assembly.face(of)
+    face = observation.assembly.face(of)
     center, n = face.outline.mean(axis=0) * _MM, face.normal
     return cq.Face.makePlane(_PATCH_MM, _PATCH_MM, cq.Vector(*center), cq.Vector(*n))
 

@@ -32,7 +32,7 @@ _TURN_FIRST = np.array([3, 4, 5, 0, 1, 2])
 _TURN_FIRST.flags.writeable = False
 
 
-def gtsam(seen: Observation, *, contact_m: float = CONTACT_M) -> Correction:
+def gtsam(observation: Observation, *, contact_m: float = CONTACT_M) -> Correction:
     """The goals at which GTSAM's Levenberg-Marquardt ends.
 
     Args:
@@ -45,7 +45,7 @@ def gtsam(seen: Observation, *, contact_m: float = CONTACT_M) -> Correction:
         InputError: GTSAM is not installed or cannot be loaded beside CasADi; a covariance is not positive definite.
     """
     module = _module()
-    return as_it_ends(seen, lambda seen: _solved(module, seen, contact_m), "GTSAM came to an end")
+    return as_it_ends(observation, lambda observation: _solved(module, observation, contact_m), "GTSAM came to an end")
 
 
 def _module() -> Any:
@@ -64,11 +64,11 @@ def _module() -> Any:
     return module
 
 
-def _solved(gtsam: Any, seen: Observation, contact_m: float) -> Array:
-    whitened(seen)  # GTSAM takes a covariance that is none without a word
-    system, n = equations(seen.assembly, seen.start, seen.goals), len(seen.goals)
+def _solved(gtsam: Any, observation: Observation, contact_m: float) -> Array:
+    whitened(observation)  # GTSAM takes a covariance that is none without a word
+    system, n = equations(observation.assembly, observation.start, observation.goals), len(observation.goals)
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    for k, (T, covariance) in enumerate(zip(seen.goals, seen.covariance, strict=True)):
+    for k, (T, covariance) in enumerate(zip(observation.goals, observation.covariance, strict=True)):
         noise = gtsam.noiseModel.Gaussian.Covariance(np.asfortranarray(covariance[np.ix_(_TURN_FIRST, _TURN_FIRST)]))
         graph.add(gtsam.PriorFactorPose3(k, gtsam.Pose3(T), noise))
         values.insert(k, gtsam.Pose3(T))
@@ -77,7 +77,7 @@ def _solved(gtsam: Any, seen: Observation, contact_m: float) -> Array:
         keys = list(one.variables(n))
         if keys:
             noise = gtsam.noiseModel.Isotropic.Sigma(len(one), contact_m)
-            graph.add(gtsam.CustomFactor(noise, keys, _error(one, seen.goals)))
+            graph.add(gtsam.CustomFactor(noise, keys, _error(one, observation.goals)))
     settings = gtsam.LevenbergMarquardtParams()
     settings.setLinearSolverType("MULTIFRONTAL_QR")
     settings.setRelativeErrorTol(_TOLERANCE)

@@ -23,7 +23,7 @@ _TOLERANCE = 1e-12
 EVALUATIONS = 300
 
 
-def least_squares(seen: Observation, *, contact_m: float = CONTACT_M) -> Correction:
+def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> Correction:
     """The goals with the least sum of squares.
 
     Args:
@@ -35,14 +35,16 @@ def least_squares(seen: Observation, *, contact_m: float = CONTACT_M) -> Correct
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(seen, lambda seen: _solved(seen, contact_m), "the least sum of squares was looked for")
+    return as_it_ends(
+        observation, lambda observation: _solved(observation, contact_m), "the least sum of squares was looked for"
+    )
 
 
-def _solved(seen: Observation, contact_m: float) -> Array:
+def _solved(observation: Observation, contact_m: float) -> Array:
     from scipy.optimize import least_squares as minimised
 
-    space, system = whitened(seen), equations(seen.assembly, seen.start, seen.goals)
-    prior = np.eye(6 * len(seen.goals))
+    space, system = whitened(observation), equations(observation.assembly, observation.start, observation.goals)
+    prior = np.eye(6 * len(observation.goals))
 
     def residual(z: Array) -> Array:
         return np.concatenate([system.residual(space.goals(z)) / contact_m, z])

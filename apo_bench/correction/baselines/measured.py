@@ -17,39 +17,39 @@ from apo_bench.records import outcomes
 TWIST_UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
 
 
-def goals_as_given(seen: Observation, goals: Array, said: str) -> Correction:
+def goals_as_given(observation: Observation, goals: Array, said: str) -> Correction:
     """A correction of these goals, (n, 4, 4), to be executed as it is, whatever gap it leaves.
 
     Args:
-        said: The sentence, if a contact does not hold within `seen.gap_m`.
+        said: The sentence, if a contact does not hold within `observation.gap_m`.
 
     Returns:
         `converged`; `not_finite`, and what was seen, if a number is not finite.
     """
-    before = largest_gap(seen.assembly, seen.start, seen.goals)
+    before = largest_gap(observation.assembly, observation.start, observation.goals)
     if not np.isfinite(goals).all():
-        return Correction(seen.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
-    system = equations(seen.assembly, seen.start, goals)
+        return Correction(observation.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
+    system = equations(observation.assembly, observation.start, goals)
     e, J = system.linearised(goals)
     _, rank = least_step(J / np.tile(TWIST_UNITS, len(goals)), e, SINGULAR_CUT_OFF)
-    freed = tuple(int(k) for k in np.flatnonzero((goals != seen.goals).any(axis=(1, 2)))[::-1])
+    freed = tuple(int(k) for k in np.flatnonzero((goals != observation.goals).any(axis=(1, 2)))[::-1])
     after = largest(e)
-    said = status_sentence("converged", seen.gap_m) if after <= seen.gap_m else said
+    said = status_sentence("converged", observation.gap_m) if after <= observation.gap_m else said
     return Correction(goals, "converged", said, freed, before, after, rank)
 
 
-def gap_of(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> float:
+def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()) -> float:
     """The largest |e| at goals (n, 4, 4) of what is asked of the contacts, [m]; of walls, how far one is overstepped.
 
     Args:
         dropped: Relations, or single contacts, that do not count.
     """
-    plain = equations(seen.assembly, seen.start, seen.goals)
-    system, exact, walls = demanded(plain, seen.assembly, seen.play_m)
-    return violation(system, exact, walls, goals, seen.assembly.without(dropped))
+    plain = equations(observation.assembly, observation.start, observation.goals)
+    system, exact, walls = demanded(plain, observation.assembly, observation.play_m)
+    return violation(system, exact, walls, goals, observation.assembly.without(dropped))
 
 
-def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:
+def as_it_ends(observation: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:
     """What a method that promises nothing makes of an observation, with the gap that it leaves in the sentence.
 
     Args:
@@ -59,8 +59,8 @@ def as_it_ends(seen: Observation, mended: Callable[[Observation], Array], done: 
     Returns:
         As `goals_as_given`, or `not_seen`; what was seen where there is no contact.
     """
-    if not seen.seen.all():
-        return refused_correction(seen)
-    goals = mended(seen) if seen.assembly.relations() else seen.goals
-    left_m = largest_gap(seen.assembly, seen.start, goals)
-    return goals_as_given(seen, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")
+    if not observation.seen.all():
+        return refused_correction(observation)
+    goals = mended(observation) if observation.assembly.relations() else observation.goals
+    left_m = largest_gap(observation.assembly, observation.start, goals)
+    return goals_as_given(observation, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

@@ -17,7 +17,7 @@ from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry.arrays import Array
 
 
-def no_history(seen: Observation) -> Correction:
+def no_history(observation: Observation) -> Correction:
     """Correct object poses by the contacts that stand at the end; operations get what their part was left with.
 
     A part that was carried has a pose of its own, begun where the motion parameters put it. The pose of a part
@@ -28,33 +28,33 @@ def no_history(seen: Observation) -> Correction:
         The status says whether the standing contacts hold at the object poses; the gaps are those of every contact
         ever made. `freed` are the operations that got a new motion parameter.
     """
-    if not seen.seen.all():
-        return refused_correction(seen)
-    last = {part: k for k, operation in enumerate(seen.assembly.operations) for part in operation.moves}
-    poses = _poses(seen, tuple(last))
-    end = _end(seen.assembly, tuple(last))
-    system = equations(end, seen.start, poses)
-    free = candidates(end, ~(system.gaps(poses) <= seen.gap_m))
+    if not observation.seen.all():
+        return refused_correction(observation)
+    last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}
+    poses = _poses(observation, tuple(last))
+    end = _end(observation.assembly, tuple(last))
+    system = equations(end, observation.start, poses)
+    free = candidates(end, ~(system.gaps(poses) <= observation.gap_m))
     found = solve_newton(system.among(system.containing(free)), poses, free)
-    ended = solver_status(found, largest(system.gaps(found.goals)), seen.gap_m)
-    freed = _main(seen.assembly, last, free)
-    goals = np.array(seen.goals)
+    ended = solver_status(found, largest(system.gaps(found.goals)), observation.gap_m)
+    freed = _main(observation.assembly, last, free)
+    goals = np.array(observation.goals)
     goals[list(freed)] = found.goals[list(freed.values())]
     return Correction(
         goals=goals,
         status=ended,
-        sentence=status_sentence(ended, seen.gap_m, "every contact that stands at the end"),
+        sentence=status_sentence(ended, observation.gap_m, "every contact that stands at the end"),
         freed=tuple(freed),
-        gap_before_m=largest_gap(seen.assembly, seen.start, seen.goals),
-        gap_after_m=largest_gap(seen.assembly, seen.start, goals),
+        gap_before_m=largest_gap(observation.assembly, observation.start, observation.goals),
+        gap_after_m=largest_gap(observation.assembly, observation.start, goals),
         rank=found.rank,
         trace=found.trace,
     )
 
 
-def _poses(seen: Observation, parts: tuple[str, ...]) -> Array:
+def _poses(observation: Observation, parts: tuple[str, ...]) -> Array:
     """Where the motion parameters leave these parts, (parts, 4, 4), world frame, [m]."""
-    final = placements(seen.assembly, seen.start, seen.goals)[-1] if parts else {}
+    final = placements(observation.assembly, observation.start, observation.goals)[-1] if parts else {}
     return np.array([final[part] for part in parts]).reshape(-1, 4, 4)
 
 

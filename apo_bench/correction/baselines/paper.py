@@ -13,37 +13,39 @@ from apo_bench.correction.ending import refused_correction, solver_status, statu
 from apo_bench.correction.solvers.newton import solve_newton
 
 
-def paper(seen: Observation) -> Correction:
+def paper(observation: Observation) -> Correction:
     """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other goal by itself.
 
     Returns:
-        `converged` if every |e| is within `seen.gap_m`; otherwise `not_seen` (nothing was changed), `inconsistent`,
+        `converged` if every |e| is within `observation.gap_m`; otherwise `not_seen` (nothing was changed), `inconsistent`,
         `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the candidates; rank and
         trace are those of their joint solution.
     """
-    return at_once(seen, np.ones(len(seen.assembly.relations()), dtype=np.bool_))
+    return at_once(observation, np.ones(len(observation.assembly.relations()), dtype=np.bool_))
 
 
-def at_once(seen: Observation, known: NDArray[np.bool_]) -> Correction:
-    """The same on a graph that holds the `known` contacts, (c,) in the order of `seen.assembly.relations()`.
+def at_once(observation: Observation, known: NDArray[np.bool_]) -> Correction:
+    """The same on a graph that holds the `known` contacts, (c,) in the order of `observation.assembly.relations()`.
 
     The status says whether those hold; the gaps are those of every contact ever made.
     """
-    if not seen.seen.all():
-        return refused_correction(seen)
-    system = equations(seen.assembly, seen.start, seen.goals)
-    before = system.gaps(seen.goals)
-    freed = candidates(seen.assembly, known & ~(before <= seen.gap_m), known)
-    found = solve_newton(system.among(known & system.containing(freed)), seen.goals, freed)
-    ended = solver_status(found, largest(system.gaps(found.goals)[known]), seen.gap_m)
+    if not observation.seen.all():
+        return refused_correction(observation)
+    system = equations(observation.assembly, observation.start, observation.goals)
+    before = system.gaps(observation.goals)
+    freed = candidates(observation.assembly, known & ~(before <= observation.gap_m), known)
+    found = solve_newton(system.among(known & system.containing(freed)), observation.goals, freed)
+    ended = solver_status(found, largest(system.gaps(found.goals)[known]), observation.gap_m)
     goals = found.goals
     if ended == "converged":
         for k in sorted(set(range(len(goals))).difference(freed)):
-            goals = solve_own_contacts(system, goals, k, seen.gap_m)
+            goals = solve_own_contacts(system, goals, k, observation.gap_m)
     return Correction(
         goals=goals,
         status=ended,
-        sentence=status_sentence(ended, seen.gap_m, "every contact" if known.all() else "every contact that was kept"),
+        sentence=status_sentence(
+            ended, observation.gap_m, "every contact" if known.all() else "every contact that was kept"
+        ),
         freed=freed,
         gap_before_m=largest(before),
         gap_after_m=largest(system.gaps(goals)),

@@ -34,7 +34,7 @@ _MEAN, _SQUARE, _TINY = 0.9, 0.999, 1e-8
 """Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
 
 
-def penalty(seen: Observation, *, contact_m: float = CONTACT_M, length: float = LENGTH) -> Correction:
+def penalty(observation: Observation, *, contact_m: float = CONTACT_M, length: float = LENGTH) -> Correction:
     """The goals at which the descent ends.
 
     Args:
@@ -47,7 +47,11 @@ def penalty(seen: Observation, *, contact_m: float = CONTACT_M, length: float = 
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(seen, lambda seen: _descended(seen, contact_m, length), f"the descent ended after {STEPS} steps")
+    return as_it_ends(
+        observation,
+        lambda observation: _descended(observation, contact_m, length),
+        f"the descent ended after {STEPS} steps",
+    )
 
 
 @final
@@ -71,15 +75,15 @@ class Loss:
         return value, gradient
 
 
-def loss(seen: Observation, contact_m: float = CONTACT_M) -> Loss:
+def loss(observation: Observation, contact_m: float = CONTACT_M) -> Loss:
     """The loss of an observation."""
-    system = equations(seen.assembly, seen.start, seen.goals)
-    return Loss(whitened(seen), system, meeting(seen.assembly, system), contact_m)
+    system = equations(observation.assembly, observation.start, observation.goals)
+    return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
 
 
-def _descended(seen: Observation, contact_m: float, length: float) -> Array:
-    down = loss(seen, contact_m)
-    z = np.zeros(6 * len(seen.goals))
+def _descended(observation: Observation, contact_m: float, length: float) -> Array:
+    down = loss(observation, contact_m)
+    z = np.zeros(6 * len(observation.goals))
     m, v = np.zeros_like(z), np.zeros_like(z)
     for t in range(1, STEPS + 1):
         _, g = down(z)

@@ -19,7 +19,7 @@ from apo_bench.geometry.arrays import Array
 _TURNS = 30
 
 
-def snap(seen: Observation) -> Correction:
+def snap(observation: Observation) -> Correction:
     """Each goal onto the contacts of its own operation, by the most likely twist, in the order of the operations.
 
     Returns:
@@ -28,12 +28,12 @@ def snap(seen: Observation) -> Correction:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return as_it_ends(seen, _snapped, "every part was put onto its newest support")
+    return as_it_ends(observation, _snapped, "every part was put onto its newest support")
 
 
-def _snapped(seen: Observation) -> Array:
-    goals, space = np.array(seen.goals), whitened(seen)
-    system = equations(seen.assembly, seen.start, goals)
+def _snapped(observation: Observation) -> Array:
+    goals, space = np.array(observation.goals), whitened(observation)
+    system = equations(observation.assembly, observation.start, goals)
     for k in range(len(goals)):
         goals[k] = _put(system.among(system.made == k), goals, k, space)
     return goals

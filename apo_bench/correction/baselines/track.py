@@ -26,14 +26,14 @@ _Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
 """Candidates, most recent first -> the sets of motion parameters to try, in order."""
 
 
-def paper_track(seen: Observation) -> Correction:
+def paper_track(observation: Observation) -> Correction:
     """Follow the human step by step, freeing the 1, 2, .. most recent candidates.
 
     Returns:
         As `paper`; `freed` is what successful trials changed, `tried` every trial, rank and trace those of the last
         one. If no set of candidates suffices, the steps before keep their corrected goals and there is no schedule.
     """
-    return track_operations(seen, nested)
+    return track_operations(observation, nested)
 
 
 def nested(chosen: tuple[int, ...]) -> Iterable[tuple[int, ...]]:
@@ -55,21 +55,21 @@ class TrackedOperation:
     trace: tuple[Iterate, ...] = ()
 
 
-def track_operations(seen: Observation, sets: _Sets) -> Correction:
+def track_operations(observation: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
-    if not seen.seen.all():
-        return refused_correction(seen)
-    now, schedule, targets = np.array(seen.goals), list[Step](), list[Array]()
+    if not observation.seen.all():
+        return refused_correction(observation)
+    now, schedule, targets = np.array(observation.goals), list[Step](), list[Array]()
     steps = list[TrackedOperation]()
     for n in range(len(now)):
-        steps.append(_next(seen, now[: n + 1], sets))
+        steps.append(_next(observation, now[: n + 1], sets))
         if steps[-1].status != "converged":
-            return _report(seen, now, steps)
+            return _report(observation, now, steps)
         back = reached_back(n, steps[-1].freed)
         targets += [now[step.operation] if step.undo else steps[-1].goals[step.operation] for step in back]
         schedule += back
         now = np.concatenate([steps[-1].goals, now[n + 1 :]])
-    return _report(seen, now, steps, tuple(schedule), np.array(targets) if targets else None)
+    return _report(observation, now, steps, tuple(schedule), np.array(targets) if targets else None)
 
 
 def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
@@ -78,22 +78,22 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
     return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
 
 
-def _next(seen: Observation, goals: Array, sets: _Sets) -> TrackedOperation:
+def _next(observation: Observation, goals: Array, sets: _Sets) -> TrackedOperation:
     """The last of these goals has just been observed; the others are in force."""
     n = len(goals) - 1
-    system = equations(seen.assembly.first(n + 1), seen.start, goals)
-    failing = ~(system.gaps(goals) <= seen.gap_m)
+    system = equations(observation.assembly.first(n + 1), observation.start, goals)
+    failing = ~(system.gaps(goals) <= observation.gap_m)
     if not failing[system.made == n].any():
-        return TrackedOperation(solve_own_contacts(system, goals, n, seen.gap_m), "converged")
-    chosen, tried, last = candidates(seen.assembly.first(n + 1), failing), list[Try](), None
+        return TrackedOperation(solve_own_contacts(system, goals, n, observation.gap_m), "converged")
+    chosen, tried, last = candidates(observation.assembly.first(n + 1), failing), list[Try](), None
     for free in sets(chosen):
         last, left_m = _trial(system, goals, free, failing)
         if not last.finite:
             break
         tried.append(Try(n, free, left_m))
-        if left_m <= seen.gap_m:
+        if left_m <= observation.gap_m:
             return TrackedOperation(last.goals, "converged", free, tuple(tried), last.rank, last.trace)
-    ended = "inconsistent" if last is None else solver_status(last, np.inf, seen.gap_m)
+    ended = "inconsistent" if last is None else solver_status(last, np.inf, observation.gap_m)
     return TrackedOperation(goals, ended, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
 
 
@@ -107,21 +107,21 @@ def _trial(
 
 
 def _report(
-    seen: Observation,
+    observation: Observation,
     goals: Array,
     steps: list[TrackedOperation],
     schedule: tuple[Step, ...] = (),
     targets: Array | None = None,
 ) -> Correction:
-    system = equations(seen.assembly, seen.start, seen.goals)
+    system = equations(observation.assembly, observation.start, observation.goals)
     ended = steps[-1].status if steps else "converged"
     last = next((step for step in reversed(steps) if step.trace), TrackedOperation(goals, ended))
     return Correction(
         goals=goals,
         status=ended,
-        sentence=status_sentence(ended, seen.gap_m),
+        sentence=status_sentence(ended, observation.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
-        gap_before_m=largest(system.gaps(seen.goals)),
+        gap_before_m=largest(system.gaps(observation.goals)),
         gap_after_m=largest(system.gaps(goals)),
         rank=last.rank,
         trace=last.trace,

@@ -13,9 +13,9 @@ from apo_bench.correction.own_code.message import Arrays, GarbledMessage, Messag
 from apo_bench.geometry.solid import Box, Face, Solid
 
 
-def observation_message(seen: Observation) -> Message:
+def observation_message(observation: Observation) -> Message:
     """All that a corrector may use."""
-    assembly, parts = seen.assembly, list(seen.start)
+    assembly, parts = observation.assembly, list(observation.start)
     form = {
         "solids": [[part, _solid_form(solid)] for part, solid in assembly.solids.items()],
         "operations": [
@@ -24,11 +24,16 @@ def observation_message(seen: Observation) -> Message:
         "fixed": sorted(assembly.fixed),
         "gaps": [[_ends(contact), gap] for contact, gap in assembly.gaps.items()],
         "parts": parts,
-        "gap_m": float(seen.gap_m),
-        "play_m": float(seen.play_m),
+        "gap_m": float(observation.gap_m),
+        "play_m": float(observation.play_m),
     }
-    start = np.array([seen.start[part] for part in parts]).reshape(-1, 4, 4)
-    return form, {"start": start, "goals": seen.goals, "covariance": seen.covariance, "seen": seen.seen}
+    start = np.array([observation.start[part] for part in parts]).reshape(-1, 4, 4)
+    return form, {
+        "start": start,
+        "goals": observation.goals,
+        "covariance": observation.covariance,
+        "seen": observation.seen,
+    }
 
 
 def parse_observation(form: MessageForm, arrays: Arrays) -> Observation:
@@ -47,28 +52,28 @@ def parse_observation(form: MessageForm, arrays: Arrays) -> Observation:
     return Observation(assembly, start, **kept, gap_m=form["gap_m"], play_m=form["play_m"])
 
 
-def correction_message(made: Correction) -> Message:
+def correction_message(correction: Correction) -> Message:
     """What a corrector returned.
 
     Raises:
         TypeError, ValueError: It holds what is no number, or no text, where one is needed.
     """
     form = {
-        "status": made.status,
-        "sentence": made.sentence,
-        "freed": [int(k) for k in _several(made.freed)],
-        "gaps": [float(made.gap_before_m), float(made.gap_after_m)],
-        "rank": int(made.rank),
-        "trace": [[float(gap), int(rank), float(step)] for gap, rank, step in made.trace],
+        "status": correction.status,
+        "sentence": correction.sentence,
+        "freed": [int(k) for k in _several(correction.freed)],
+        "gaps": [float(correction.gap_before_m), float(correction.gap_after_m)],
+        "rank": int(correction.rank),
+        "trace": [[float(gap), int(rank), float(step)] for gap, rank, step in correction.trace],
         "tried": [
-            [int(one.step), [int(k) for k in _several(one.free)], float(one.gap_m)] for one in _tries(made.tried)
+            [int(one.step), [int(k) for k in _several(one.free)], float(one.gap_m)] for one in _tries(correction.tried)
         ],
-        "schedule": [[int(k), bool(undo)] for k, undo in made.schedule],
-        "test": _test_form(made.test),
-        "test_after": _test_form(made.test_after),
-        "dropped": [str(name) for name in _several(made.dropped)],
+        "schedule": [[int(k), bool(undo)] for k, undo in correction.schedule],
+        "test": _test_form(correction.test),
+        "test_after": _test_form(correction.test_after),
+        "dropped": [str(name) for name in _several(correction.dropped)],
     }
-    possible = {"goals": made.goals, "targets": made.targets, "covariance": made.covariance}
+    possible = {"goals": correction.goals, "targets": correction.targets, "covariance": correction.covariance}
     return form, {name: array for name, array in possible.items() if array is not None}
 
 

@@ -87,14 +87,14 @@ class OwnCorrectors:
         self.close()
 
 
-def correct_named(seen: Observation, corrector: Any) -> Correction:
+def correct_named(observation: Observation, corrector: Any) -> Correction:
     """As `correct`, but what is named as `module:name` runs in a process of its own.
 
     Raises:
         InputError: As `correct`.
     """
     with OwnCorrectors() as own:
-        return correct(seen, own.find(corrector))
+        return correct(observation, own.find(corrector))
 
 
 def check_correctors(methods: Iterable[str], limit_s: float = CORRECTOR_LIMIT_S) -> set[str]:
@@ -118,14 +118,14 @@ class _OwnCorrector:
         self.__name__, self.__module__ = name, name.partition(":")[0]
         self._server, self._limit_s = server, limit_s
 
-    def __call__(self, seen: Observation) -> Correction:
+    def __call__(self, observation: Observation) -> Correction:
         """Ask it.
 
         Raises:
             CorrectorMisbehaved: It raised an error or returned what it must not; or, as `CorrectorLost`, it ended its
                 process or took too long.
         """
-        said, numbers = self._asked("correct", *observation_message(seen), self._limit_s)
+        said, numbers = self._asked("correct", *observation_message(observation), self._limit_s)
         if "raised" in said:
             raise CorrectorMisbehaved(_line(said["raised"]))
         try:

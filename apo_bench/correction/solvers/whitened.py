@@ -38,13 +38,13 @@ class Whitened:
         return np.asarray((self.factor @ z.reshape(-1, 6, 1))[..., 0])
 
 
-def whitened(seen: Observation) -> Whitened:
+def whitened(observation: Observation) -> Whitened:
     """The coordinates of an observation.
 
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return Whitened(seen.goals, scales(seen.covariance))
+    return Whitened(observation.goals, scales(observation.covariance))
 
 
 def scales(covariance: Array) -> Array:

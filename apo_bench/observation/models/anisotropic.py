@@ -54,18 +54,18 @@ class Anisotropic:
         states="R^t S S R with R as seen, which is exact",
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sight, unit = line_of_sight(), rng.standard_normal((len(assembly), 6))
         place = self.level.mm * 1e-3 * _stretch(sight, ALONG, ACROSS)
         turn = np.radians(self.level.deg) * _stretch(sight, IN_IMAGE, OUT_OF_IMAGE)
         rotation = np.zeros((len(assembly), 6))
-        rotation[:, 3:] = np.einsum("nji,nj->ni", shown.goals[:, :3, :3], unit[:, 3:] @ turn)
-        R = (shown.goals @ pose.exp(rotation))[:, :3, :3]
+        rotation[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], unit[:, 3:] @ turn)
+        R = (demonstration.goals @ pose.exp(rotation))[:, :3, :3]
         xi = np.concatenate([np.einsum("nji,nj->ni", R, unit[:, :3] @ place), rotation[:, 3:]], axis=1)
         covariance = np.zeros((len(assembly), 6, 6))
         covariance[:, :3, :3] = _in_body(R, place @ place)
         covariance[:, 3:, 3:] = _in_body(R, turn @ turn)
-        return observe_displaced(assembly, shown, xi, covariance)
+        return observe_displaced(assembly, demonstration, xi, covariance)
 
 
 def line_of_sight() -> Array:

@@ -34,9 +34,9 @@ class Bias:
         "observation has no place for it",
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         parts = sorted(assembly.solids)
         unit = dict(zip(parts, rng.standard_normal((len(parts), 6)), strict=True))
         xi = np.array([unit[operation.main] for operation in assembly.operations]).reshape(-1, 6) * sigma
-        return observe_displaced(assembly, shown, xi, np.diag(sigma**2))
+        return observe_displaced(assembly, demonstration, xi, np.diag(sigma**2))

@@ -40,13 +40,13 @@ class BiasView:
         "errors of all operations are one is not said, since an observation has no place for it",
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit = rng.standard_normal(6)
         if not len(assembly):
-            return observe_displaced(assembly, shown, np.zeros((0, 6)), np.diag(sigma**2))
-        view = pose.adjoint(pose.inverse(shown.goals) @ self._middle(shown.goals))
-        return observe_displaced(assembly, shown, view @ (unit * sigma), self._covariance(view, sigma))
+            return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
+        view = pose.adjoint(pose.inverse(demonstration.goals) @ self._middle(demonstration.goals))
+        return observe_displaced(assembly, demonstration, view @ (unit * sigma), self._covariance(view, sigma))
 
     def _middle(self, goals: Array) -> Array:
         P = self.camera.T_world_camera.copy()

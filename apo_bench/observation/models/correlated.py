@@ -46,14 +46,14 @@ class Correlated:
         if not 0.0 <= self.correlation <= 1.0:
             raise InputError(f"a correlation of {self.correlation:g} was given; give a number from 0 to 1.")
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit = rng.standard_normal((len(assembly), 6))
         for k in range(1, len(unit)):
             unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]
         place, turn = np.split((unit * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T, 2, axis=1)
         xi = np.zeros((len(assembly), 6))
-        xi[:, 3:] = np.einsum("nji,nj->ni", shown.goals[:, :3, :3], turn[:, 0])
-        R_seen = (shown.goals @ pose.exp(xi))[:, :3, :3]
+        xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], turn[:, 0])
+        R_seen = (demonstration.goals @ pose.exp(xi))[:, :3, :3]
         xi[:, :3] = np.einsum("nji,nj->ni", R_seen, place[:, 0])
-        return observe_displaced(assembly, shown, xi, np.diag(sigma**2))
+        return observe_displaced(assembly, demonstration, xi, np.diag(sigma**2))

@@ -80,14 +80,16 @@ class Empirical:
     def __post_init__(self) -> None:
         check_measured_level(self.level, self.sample.covariance)
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         n, sample = len(assembly), self.sample
         chance, sign = rng.random((n, 3)), rng.choice([-1.0, 1.0], (n, 1))
         errors = _picked(sample.inliers, chance[:, 0])
         if len(sample.outliers):
             errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
         missed = chance[:, 2] < sample.missed
-        return observe_in_ray_frames(self.camera, self.level, shown, assembly, sign * errors, sample.covariance, missed)
+        return observe_in_ray_frames(
+            self.camera, self.level, demonstration, assembly, sign * errors, sample.covariance, missed
+        )
 
 
 def empirical_noise(path: Path, level: Level) -> Empirical:

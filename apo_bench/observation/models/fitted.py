@@ -86,14 +86,14 @@ class Fitted:
         (across, along), (out, about) = self.measured.shift_mm.variances, self.measured.turn_deg.variances
         return np.diag(np.array([across, across, along, out, out, about]) * LEVEL_UNITS**2)
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         n, measured = len(assembly), self.measured
         errors = np.concatenate([measured.shift_mm.draw(n, rng), measured.turn_deg.draw(n, rng)], axis=1)
         gross, chance = _gross(measured, n, rng), rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
         return observe_in_ray_frames(
-            self.camera, self.level, shown, assembly, errors * LEVEL_UNITS, self.covariance, missed
+            self.camera, self.level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
 
 
@@ -115,7 +115,7 @@ def check_measured_level(level: Level, covariance: Array) -> None:
 def observe_in_ray_frames(
     camera: Camera,
     level: Level,
-    shown: Demonstration,
+    demonstration: Demonstration,
     assembly: Assembly,
     errors: Array,
     covariance: Array,
@@ -129,12 +129,14 @@ def observe_in_ray_frames(
         missed: (n,), what nothing is found for.
     """
     scale = np.repeat([level.mm, level.deg], 3)
-    xi = camera.twists(shown.goals, errors * scale)
-    found = observe_displaced(assembly, shown, xi, np.zeros((6, 6)))
-    made = observe_displaced(assembly, shown, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale)))
+    xi = camera.twists(demonstration.goals, errors * scale)
+    found = observe_displaced(assembly, demonstration, xi, np.zeros((6, 6)))
+    made = observe_displaced(
+        assembly, demonstration, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale))
+    )
     missed = missed & (max(level) > 0.0)
     goals, stated = made.goals.copy(), made.covariance.copy()
-    goals[missed] = last_seen(assembly, shown.start, goals, ~missed)[missed]
+    goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
     stated[missed] = np.diag(UNSEEN_DEVIATION**2)
     return replace(made, goals=goals, covariance=stated, seen=~missed)
 

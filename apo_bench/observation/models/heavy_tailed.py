@@ -45,8 +45,8 @@ class HeavyTailed:
                 "which it has no covariance."
             )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit = rng.standard_normal((len(assembly), 6))
         scale = np.sqrt((self.freedom - 2.0) / rng.chisquare(self.freedom, (len(assembly), 1)))
-        return observe_displaced(assembly, shown, unit * scale * sigma, np.diag(sigma**2))
+        return observe_displaced(assembly, demonstration, unit * scale * sigma, np.diag(sigma**2))

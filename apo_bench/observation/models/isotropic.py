@@ -38,22 +38,24 @@ class Isotropic:
         states="L^2 in every direction, which is exact",
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         xi = rng.standard_normal((len(assembly), 6)) * sigma
-        return observe_displaced(assembly, shown, xi, np.diag(sigma**2))
+        return observe_displaced(assembly, demonstration, xi, np.diag(sigma**2))
 
 
-def observe_displaced(assembly: Assembly, shown: Demonstration, xi: Array, covariance: Array) -> Observation:
+def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Array, covariance: Array) -> Observation:
     """Every goal seen at `T exp(xi)`; it states the covariance of xi, what carelessness adds, and at least the floor.
 
     Args:
         xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
-    goals = np.where(np.any(xi, axis=1, keepdims=True)[..., None], shown.goals @ pose.exp(xi), shown.goals)
-    stated = floored(covariance + shown.careless)
-    return Observation(assembly, shown.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+    goals = np.where(
+        np.any(xi, axis=1, keepdims=True)[..., None], demonstration.goals @ pose.exp(xi), demonstration.goals
+    )
+    stated = floored(covariance + demonstration.careless)
+    return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
 
 
 def floored(covariance: Array) -> Array:

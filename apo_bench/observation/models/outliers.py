@@ -73,14 +73,14 @@ class Outliers:
         """Covariance of the errors of all that is seen, over the one that is stated."""
         return 1.0 + self.outliers * (self.times**2 - 1.0)
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
         unit, chance = rng.standard_normal((len(assembly), 6)), rng.random((len(assembly), 2))
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
-        made = observe_displaced(assembly, shown, unit * times * sigma, np.diag(sigma**2))
+        made = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
         goals, covariance = made.goals.copy(), made.covariance.copy()
-        goals[missed] = last_seen(assembly, shown.start, goals, ~missed)[missed]
+        goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         return replace(made, goals=goals, covariance=covariance, seen=~missed)
 

@@ -39,13 +39,15 @@ class PerPart:
         states="(L f)^2 in every direction, with the factor that was drawn: exact",
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         unit = rng.standard_normal((len(assembly), 6))
         factor = factors(assembly.solids, rng)
         sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3) * np.array(
             [[factor[operation.main]] for operation in assembly.operations]
         ).reshape(-1, 1)
-        return observe_displaced(assembly, shown, unit * sigma, sigma[:, :, None] * np.eye(6) * sigma[:, None, :])
+        return observe_displaced(
+            assembly, demonstration, unit * sigma, sigma[:, :, None] * np.eye(6) * sigma[:, None, :]
+        )
 
 
 def factors(parts: Iterable[str], rng: np.random.Generator) -> Mapping[str, float]:

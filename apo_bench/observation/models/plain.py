@@ -44,11 +44,11 @@ class Plain:
     def __name__(self) -> str:
         return str(getattr(self.function, "__name__", type(self.function).__name__))
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        goals = np.array(self.function(shown.goals.copy(), rng), dtype=np.float64)
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        goals = np.array(self.function(demonstration.goals.copy(), rng), dtype=np.float64)
         sigma = np.repeat([self.deviation_mm * 1e-3, np.radians(self.deviation_deg)], 3)
-        stated = floored(np.diag(sigma**2) + shown.careless)
-        return Observation(assembly, shown.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+        stated = floored(np.diag(sigma**2) + demonstration.careless)
+        return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
 
 
 def declared(function: Any, name: str) -> Plain:

@@ -52,9 +52,9 @@ class Sighted:
         "from the one drawn by the angle between the two rays, a thousandth at 1 mm",
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         mm, rad = self.level.mm * 1e-3, np.radians(self.level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
-        xi = self.camera.twists(shown.goals, rng.standard_normal((len(assembly), 6)) * sigma)
-        seen = observe_displaced(assembly, shown, xi, np.zeros((6, 6)))
-        return observe_displaced(assembly, shown, xi, self.camera.covariance(seen.goals, np.diag(sigma**2)))
+        xi = self.camera.twists(demonstration.goals, rng.standard_normal((len(assembly), 6)) * sigma)
+        seen = observe_displaced(assembly, demonstration, xi, np.zeros((6, 6)))
+        return observe_displaced(assembly, demonstration, xi, self.camera.covariance(seen.goals, np.diag(sigma**2)))

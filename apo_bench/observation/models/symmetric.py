@@ -58,7 +58,7 @@ class Symmetric:
         ),
     )
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         unit = rng.standard_normal((len(assembly), 6))
         xi, covariance = np.zeros((len(assembly), 6)), np.zeros((len(assembly), 6, 6))
         groups = {part: symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
@@ -70,7 +70,7 @@ class Symmetric:
                 off = pose.exp(about @ (unit[k] * sigma))[None]
                 xi[k] = pose.log(off @ nearest_symmetry(group, off))[0]
             covariance[k] = about @ np.diag(stated**2) @ about.T
-        return observe_displaced(assembly, shown, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
+        return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 
     def _deviations(self, fold: Array) -> tuple[Array, Array]:
         """Those that are drawn and those that are stated, (6,) each, about the centre of volume, [m, rad]."""
@@ -89,8 +89,8 @@ class AnyTurn:
 
     level: Level
 
-    def __call__(self, assembly: Assembly, shown: Demonstration, rng: np.random.Generator) -> Observation:
-        seen = Symmetric(self.level)(assembly, shown, rng)
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        seen = Symmetric(self.level)(assembly, demonstration, rng)
         g = np.array([self._one(assembly.solids[o.main], rng) for o in assembly.operations]).reshape(-1, 4, 4)
         Ad = pose.adjoint(pose.inverse(g))
         C = Ad @ seen.covariance @ np.swapaxes(Ad, 1, 2)
