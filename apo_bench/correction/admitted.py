@@ -16,34 +16,38 @@ _ASYMMETRY = 1e-9
 """Of its largest entry, how far a covariance may be from symmetric."""
 
 
-def check_observations(seen: Sequence[Any]) -> None:
+def check_observations(observations: Sequence[Any]) -> None:
     """Refuse what no corrector can make sense of, before any is asked, so that the blame falls where it belongs.
 
     Args:
-        seen: One, or several of one assembly with the same start poses.
+        observations: One, or several of one assembly with the same start poses.
 
     Raises:
         InputError: One is no `Observation`, a pose is not rigid or absurdly far away, a part has no start, a covariance
             is not symmetric, or a length makes no sense.
     """
-    for i, one in enumerate(seen):
+    for i, one in enumerate(observations):
         if not isinstance(one, Observation):
             raise InputError(f"an Observation is needed, {kind(one)} was given; make one, or read it from a file.")
-        _check_lengths(one, _name(seen, i))
-    if not seen:
+        _check_lengths(one, _name(observations, i))
+    if not observations:
         return
-    first = seen[0]
+    first = observations[0]
     for part in first.assembly.solids:
         if part not in first.start:
-            raise InputError(f"{_name(seen, 0)} has no start of the part '{part}'; state where every part starts.")
+            raise InputError(
+                f"{_name(observations, 0)} has no start of the part '{part}'; state where every part starts."
+            )
     starts = np.array([first.start[part] for part in first.assembly.solids]).reshape(-1, 4, 4)
-    _check_poses(starts, lambda j: f"the start of '{list(first.assembly.solids)[j]}' in {_name(seen, 0)}")
-    _check_poses(np.concatenate([one.goals for one in seen]), lambda j: f"the goal of {_operation(seen, j)}")
-    C = np.concatenate([one.covariance for one in seen])
+    _check_poses(starts, lambda j: f"the start of '{list(first.assembly.solids)[j]}' in {_name(observations, 0)}")
+    _check_poses(
+        np.concatenate([one.goals for one in observations]), lambda j: f"the goal of {_operation(observations, j)}"
+    )
+    C = np.concatenate([one.covariance for one in observations])
     off, size = (np.abs(M).max(axis=(1, 2), initial=0.0) for M in (C - np.swapaxes(C, 1, 2), C))
     for j in map(int, np.flatnonzero(off > _ASYMMETRY * size)):
         raise InputError(
-            f"the covariance of {_operation(seen, j)} is not symmetric; entry (i, j) must equal entry (j, i)."
+            f"the covariance of {_operation(observations, j)} is not symmetric; entry (i, j) must equal entry (j, i)."
         )
 
 
@@ -67,11 +71,11 @@ def _check_poses(T: Array, name: Callable[[int], str]) -> None:
         )
 
 
-def _operation(seen: Sequence[Observation], j: int) -> str:
+def _operation(observations: Sequence[Observation], j: int) -> str:
     """Row j of all operations of all observations: `operation 2 in observation 3`."""
-    i, k = [(i, k) for i, one in enumerate(seen) for k in range(len(one.goals))][j]
-    return f"operation {k + 1} in {_name(seen, i)}"
+    i, k = [(i, k) for i, one in enumerate(observations) for k in range(len(one.goals))][j]
+    return f"operation {k + 1} in {_name(observations, i)}"
 
 
-def _name(seen: Sequence[Any], i: int) -> str:
-    return f"observation {i + 1}" if len(seen) > 1 else "the observation"
+def _name(observations: Sequence[Any], i: int) -> str:
+    return f"observation {i + 1}" if len(observations) > 1 else "the observation"

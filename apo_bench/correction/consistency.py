@@ -93,7 +93,7 @@ def p_value(chi_square: float, freedom: int) -> float:
 
 
 def correction_length(
-    system: CompactEquations, seen: Array, L: Array, found: NearestGoals, slack_m: Array
+    system: CompactEquations, observed: Array, L: Array, found: NearestGoals, slack_m: Array
 ) -> tuple[float, int, NearestGoals | None]:
     """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
 
@@ -111,7 +111,7 @@ def correction_length(
     if holds and not slack_m.any():
         return float(found.z @ found.z), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
-    relaxed = nearest_goals(system, seen, L, soft)
+    relaxed = nearest_goals(system, observed, L, soft)
     asked = soft > 0.0
     over = relaxed.e[asked] / soft[asked]
     return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed

@@ -74,13 +74,13 @@ class ContactCorrector:
             worst = asked.suspects(kept) if dropped else first.suspects
             if not worst:
                 break
-            dropped += (self._narrowed(asked, kept, worst[0]),)
+            dropped += (self._most_suspect(asked, kept, worst[0]),)
             kept = asked.without(dropped)
             found, tested = asked.solve(kept)
             tested = replace(tested, level=self.level)
         return self._report(asked, found, kept, tested, first, dropped)
 
-    def _narrowed(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
+    def _most_suspect(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
         """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
         single = asked.contact_suspects(kept, worst.relation)[0]
         return single.relation if single.p_value >= self.level else worst.relation
@@ -94,20 +94,22 @@ class ContactCorrector:
         first: Consistency,
         dropped: tuple[str, ...],
     ) -> Correction:
-        seen, known = asked.seen, freedom(found.Jt)
+        observation, known = asked.observation, freedom(found.Jt)
         directions = jacobian_rank(found.Jt) if known is None else known.rank
-        status = _status(found, asked.gap(found.goals, kept), seen.gap_m)
+        status = _status(found, asked.gap(found.goals, kept), observation.gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not tested.passes:
             status = "doubtful"
         of = "every contact" if kept.all() else f"every contact but those of {', '.join(dropped)}"
-        said = status_sentence(status, seen.gap_m, of) + ("" if self.doubt == "apply" else _doubts(first, dropped))
+        said = status_sentence(status, observation.gap_m, of) + (
+            "" if self.doubt == "apply" else _doubts(first, dropped)
+        )
         every = asked.without(())
         return Correction(
             goals=found.goals,
             status=status,
             sentence=said,
-            freed=asked.system.variables(len(seen.goals)),
-            gap_before_m=asked.gap(seen.goals, every),
+            freed=asked.system.variables(len(observation.goals)),
+            gap_before_m=asked.gap(observation.goals, every),
             gap_after_m=asked.gap(found.goals, every),
             rank=directions,
             trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),

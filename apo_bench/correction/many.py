@@ -24,39 +24,41 @@ BATCH = 64
 """Observations that are solved together: more would leave the cache of the processor."""
 
 
-def correct_many(seen: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
+def correct_many(observations: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
     """The same corrections as one after the other, to rounding, some times faster.
 
     Args:
-        seen: Observations of one and the same assembly with the same start poses and play.
+        observations: Observations of one and the same assembly with the same start poses and play.
 
     Raises:
         InputError: They are not, one makes no sense, or a covariance is not positive definite.
     """
-    if isinstance(seen, Observation) or not isinstance(seen, Sequence):
+    if isinstance(observations, Observation) or not isinstance(observations, Sequence):
         raise InputError("correct_many needs a list of observations; ask `correct` for one, or make a list of them.")
     if not isinstance(corrector, ContactCorrector):
         raise InputError(
             f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop')."
         )
-    if not seen:
+    if not observations:
         return ()
-    check_observations(seen)
-    for i, other in enumerate(seen, start=1):
-        if other.assembly is not seen[0].assembly or not _alike(other, seen[0]):
+    check_observations(observations)
+    for i, other in enumerate(observations, start=1):
+        if other.assembly is not observations[0].assembly or not _alike(other, observations[0]):
             raise InputError(
                 f"observation {i} is of another assembly, start or play than observation 1; "
                 "correct those together that share them."
             )
-    return tuple(made for i in range(0, len(seen), BATCH) for made in _chunk(seen[i : i + BATCH], corrector))
+    return tuple(
+        made for i in range(0, len(observations), BATCH) for made in _chunk(observations[i : i + BATCH], corrector)
+    )
 
 
-def _chunk(seen: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
-    goals, L = np.array([one.goals for one in seen]), np.array([scales(one.covariance) for one in seen])
-    plain = equations(seen[0].assembly, seen[0].start, seen[0].goals)
-    pattern, exact, _ = demanded(plain, seen[0].assembly, seen[0].play_m)
-    found = corrector.solver(compact_many(seen[0].assembly, pattern, goals).among(exact), goals, L)
-    return [corrector.given(one, _one(found, i)) for i, one in enumerate(seen)]
+def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
+    goals, L = np.array([one.goals for one in observations]), np.array([scales(one.covariance) for one in observations])
+    plain = equations(observations[0].assembly, observations[0].start, observations[0].goals)
+    pattern, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)
+    found = corrector.solver(compact_many(observations[0].assembly, pattern, goals).among(exact), goals, L)
+    return [corrector.given(one, _one(found, i)) for i, one in enumerate(observations)]
 
 
 def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> CompactEquations:

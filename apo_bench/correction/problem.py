@@ -35,14 +35,14 @@ Solver = Callable[[CompactEquations, Array, Array], NearestGoals]
 class Problem:
     """One observation with what is asked of its c contacts."""
 
-    seen: Observation
+    observation: Observation
     system: Equations
     """Of every contact, planes shifted to where they are asked to be."""
     compact: CompactEquations
     """The same, three per contact."""
     exact: NDArray[np.bool_]
     """(c,): contacts that are equations; the others are walls."""
-    walls: Inequalities
+    inequalities: Inequalities
     L: Array
     """(n, 6, 6)."""
     slack_m: Array
@@ -63,25 +63,25 @@ class Problem:
         """
         chosen = kept & self.exact
         part, slack_m = self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
-        found = self.solver(part, self.seen.goals, self.L) if found is None else found
-        chi_square, freedom, shared = correction_length(part, self.seen.goals, self.L, found, slack_m)
-        if found.finite and largest(self.system.gaps(found.goals)[chosen]) > self.seen.gap_m:
-            found = shared or nearest_goals(part, self.seen.goals, self.L, np.hypot(slack_m, SOFT_M))
+        found = self.solver(part, self.observation.goals, self.L) if found is None else found
+        chi_square, freedom, shared = correction_length(part, self.observation.goals, self.L, found, slack_m)
+        if found.finite and largest(self.system.gaps(found.goals)[chosen]) > self.observation.gap_m:
+            found = shared or nearest_goals(part, self.observation.goals, self.L, np.hypot(slack_m, SOFT_M))
         elif found.finite and kept[~self.exact].any():
-            walls = self.walls.among(kept[~self.exact])
-            held = nearest_between(part, walls, self.seen.goals, self.L, found)
-            touched = active_rank(found.Jt, walls, held)
+            inequalities = self.inequalities.among(kept[~self.exact])
+            held = nearest_between(part, inequalities, self.observation.goals, self.L, found)
+            touched = active_rank(found.Jt, inequalities, held)
             chi_square += float(held.z @ held.z - found.z @ found.z)
             found, freedom = held, freedom + touched
         return found, Consistency(chi_square, freedom, p_value(chi_square, freedom), LEVEL)
 
     def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
         """Relations whose contacts are `kept`, the most suspect first."""
-        return suspects(self.seen.assembly, kept, self._test, lambda: self._pull(kept))
+        return suspects(self.observation.assembly, kept, self._test, lambda: self._pull(kept))
 
     def contact_suspects(self, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
         """The contacts of one relation that are `kept`, the most suspect first."""
-        return contact_suspects(self.seen.assembly, kept, self._test, relation)
+        return contact_suspects(self.observation.assembly, kept, self._test, relation)
 
     def _test(self, kept: NDArray[np.bool_]) -> Consistency:
         return self.solve(kept)[1]
@@ -91,17 +91,17 @@ class Problem:
         chosen = kept & self.exact
         soft = np.hypot(self.slack_m, SOFT_M)[np.repeat(chosen, 3)]
         pull = np.zeros((len(self.compact), 3))
-        relaxed = nearest_goals(self.compact.among(chosen), self.seen.goals, self.L, soft)
+        relaxed = nearest_goals(self.compact.among(chosen), self.observation.goals, self.L, soft)
         pull[chosen] = (relaxed.e / soft).reshape(-1, 3)
         return np.asarray((pull * pull).sum(axis=1))
 
     def without(self, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
         """The contacts that are left without these relations or single contacts, (c,)."""
-        return self.seen.assembly.without(dropped)
+        return self.observation.assembly.without(dropped)
 
     def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
         """The largest |e| of what is kept, [m]; of walls, by how much they are overstepped."""
-        return violation(self.system, self.exact, self.walls, goals, kept)
+        return violation(self.system, self.exact, self.inequalities, goals, kept)
 
 
 def problem(observation: Observation, solver: Solver) -> Problem:
@@ -112,7 +112,9 @@ def problem(observation: Observation, solver: Solver) -> Problem:
     """
     L = scales(observation.covariance)
     plain = equations(observation.assembly, observation.start, observation.goals)
-    system, exact, walls = demanded(plain, observation.assembly, observation.play_m)
+    system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     every = compact_equations(system, len(observation.goals))
     fits = np.array([observation.assembly.is_fit(r.contact) for r in observation.assembly.relations()], dtype=np.bool_)
-    return Problem(observation, system, every, exact, walls, L, fit_deviation(fits, every, observation.play_m), solver)
+    return Problem(
+        observation, system, every, exact, inequalities, L, fit_deviation(fits, every, observation.play_m), solver
+    )

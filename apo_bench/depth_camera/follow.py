@@ -83,9 +83,11 @@ def follow_demonstration(
         if spell is None:
             break
         last, which, compared, moved = spell
-        seen = Appearance(finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m)
+        appearance = Appearance(
+            finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m
+        )
         group = None if which is None else _moved(assembly, shapes, believed, which)
-        shares, found = _recognised(expected, shapes, group, which, seen)
+        shares, found = _recognised(expected, shapes, group, which, appearance)
         if which is not None and found is not None:
             operation = assembly.operations[which]
             T = nearest_symmetric_pose(
@@ -156,14 +158,14 @@ def _posed(shape: Shape, T: Array) -> Shape:
 
 
 def _recognised(
-    expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, seen: Appearance
+    expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, appearance: Appearance
 ) -> tuple[Mapping[str, float], LocatedModel | None]:
     """How much each model explains, and where the one that moved is, if none explains more."""
-    assembly, points = expected.assembly, seen.points()
+    assembly, points = expected.assembly, appearance.points()
     shares: dict[str, float] = {}
     found = None
     if which is not None and group is not None:
-        found = locate(group, seen, points)
+        found = locate(group, appearance, points)
         shares["+".join(assembly.operations[which].moves)] = found.explained if found else 0.0
     models: dict[str, Model] = {}
     known = [] if group is None else [group.shape]
@@ -171,7 +173,7 @@ def _recognised(
         if part not in assembly.fixed and not any(_alike(shapes[part], shape) for shape in known):
             models[part] = Model(shapes[part], symmetries(solid))
             known.append(shapes[part])
-    shares |= model_shares(models, seen, points)
+    shares |= model_shares(models, appearance, points)
     if found is not None and found.explained < max(shares.values()) - ALIKE:
         found = None
     return shares, found

@@ -95,7 +95,7 @@ class LocatedModel:
     """0 to 1."""
 
 
-def locate(model: Model, seen: Appearance, points: Points) -> LocatedModel | None:
+def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel | None:
     """Fit a model to what appeared; None if there are too few points, or they are not explained by it.
 
     A main part with what it carries is found as one rigid thing. As a carried part may have been shifted in the hand,
@@ -103,53 +103,53 @@ def locate(model: Model, seen: Appearance, points: Points) -> LocatedModel | Non
     """
     if len(points) < 6:
         return None
-    best, _ = _best(model, seen, points)
-    T, C = _fine(model.shape, seen, points.thinned(_FINE), best)
-    share = _share(model, seen, T)
+    best, _ = _best(model, appearance, points)
+    T, C = _fine(model.shape, appearance, points.thinned(_FINE), best)
+    share = _share(model, appearance, T)
     if share < _LEAST_EXPLAINED:
         return None
     if model.main is not None:
         main, rest = (Shape(*(a[part] for a in model.shape)) for part in (slice(model.main), slice(model.main, None)))
         local = (points.at - T[:3, 3]) @ T[:3, :3]
         d = np.abs(signed_distance(main, local)[0])
-        own = points.only((d < 2.0 * seen.width_m) & (d < np.abs(signed_distance(rest, local)[0])))
+        own = points.only((d < 2.0 * appearance.width_m) & (d < np.abs(signed_distance(rest, local)[0])))
         if len(own) >= 6:
-            alone = _fine(main, seen, own.thinned(_FINE), T)
+            alone = _fine(main, appearance, own.thinned(_FINE), T)
             if (np.sqrt(np.diag(alone[1])) < _WELL_SEEN).all():
                 T, C = alone
     return LocatedModel(T, C, share)
 
 
-def model_shares(models: Mapping[str, Model], seen: Appearance, points: Points) -> Mapping[str, float]:
+def model_shares(models: Mapping[str, Model], appearance: Appearance, points: Points) -> Mapping[str, float]:
     """How much of what appeared each model explains where it fits best, 0 to 1."""
     if len(points) < 6:
         return dict.fromkeys(models, 0.0)
-    return {name: _best(model, seen, points)[1] for name, model in models.items()}
+    return {name: _best(model, appearance, points)[1] for name, model in models.items()}
 
 
-def _fine(shape: Shape, seen: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
+def _fine(shape: Shape, appearance: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
     """The last fit, from a good start, and its covariance."""
-    T = refine(shape, points, T[None], seen.width_m, 20).T[0]
-    return T, covariance(shape, points, T, seen.width_m, seen.noise_m, seen.bias_m)
+    T = refine(shape, points, T[None], appearance.width_m, 20).T[0]
+    return T, covariance(shape, points, T, appearance.width_m, appearance.noise_m, appearance.bias_m)
 
 
-def _coarse(model: Model, seen: Appearance, points: Points) -> Fits:
+def _coarse(model: Model, appearance: Appearance, points: Points) -> Fits:
     """The best few of the fits from all starts."""
     begun = starts(model.shape, points.at, model.same)
-    first = refine(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * seen.width_m), 10)
+    first = refine(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * appearance.width_m), 10)
     best = first.T[np.argsort(first.cost, kind="stable")[:_BEST]]
     middle = points.thinned(_MIDDLE)
-    nearer = refine(model.shape, middle, best, np.sqrt(seen.width_m * max(_WIDE_M, 3.0 * seen.width_m)), 8)
-    return refine(model.shape, middle, nearer.T, seen.width_m, 8)
+    nearer = refine(model.shape, middle, best, np.sqrt(appearance.width_m * max(_WIDE_M, 3.0 * appearance.width_m)), 8)
+    return refine(model.shape, middle, nearer.T, appearance.width_m, 8)
 
 
-def _best(model: Model, seen: Appearance, points: Points) -> tuple[Array, float]:
+def _best(model: Model, appearance: Appearance, points: Points) -> tuple[Array, float]:
     """The pose (4, 4) that explains most, and how much, judged together with how close it is."""
-    fits = _coarse(model, seen, points)
-    shares = np.array([_share(model, seen, T) for T in fits.T])
+    fits = _coarse(model, appearance, points)
+    shares = np.array([_share(model, appearance, T) for T in fits.T])
     best = int(np.argmax(shares - fits.cost))
     return fits.T[best], float(shares[best])
 
 
-def _share(model: Model, seen: Appearance, T: Array) -> float:
-    return share_explained(model.shape, T, seen.views, seen.smooth, seen.masks, seen.noise_m)
+def _share(model: Model, appearance: Appearance, T: Array) -> float:
+    return share_explained(model.shape, T, appearance.views, appearance.smooth, appearance.masks, appearance.noise_m)

@@ -25,12 +25,12 @@ _AROUND = 20
 _LARGEST_MM, _RESIDUAL_MM = 60.0, 5.0
 
 
-def draw_eye(seen: SensorRun, out: Path, view: int = 0) -> None:
+def draw_eye(run: SensorRun, out: Path, view: int = 0) -> None:
     """Draw every operation that was noticed, in one view of the range finder."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    events, assembly = seen.events, seen.shown.demonstration.assembly
+    events, assembly = run.events, run.shown.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
@@ -41,7 +41,7 @@ def draw_eye(seen: SensorRun, out: Path, view: int = 0) -> None:
         axes.set_yticks([])
     for row, event in zip(rows, events, strict=False):
         row[0].set_ylabel(_label(assembly, event), fontsize=9)
-        _draw_row(row, seen.watched, seen.images, event, view)
+        _draw_row(row, run.watched, run.images, event, view)
     for axes in rows[:, 1:].ravel():
         _crop(axes, events, view)
     try:
@@ -79,9 +79,9 @@ def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], e
     row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
     if event.found is not None and event.shape is not None:
         expected = _expected(watched.finder.views[view], event)
-        seen = regions.appeared & (np.abs(after - expected) < 0.02)
+        run = regions.appeared & (np.abs(after - expected) < 0.02)
         drawn = row[4].imshow(
-            np.where(seen, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-_RESIDUAL_MM, vmax=_RESIDUAL_MM
+            np.where(run, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-_RESIDUAL_MM, vmax=_RESIDUAL_MM
         )
         row[4].contour(np.isfinite(expected), levels=[0.5], colors=_OUTLINE, linewidths=1.2)
         bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)

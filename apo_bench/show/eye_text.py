@@ -13,32 +13,32 @@ from apo_bench.show.eye_one import SensorRun
 _FORM = "apo-bench/eye/1"
 
 
-def eye_form(seen: SensorRun, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
+def eye_form(run: SensorRun, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
     """Everything that `apo-bench eye` says, operations from 1; the error is that of the eye, not the human's."""
-    of = {event.operation: event for event in seen.events if event.operation is not None}
+    of = {event.operation: event for event in run.events if event.operation is not None}
     return {
         "schema": _FORM,
-        "scenario": seen.name,
+        "scenario": run.name,
         "level_mm": level_mm,
         "seed": seed,
         "careless": careless,
-        "firings_s": [round(t, 3) for t in seen.watched.times_s],
+        "firings_s": [round(t, 3) for t in run.watched.times_s],
         "operations": [
-            {"operation": k + 1, "moves": list(operation.moves)} | _one(of.get(k), seen, k)
-            for k, operation in enumerate(seen.shown.demonstration.assembly.operations)
+            {"operation": k + 1, "moves": list(operation.moves)} | _one(of.get(k), run, k)
+            for k, operation in enumerate(run.shown.demonstration.assembly.operations)
         ],
     }
 
 
-def _one(event: Event | None, seen: SensorRun, k: int) -> dict[str, Any]:
+def _one(event: Event | None, run: SensorRun, k: int) -> dict[str, Any]:
     if event is None or event.found is None:
         return {"found": False}
     deviation = np.sqrt(np.diag(event.found.covariance))
-    error = pose.log(pose.inverse(event.found.T) @ seen.shown.demonstration.goals[k])
+    error = pose.log(pose.inverse(event.found.T) @ run.shown.demonstration.goals[k])
     packed = pose.pack(event.found.T)
     return {
         "found": True,
-        "time_s": round(seen.watched.times_s[event.last], 3),
+        "time_s": round(run.watched.times_s[event.last], 3),
         "explained": {name: round(share, 3) for name, share in event.explained.items()},
         "pose": [*(1e3 * packed[:3]).tolist(), *packed[3:].tolist()],
         "deviation_mm": (1e3 * deviation[:3]).tolist(),

@@ -66,7 +66,7 @@ class Worker:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
         """
         demonstrations: dict[tuple[float, str], Recording] = {}
-        branches = ReplayCache()
+        cache = ReplayCache()
         for spec in unit.trials:
             if stopped():
                 return
@@ -80,7 +80,7 @@ class Worker:
             if key not in demonstrations:
                 demonstrations[key] = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
             shown = time.perf_counter()
-            row = row_of(spec, scene, demonstrations[key], content, method=method, branches=branches)
+            row = row_of(spec, scene, demonstrations[key], content, method=method, cache=cache)
             ended = time.perf_counter()
             yield "row", row, timing(row, compile_s, shown - start, ended - shown, {"worker": self._number})
 

@@ -114,7 +114,7 @@ def replay_and_judge(
     reference: Array,
     watch: Any = None,
     fidelity: str = "full",
-    branches: ReplayCache | None = None,
+    cache: ReplayCache | None = None,
     searches: bool = False,
     most_s: float = math.inf,
 ) -> Attempt:
@@ -126,7 +126,7 @@ def replay_and_judge(
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time that the replay may take.
     """
-    result = replay(plan, scene, watch, fidelity=fidelity, branches=branches, searches=searches, most_s=most_s)
+    result = replay(plan, scene, watch, fidelity=fidelity, cache=cache, searches=searches, most_s=most_s)
     return Attempt(result, judge(scene.scenario.assembly, result.reached, reference, scene.criteria))
 
 

@@ -53,7 +53,7 @@ def run_trial(
     content: str | None = None,
     method: Any = None,
     watch: Any = None,
-    branches: ReplayCache | None = None,
+    cache: ReplayCache | None = None,
 ) -> Row:
     """Run one trial.
 
@@ -64,7 +64,7 @@ def run_trial(
         content: From `content_hash`, if it is at hand.
         method: What `OwnCorrectors.find` makes of the method of `spec`, if it is at hand.
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
-        branches: What replays of this scene and seed have in common; changes nothing but the time it takes.
+        cache: What replays of this scene and seed have in common; changes nothing but the time it takes.
 
     Raises:
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
@@ -80,7 +80,7 @@ def run_trial(
     given = _corrector_input(spec, seen, truth)
     planned = plan(method or parsed(spec.method).plan, seen, truth, given)
     said = confidence(planned, seen, given, truth)
-    return first | _carry_out(planned, scene, truth, truth, watch, spec, branches) | said | _contacts(spec, seen, given)
+    return first | _carry_out(planned, scene, truth, truth, watch, spec, cache) | said | _contacts(spec, seen, given)
 
 
 def scene_of(spec: TrialSettings) -> Scene:
@@ -165,7 +165,7 @@ def _carry_out(
     truth: Array | None,
     watch: Any,
     spec: TrialSettings,
-    branches: ReplayCache | None,
+    cache: ReplayCache | None,
 ) -> Row:
     said = _correction(planned)
     if planned.plan is None:
@@ -173,7 +173,7 @@ def _carry_out(
         return result(planned.refused, success=False) | said
     said |= {"predicted": predicted_outcome(planned.plan, scene)}
     searches = parsed(spec.method).searches
-    attempt = replay_and_judge(planned.plan, scene, reference, watch, spec.fidelity, branches, searches)
+    attempt = replay_and_judge(planned.plan, scene, reference, watch, spec.fidelity, cache, searches)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     return end | said | _physics(attempt, planned.plan, truth)
 

@@ -36,28 +36,28 @@ def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
     return record_demonstration(scene(name, grasp), careless, seed)
 
 
-def row(method, fidelity, *, grasp="friction", level=1.0, branches=None):
+def row(method, fidelity, *, grasp="friction", level=1.0, cache=None):
     spec = TrialSettings("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
-    return json.dumps(run_trial(spec, scene(grasp=grasp), recording=shown(grasp=grasp), branches=branches))
+    return json.dumps(run_trial(spec, scene(grasp=grasp), recording=shown(grasp=grasp), cache=cache))
 
 
 @pytest.mark.parametrize(("fidelity", "grasp"), [("full", "friction"), ("contact", "friction"), ("full", "weld")])
 def test_shared_beginnings_change_no_byte(fidelity, grasp):
     asked = [("paper", 1.0), ("paper-track", 1.0), ("none", 1.0), ("paper", 0.5), ("paper", 1.0)]
-    branches = ReplayCache()
-    shared = [row(method, fidelity, grasp=grasp, level=level, branches=branches) for method, level in asked]
+    cache = ReplayCache()
+    shared = [row(method, fidelity, grasp=grasp, level=level, cache=cache) for method, level in asked]
     alone = [row(method, fidelity, grasp=grasp, level=level) for method, level in asked[:-1]]
     assert shared == [*alone, alone[0]]
 
 
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
-    branches, plan = (
+    cache, plan = (
         ReplayCache(),
         Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals),
     )
-    first = replay(plan, scene(), fidelity="contact", branches=branches)
+    first = replay(plan, scene(), fidelity="contact", cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
-    assert replay(plan, scene(), fidelity="contact", branches=branches) is first
+    assert replay(plan, scene(), fidelity="contact", cache=cache) is first
 
 
 def test_marks_differ_where_anything_that_led_there_differs():

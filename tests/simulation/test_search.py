@@ -42,8 +42,8 @@ def aside(name, mm):
     return Plan(scene(name).scenario.assembly, truth.start, goals)
 
 
-def carried_out(plan, name, searches, branches=None):
-    return replay_and_judge(plan, scene(name), layout(name).goals, None, "contact", branches, searches)
+def carried_out(plan, name, searches, cache=None):
+    return replay_and_judge(plan, scene(name), layout(name).goals, None, "contact", cache, searches)
 
 
 def driven(law, push):
@@ -75,9 +75,9 @@ def test_what_is_farther_off_than_the_spiral_is_not_found():
     assert found.result.sim_seconds < carried_out(plan, "stick_in_tower", False).result.sim_seconds + 30.0
 
 
-def row(method, level, branches=None):
+def row(method, level, cache=None):
     spec = TrialSettings("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
-    return run_trial(spec, scene("stick_in_tower"), recording=shown("stick_in_tower"), branches=branches)
+    return run_trial(spec, scene("stick_in_tower"), recording=shown("stick_in_tower"), cache=cache)
 
 
 def test_where_no_hole_is_missed_nothing_changes():
@@ -89,8 +89,8 @@ def test_where_no_hole_is_missed_nothing_changes():
 
 def test_shared_beginnings_change_no_byte():
     asked = [("none", 0.1), ("search", 0.1), ("contact+search", 0.1), ("contact", 0.1), ("search", 0.1), ("none", 0.1)]
-    branches = ReplayCache()
-    shared = [json.dumps(row(*each, branches)) for each in asked]
+    cache = ReplayCache()
+    shared = [json.dumps(row(*each, cache)) for each in asked]
     alone = [json.dumps(row(*each)) for each in asked[:4]]
     assert shared == [*alone, alone[1], alone[0]]
     none, search = (json.loads(each) for each in alone[:2])

@@ -53,7 +53,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 
-    def run_trial(spec: Any, scene: Any, *, recording: str, content: str, method: Any, branches: Any) -> dict[str, Any]:
+    def run_trial(spec: Any, scene: Any, *, recording: str, content: str, method: Any, cache: Any) -> dict[str, Any]:
         did["trial"] += 1
         assert method == spec.method
         assert recording == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"

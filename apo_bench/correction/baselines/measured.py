@@ -17,11 +17,11 @@ from apo_bench.records import outcomes
 TWIST_UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)
 
 
-def goals_as_given(observation: Observation, goals: Array, said: str) -> Correction:
+def goals_as_given(observation: Observation, goals: Array, sentence: str) -> Correction:
     """A correction of these goals, (n, 4, 4), to be executed as it is, whatever gap it leaves.
 
     Args:
-        said: The sentence, if a contact does not hold within `observation.gap_m`.
+        sentence: The sentence, if a contact does not hold within `observation.gap_m`.
 
     Returns:
         `converged`; `not_finite`, and what was seen, if a number is not finite.
@@ -34,8 +34,8 @@ def goals_as_given(observation: Observation, goals: Array, said: str) -> Correct
     _, rank = least_step(J / np.tile(TWIST_UNITS, len(goals)), e, SINGULAR_CUT_OFF)
     freed = tuple(int(k) for k in np.flatnonzero((goals != observation.goals).any(axis=(1, 2)))[::-1])
     after = largest(e)
-    said = status_sentence("converged", observation.gap_m) if after <= observation.gap_m else said
-    return Correction(goals, "converged", said, freed, before, after, rank)
+    sentence = status_sentence("converged", observation.gap_m) if after <= observation.gap_m else sentence
+    return Correction(goals, "converged", sentence, freed, before, after, rank)
 
 
 def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()) -> float:
@@ -45,8 +45,8 @@ def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()
         dropped: Relations, or single contacts, that do not count.
     """
     plain = equations(observation.assembly, observation.start, observation.goals)
-    system, exact, walls = demanded(plain, observation.assembly, observation.play_m)
-    return violation(system, exact, walls, goals, observation.assembly.without(dropped))
+    system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
+    return violation(system, exact, inequalities, goals, observation.assembly.without(dropped))
 
 
 def as_it_ends(observation: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:

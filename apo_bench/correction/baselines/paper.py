@@ -17,9 +17,9 @@ def paper(observation: Observation) -> Correction:
     """Solve for the motion parameters that Section 3.3.2 chooses, and settle every other goal by itself.
 
     Returns:
-        `converged` if every |e| is within `observation.gap_m`; otherwise `not_seen` (nothing was changed), `inconsistent`,
-        `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the candidates; rank and
-        trace are those of their joint solution.
+        `converged` if every |e| is within `observation.gap_m`; otherwise `not_seen` (nothing was changed),
+        `inconsistent`, `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the
+        candidates; rank and trace are those of their joint solution.
     """
     return at_once(observation, np.ones(len(observation.assembly.relations()), dtype=np.bool_))
 

@@ -46,7 +46,7 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
     the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t covariance
     V)^-1 (c + V^t xi).
     """
-    one = Whitened(space.seen[k : k + 1], space.factor[k : k + 1])
+    one = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
     now, z = np.array(goals), np.zeros(6)
     for _ in range(_TURNS):
         e, J = own.linearised(now)

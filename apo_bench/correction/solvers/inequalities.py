@@ -64,10 +64,10 @@ class Inequalities:
 
 
 def violation(
-    system: Equations, exact: NDArray[np.bool_], walls: Inequalities, goals: Array, kept: NDArray[np.bool_]
+    system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, goals: Array, kept: NDArray[np.bool_]
 ) -> float:
     """The largest |e| of the equations that are `kept`, (c,), [m]; of walls, by how much they are overstepped."""
-    return max(largest(system.gaps(goals)[kept & exact]), walls.among(kept[~exact]).overstepped(goals))
+    return max(largest(system.gaps(goals)[kept & exact]), inequalities.among(kept[~exact]).overstepped(goals))
 
 
 def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
@@ -76,16 +76,16 @@ def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equa
     exact = low == high
     plane = np.array(system.plane)
     plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]
-    walls = system.among(~exact)
+    inequalities = system.among(~exact)
     return (
         replace(system, plane=plane),
         exact,
-        Inequalities(walls, low[~exact][walls.contact], high[~exact][walls.contact]),
+        Inequalities(inequalities, low[~exact][inequalities.contact], high[~exact][inequalities.contact]),
     )
 
 
 def nearest_between(
-    system: CompactEquations, walls: Inequalities, seen: Array, L: Array, start: NearestGoals
+    system: CompactEquations, inequalities: Inequalities, observed: Array, L: Array, start: NearestGoals
 ) -> NearestGoals:
     """The nearest goals that satisfy the equations and stay between the walls.
 
@@ -112,10 +112,10 @@ def nearest_between(
         Jt = system.gathered(blocks)
         shortest = z + project(e[None], Jt[None], z[None], None, _SETTLED)[0][0]
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
-        e_wall, J_wall = walls.system.linearised(T)
-        J_wall = (J_wall.reshape(len(walls), -1, 1, 6) @ B).reshape(len(walls), -1)
+        e_wall, J_wall = inequalities.system.linearised(T)
+        J_wall = (J_wall.reshape(len(inequalities), -1, 1, 6) @ B).reshape(len(inequalities), -1)
         ahead = e_wall + J_wall @ (shortest - z)
-        u, room = _program(J_wall, free, walls.low - ahead, walls.high - ahead)
+        u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
         step = shortest + free @ u - z
         length = float(np.abs(step).max(initial=0.0))
         trace.append(SolverTurn(float(np.abs(e).max(initial=0.0)), length))
@@ -125,20 +125,20 @@ def nearest_between(
         last = step if rest else shortened_step(step[None], L[None])[0]
         z = z + (step if rest else pace * last)
         D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
-        T, B, before = seen @ D, Jr @ L, length
+        T, B, before = observed @ D, Jr @ L, length
         if over:
             break
     return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
 
 
-def active_rank(Jt: Array, walls: Inequalities, found: NearestGoals) -> int:
+def active_rank(Jt: Array, inequalities: Inequalities, found: NearestGoals) -> int:
     """How many directions the walls that are touched fix beyond the equations.
 
     Args:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
     """
-    e, J = walls.system.linearised(found.goals)
-    at = (e <= walls.low + _TOUCH_M) | (e >= walls.high - _TOUCH_M)
+    e, J = inequalities.system.linearised(found.goals)
+    at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
     J = (J[at].reshape(int(at.sum()), len(found.B), 1, 6) @ found.B).reshape(int(at.sum()), len(found.z))
     return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
 

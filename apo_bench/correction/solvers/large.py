@@ -19,12 +19,14 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
 
 
-def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
+def nearest_goals_sparse(
+    system: CompactEquations, observed: Array, L: Array, soft_m: Array | None = None
+) -> NearestGoals:
     """As `manifold.nearest_goals`, of goals (n, 4, 4); the Jacobian of the result is a sparse matrix."""
     n, m = system.n, 3 * len(system)
     where = incidence(system)
     solve = sparse_solver(where)
-    z, T, B = np.zeros(6 * n), seen, L
+    z, T, B = np.zeros(6 * n), observed, L
     before, trace, rest, finite = np.inf, list[SolverTurn](), False, True
     blocks = np.zeros((len(where.contact), 6, 3))
     for turn in range(MOST_TURNS):
@@ -43,10 +45,10 @@ def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m
         rest = bool(settles(np.array(length), np.array(before)))
         z = z + (step if rest else shortened_step(step[None], L[None])[0])
         D, Jr = exp_and_jacobian((L @ z.reshape(n, 6, 1))[..., 0])
-        T, B, before = seen @ D, Jr @ L, length
+        T, B, before = observed @ D, Jr @ L, length
         if rest:
             break
     if not finite:
-        z, T = np.zeros(6 * n), seen
+        z, T = np.zeros(6 * n), observed
     Jt = where.matrix(blocks).T
     return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest and finite), np.array(finite), tuple(trace))

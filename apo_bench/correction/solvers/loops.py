@@ -36,7 +36,7 @@ def solve_each(
     words: _Words,
     plane: _Array,
     points: _Array,
-    seen: _Array,
+    observed: _Array,
     L: _Array,
     soft_m: _Array,
     series: _Array,
@@ -59,7 +59,7 @@ def solve_each(
         trace: (TURNS, 2), zeros: the largest |e| and the largest step of each turn.
     """
     turns, step_size, sure, damp, fall, floor, largest_turn, smallest = rule
-    b, n, c, w, p = len(seen), seen.shape[1], len(plane), words[0].shape[1], len(start)
+    b, n, c, w, p = len(observed), observed.shape[1], len(plane), words[0].shape[1], len(start)
     m, longest, soft = 3 * c, 0, len(soft_m) > 0
     width, slot, first, begin, users = ordered(words, p + n, n)
     factors = np.zeros((p + n + 1, 2, 4, 4))
@@ -70,7 +70,7 @@ def solve_each(
     for o in range(b):
         T, z, e, B = out[0][o], out[1][o], out[2][o], out[4][o]
         v, Lo = points[o if len(points) > 1 else 0], L[o if len(L) > 1 else 0]
-        T[:], z[:], B[:], size = seen[o], 0.0, Lo, np.inf
+        T[:], z[:], B[:], size = observed[o], 0.0, Lo, np.inf
         for turn in range(turns):
             longest = max(longest, turn + 1)
             for k in range(n):
@@ -107,12 +107,12 @@ def solve_each(
             for i in range(6 * n):
                 z[i] += share * step[i]
             for k in range(n):
-                displaced(seen[o, k], Lo[k], z[6 * k : 6 * k + 6], series, T[k], B[k])
+                displaced(observed[o, k], Lo[k], z[6 * k : 6 * k + 6], series, T[k], B[k])
             if rest[o]:
                 break
         scattered(blocks, words[1], slot, out[3][o])
         if not finite[o]:
-            T[:], z[:] = seen[o], 0.0
+            T[:], z[:] = observed[o], 0.0
         for k in range(n):
             both(T[k], factors[p + k])
         linearise(words, width, slot, factors, plane, v, B, e, blocks, behind)
@@ -363,7 +363,7 @@ def step_share(L: _Array, step: _Array, largest_turn: float, smallest: float) ->
     return min(1.0, largest_turn / max(math.sqrt(largest), smallest))
 
 
-def displaced(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Array) -> None:
+def displaced(observed: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: _Array) -> None:
     """T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z."""
     xi = np.zeros(6)
     for i in range(6):
@@ -387,10 +387,10 @@ def displaced(seen: _Array, L: _Array, z: _Array, series: _Array, T: _Array, B: 
             P[i, j] = one + a * W[i, j] + b * W2
             S[i, j] = a * V[i, j] + b * M - 2.0 * s * (f[4] * W[i, j] + f[5] * W2)
     for i in range(3):
-        T[i, 3] = seen[i, 3]
+        T[i, 3] = observed[i, 3]
         for j in range(3):
-            T[i, j] = seen[i, 0] * R[0, j] + seen[i, 1] * R[1, j] + seen[i, 2] * R[2, j]
-            T[i, 3] += seen[i, j] * (G[j, 0] * v[0] + G[j, 1] * v[1] + G[j, 2] * v[2])
+            T[i, j] = observed[i, 0] * R[0, j] + observed[i, 1] * R[1, j] + observed[i, 2] * R[2, j]
+            T[i, 3] += observed[i, j] * (G[j, 0] * v[0] + G[j, 1] * v[1] + G[j, 2] * v[2])
         for q in range(6):
             B[i, q] = P[i, 0] * L[0, q] + P[i, 1] * L[1, q] + P[i, 2] * L[2, q]
             B[i, q] += S[i, 0] * L[3, q] + S[i, 1] * L[4, q] + S[i, 2] * L[5, q]

@@ -90,9 +90,9 @@ def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Arra
 
         return nearest_goals_sparse(system, goals, L, soft_m)
     b = math.prod(lead)
-    seen = goals.reshape(b, n, 4, 4)
+    observed = goals.reshape(b, n, 4, 4)
     scale = np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)
-    found = _many(system, seen, scale, soft_m)
+    found = _many(system, observed, scale, soft_m)
     if lead == (b,):
         return found
     names = ("goals", "z", "e", "Jt", "B", "at_rest", "finite")
@@ -100,10 +100,10 @@ def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Arra
     return NearestGoals(**{name: x.reshape((*lead, *x.shape[1:])) for name, x in shaped.items()}, trace=found.trace)
 
 
-def _many(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None) -> NearestGoals:
+def _many(system: CompactEquations, observed: Array, L: Array, soft_m: Array | None) -> NearestGoals:
     """(b, n, 4, 4) goals; observations that rest are left alone while the others go on."""
-    b, n = len(seen), system.n
-    now = _Going(np.arange(b), system, seen, L, seen, L, np.zeros((b, 6 * n)), np.full(b, np.inf))
+    b, n = len(observed), system.n
+    now = _Going(np.arange(b), system, observed, L, observed, L, np.zeros((b, 6 * n)), np.full(b, np.inf))
     done, trace = list[tuple[NDArray[np.intp], tuple[Any, ...]]](), list[SolverTurn]()
     for turn in range(MOST_TURNS):
         e, blocks = now.system.blocks(now.T, now.B)
@@ -115,7 +115,7 @@ def _many(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None)
         over = ~finite | rest if turn + 1 < MOST_TURNS else np.ones(b, dtype=np.bool_)[now.which]
         z = now.z + (step if rest.all() else shortened_step(step, now.L))
         D, Jr = exp_and_jacobian((now.L @ z.reshape(len(z), n, 6, 1))[..., 0])
-        now = now._replace(z=z, T=now.seen @ D, B=Jr @ now.L, size=size)
+        now = now._replace(z=z, T=now.observed @ D, B=Jr @ now.L, size=size)
         if over.any() or not b:
             ended = (now.T, z, Jt, now.B, rest, finite)
             if over.all():
@@ -123,7 +123,7 @@ def _many(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None)
                 break
             done.append((now.which[over], tuple(x[over] for x in ended)))
             now = now.only(~over)
-    return _sorted(system, seen, done, tuple(trace))
+    return _sorted(system, observed, done, tuple(trace))
 
 
 def settles(size: Array, before: Array) -> NDArray[np.bool_]:
@@ -136,7 +136,7 @@ class _Going(NamedTuple):
 
     which: NDArray[np.intp]
     system: CompactEquations
-    seen: Array
+    observed: Array
     L: Array
     T: Array
     B: Array
@@ -145,13 +145,13 @@ class _Going(NamedTuple):
     """(b,), of the step before."""
 
     def only(self, kept: NDArray[np.bool_]) -> _Going:
-        rest = (x[kept] for x in (self.seen, self.L, self.T, self.B, self.z, self.size))
+        rest = (x[kept] for x in (self.observed, self.L, self.T, self.B, self.z, self.size))
         return _Going(self.which[kept], self.system.only(kept), *rest)
 
 
 def _sorted(
     system: CompactEquations,
-    seen: Array,
+    observed: Array,
     done: list[tuple[NDArray[np.intp], tuple[Any, ...]]],
     trace: tuple[SolverTurn, ...],
 ) -> NearestGoals:
@@ -162,7 +162,7 @@ def _sorted(
         order = np.argsort(np.concatenate([which for which, _ in done]))
         T, z, Jt, B, rest, finite = (np.concatenate(x)[order] for x in zip(*(x for _, x in done), strict=True))
     if not finite.all():
-        T, z = np.where(finite[:, None, None, None], T, seen), np.where(finite[:, None], z, 0.0)
+        T, z = np.where(finite[:, None, None, None], T, observed), np.where(finite[:, None], z, 0.0)
     return NearestGoals(T, z, system.residual(T), Jt, B, rest, finite, trace)
 
 

@@ -19,18 +19,18 @@ from apo_bench.geometry.twist import right_jacobian
 class Whitened:
     """The motion parameters of n operations as a vector z, (6 n,), that is zero at what was seen."""
 
-    seen: Array
+    observed: Array
     """(n, 4, 4), world frame, [m]."""
     factor: Array
     """(n, 6, 6), L of each operation, [m, rad]."""
 
     def goals(self, z: Array) -> Array:
         """T_seen exp(L z), (n, 4, 4)."""
-        return np.asarray(self.seen @ pose.exp(self._twists(z)))
+        return np.asarray(self.observed @ pose.exp(self._twists(z)))
 
     def pulled(self, z: Array, J: Array) -> Array:
         """A derivative by the body twists of the goals at z, (m, 6 n), as the derivative by z."""
-        n = len(self.seen)
+        n = len(self.observed)
         D = right_jacobian(self._twists(z)) @ self.factor
         return np.einsum("mni,nij->mnj", J.reshape(-1, n, 6), D).reshape(-1, 6 * n)
 

@@ -35,7 +35,7 @@ def replay(
     watch: Watch | None = None,
     parts_at: Poses | None = None,
     fidelity: str = "full",
-    branches: ReplayCache | None = None,
+    cache: ReplayCache | None = None,
     searches: bool = False,
     most_s: float = math.inf,
 ) -> ReplayResult:
@@ -46,7 +46,7 @@ def replay(
         parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
         fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out, and what rests
             untouched is not stepped.
-        branches: What replays of this scene have in common; changes nothing but the time it takes.
+        cache: What replays of this scene have in common; changes nothing but the time it takes.
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
     """
@@ -54,15 +54,15 @@ def replay(
     too_long = len(plan.schedule) * _SHORTEST_STEP_S > most_s
     todo = () if too_long else moves(plan, scene, searches)
     refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
-    branches = ReplayCache() if branches is None or watch is not None else branches
+    cache = ReplayCache() if cache is None or watch is not None else cache
     way = cache_keys(scene, start, fidelity, todo)
-    ended = None if refused or not way or most_s < math.inf else branches.ended(way[-1])
+    ended = None if refused or not way or most_s < math.inf else cache.ended(way[-1])
     if ended is not None:
         return ended
     robot, after = Robot(scene, start, watch, fidelity), list[Snapshot | None]([None] * len(plan.assembly))
     timeline = list[tuple[Step, float]]()
     with sleeping(scene.work, fidelity == "contact"):
-        outcome = refused or _carry_out(plan, robot, todo, after, timeline, branches, way, most_s)
+        outcome = refused or _carry_out(plan, robot, todo, after, timeline, cache, way, most_s)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
         reached=Reached(after=tuple(after), final=final),
@@ -72,7 +72,7 @@ def replay(
         timeline=tuple(timeline),
     )
     if way and not refused and outcome.code != "time_limit":
-        branches.end(way[-1], result)
+        cache.end(way[-1], result)
     return result
 
 
@@ -106,11 +106,11 @@ def _carry_out(
     todo: tuple[Move, ...],
     after: list[Snapshot | None],
     timeline: list[tuple[Step, float]],
-    branches: ReplayCache,
+    cache: ReplayCache,
     way: list[bytes],
     most_s: float,
 ) -> Outcome:
-    done, kept = branches.resume(way, robot)
+    done, kept = cache.resume(way, robot)
     if kept is None:
         robot.wait(0.05)
     else:
@@ -121,7 +121,7 @@ def _carry_out(
         try:
             if kept is None or done <= 2 * i:
                 grip = take(robot, t)
-                branches.keep(way[2 * i], robot, grip, after, timeline)
+                cache.keep(way[2 * i], robot, grip, after, timeline)
             else:
                 grip = kept.grip
             bring(robot, t, grip)
@@ -132,7 +132,7 @@ def _carry_out(
             return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
         after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
         timeline.append((step, float(robot.data.time)))
-        branches.keep(way[2 * i + 1], robot, 0, after, timeline)
+        cache.keep(way[2 * i + 1], robot, 0, after, timeline)
     return Outcome("done", "ok", None, sentence("ok"))
 
 

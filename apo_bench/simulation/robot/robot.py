@@ -95,7 +95,7 @@ class Robot:
             path = self._reached(along(self.scene.kinematics, line, s[begin : end + 1], q))
             velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
             if begin > done:
-                self._leap(q, velocity[0], begin - done)
+                self._fast_forward(q, velocity[0], begin - done)
             if self._run((path + self._lead * velocity)[1:], guard) < end - begin:
                 self._hold_where_it_is()
                 return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
@@ -217,7 +217,7 @@ class Robot:
         held = [Moving(self.scene.boxes[p], tip @ part_pose(self.scene.work, self.data, p)) for p in self._held]
         return [Moving(gripper_boxes(self.scene.kinematics, self.arm, round(opening, 4)), np.eye(4)), *held]
 
-    def _leap(self, q: Array, velocity: Array, steps: int) -> None:
+    def _fast_forward(self, q: Array, velocity: Array, steps: int) -> None:
         """Leave out steps on which nothing is near."""
         joints, forward = (self._qpos, self._dof), self.scene.kinematics.forward
         fast_forward(self.scene.work, self.data, forward, joints, q - self.q, velocity, self._held)
