@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -28,7 +28,8 @@ from apo_bench.cli import report as cli_report
 from apo_bench.cli import show as cli_show
 from apo_bench.cli import sweep_command as cli_sweep
 from apo_bench.cli.arguments import check_writable
-from apo_bench.cli.replay_command import NO_RESULT, ArmOption, Clearance, GraspOption, ScenarioArgument, Timestep
+from apo_bench.cli.replay_command import NO_RESULT
+from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import Interrupted
 from apo_bench.errors import InputError
 from apo_bench.io import streams
@@ -156,24 +157,21 @@ for commands in (
 
 
 @app.command()
+@takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
 def scene(
-    scenario: ScenarioArgument,
-    out: Annotated[Path, typer.Option(help="The MJCF file to write.")],
-    clearance: Clearance = None,
-    grasp: GraspOption = "friction",
-    arm: ArmOption = "six_axis",
-    timestep_ms: Timestep = 1.0,
+    scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **asked: Any
 ) -> None:
     """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
-    from apo_bench.records.settings import check_clearance
+    from apo_bench.records.settings import check, in_python
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import scene_xml
 
-    if clearance is not None:
-        check_clearance(clearance)
+    given = in_python({name: value for name, value in asked.items() if value is not None})
+    for name, value in given.items():
+        check(name, value)
     loaded = load_scenario(scenario)
     check_writable(out, "--out", (".xml",))
-    xml = scene_xml(loaded, clearance_mm=clearance, grasp=grasp, arm=arm, timestep_s=timestep_ms * 1e-3)
+    xml = scene_xml(loaded, **given)
     out.write_text(xml, encoding="utf-8")
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
 

@@ -10,6 +10,7 @@ import typer
 
 from apo_bench.assembly.goals import Correction, Observation, Plan
 from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
 
@@ -18,7 +19,6 @@ EXACT_M = 1e-9
 """Contacts that hold this well are a solution, at which a rank can be read off."""
 DOUBTS = ("apply", "warn", "refuse", "drop")
 
-ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 DeviationMm = Annotated[float, typer.Option(help="Standard deviation of what was seen, mm, where none is stated.")]
 DeviationDeg = Annotated[float, typer.Option(help="The same in degrees.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]

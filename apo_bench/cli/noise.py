@@ -50,11 +50,11 @@ def card(
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
-    from apo_bench.records.settings import check_level
+    from apo_bench.records.settings import check
     from apo_bench.show.noise_card import draw_errors, noise_card
     from apo_bench.show.noise_picture import draw_histogram
 
-    check_level(level)
+    check("level_mm", level, called="level")
     if out is not None:
         check_writable(out, "--out", (".png",))
     drawn = draw_errors(name, Level(level, level))

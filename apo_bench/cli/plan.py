@@ -9,12 +9,11 @@ from typing import Annotated
 import typer
 
 from apo_bench.assembly.goals import Plan
+from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io.output import redirect_output
 from apo_bench.scenario.scenario import Scenario
-
-ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
 
 def register(app: typer.Typer) -> None:

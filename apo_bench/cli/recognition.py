@@ -8,11 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io.output import redirect_output
-
-ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -20,13 +19,10 @@ def register(app: typer.Typer) -> None:
     app.command()(recognise)
 
 
+@takes(trial_options("level", "careless", "seed", "noise", "eye"))
 def recognise(
     scenario: ScenarioArgument,
-    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees; default 1.")] = None,
-    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
-    noise: Annotated[str | None, typer.Option(help="A noise model; default: isotropic.")] = None,
-    eye: Annotated[str | None, typer.Option(help="noise or range; default: noise.")] = None,
+    *,
     observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,
     deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
     deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
@@ -34,6 +30,7 @@ def recognise(
         str, typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), or recognised-twice.")
     ] = "recognised",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+    **asked: Any,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
     from apo_bench.records.relations import RECOGNISED
@@ -44,7 +41,6 @@ def recognise(
 
     if relations not in RECOGNISED:
         raise InputError(unknown("way of recognising", relations, RECOGNISED))
-    asked = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     name = load_scenario(scenario).name
     with redirect_output(as_json):

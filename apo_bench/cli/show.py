@@ -9,6 +9,7 @@ import typer
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.scenario.scenario import Scenario
@@ -16,29 +17,25 @@ from apo_bench.scenario.scenario import Scenario
 if TYPE_CHECKING:
     from apo_bench.show.believed_picture import BeliefPanel
 
-ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
-
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
     app.command()(show)
 
 
+@takes(trial_options("level", "careless", "seed", "noise", "eye"))
 def show(
     scenario: ScenarioArgument,
+    *,
     out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("believed.png"),
     seen: Annotated[bool, typer.Option("--seen", help="Only what was seen.")] = False,
     corrected: Annotated[bool, typer.Option("--corrected", help="Only what the method makes of it.")] = False,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
     method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = "contact",
-    level: Annotated[float | None, typer.Option(help="Noise: mm and degrees; default 1.")] = None,
-    careless: Annotated[float | None, typer.Option(help="0 is a careful human; default 1.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Number of the trial; default 0.")] = None,
-    noise: Annotated[str | None, typer.Option(help="A noise model; default: isotropic.")] = None,
-    eye: Annotated[str | None, typer.Option(help="noise or range; default: noise.")] = None,
     observation: Annotated[Path | None, typer.Option(help="Show this observation file instead.")] = None,
     deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
     deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+    **asked: Any,
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
     from apo_bench.scenario.file import load_scenario
@@ -48,7 +45,6 @@ def show(
     check_writable(out, "--out", (".png",))
     loaded = load_scenario(scenario)
     k = _step(len(loaded.assembly), step)
-    asked: dict[str, Any] = {"level": level, "careless": careless, "seed": seed, "noise": noise, "eye": eye}
     deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
     looked, assumed = looked_at(scenario, observation, asked, deviations)
     _check_seen(looked, k)

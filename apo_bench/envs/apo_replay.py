@@ -20,7 +20,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records.settings import RANGE, USUAL, check_eye, check_seed, level_pair, refuse_noise
+from apo_bench.records.row import Predicted
+from apo_bench.records.settings import RANGE, USUAL, TrialSettings, check, level_pair, refuse_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm
@@ -126,18 +127,18 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self,
         scenario: str | Path | Scenario = "stick_in_tower",
         level: float | Sequence[float] = 1.0,
-        careless: float = 1.0,
+        careless: float = TrialSettings.careless,
         noise: str | Callable[..., Any] | None = None,
-        grasp: str = "friction",
+        grasp: str = TrialSettings.grasp,
         clearance_mm: float | None = None,
-        arm: str | Arm = "six_axis",
-        timestep_s: float = 0.001,
-        eye: str = "noise",
+        arm: str | Arm = TrialSettings.arm,
+        timestep_s: float = TrialSettings.timestep_s,
+        eye: str = TrialSettings.eye,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
-        check_eye(eye)
+        check("eye", eye)
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
@@ -210,7 +211,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             InputError: Another option, a value that is not allowed, or no demonstration comes out right.
         """
         if seed is not None:
-            check_seed(int(seed))
+            check("seed", int(seed))
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
@@ -313,7 +314,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         goals = packed(self.seen.goals)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
-    def _replayed(self, shown: Recording, plan: Plan) -> tuple[dict[str, bool], Outcome, dict[str, Any] | None]:
+    def _replayed(self, shown: Recording, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None]:
         """The verdicts, where it ended, and what the plan had said."""
         failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
         if shown.demonstration.code != "ok":

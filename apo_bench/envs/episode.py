@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.observation.noise import Level
-from apo_bench.records.settings import check_careless, check_clearance, level_pair
+from apo_bench.records.settings import check, level_pair
 from apo_bench.simulation.scene.scene import Scene, build_scene
 
-OPTIONS = ("level", "careless", "clearance_mm")
 MOST_SCENES = 8
 """So many compiled scenes of other clearances are kept."""
 
@@ -27,9 +26,12 @@ class Settings:
     """None stands for the scenario's."""
 
     def __post_init__(self) -> None:
-        check_careless(self.careless)
+        check("careless", self.careless)
         if self.clearance_mm is not None:
-            check_clearance(self.clearance_mm)
+            check("clearance_mm", self.clearance_mm)
+
+
+OPTIONS = tuple(field.name for field in fields(Settings))
 
 
 def with_options(usual: Settings, options: object, eye: str) -> Settings:

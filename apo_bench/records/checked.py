@@ -8,18 +8,21 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Never
+from typing import Any, Never, cast
 
 import msgspec
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import CONTROL, clean
 from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
-from apo_bench.records.fields import NEVER_NULL, REQUIRED, ROW_FIELDS, RUN_FIELDS, TIMING_FIELDS, Said
-from apo_bench.records.settings import RANGE, ROW
+from apo_bench.records.fields import RUN_FIELDS, TIMING_FIELDS, Said
+from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
+from apo_bench.records.settings import RANGE, ROW, SETTINGS, TrialSettings
 from apo_bench.records.verdicts import MEANING
 
-USUAL: Mapping[str, Any] = MappingProxyType({"fidelity": "full", "arm": "six_axis", "timestep_s": 0.001})
+USUAL: Mapping[str, Any] = MappingProxyType(
+    {info.column: info.default for name, info in SETTINGS.items() if not info.key and name not in ("eye", "salt")}
+)
 """What a row that does not say means."""
 NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye")
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
@@ -47,8 +50,7 @@ _KINDS = {
 def _struct(name: str, fields: Mapping[str, Any], required: Sequence[str], **more: Any) -> type[msgspec.Struct]:
     given = []
     for field, kind in fields.items():
-        said = kind if field in NEVER_NULL else kind | None
-        given.append((field, said) if field in required else (field, said, None))
+        given.append((field, kind) if field in required else (field, kind | None, None))
     return msgspec.defstruct(name, given, kw_only=True, gc=False, **more)
 
 
@@ -59,7 +61,7 @@ _RUN = msgspec.json.Decoder(dict[str, Any])
 _KNOWN = _struct("Run", RUN_FIELDS, ())
 
 
-def row_of(line: bytes, where: str) -> dict[str, Any]:
+def row_of(line: bytes, where: str) -> Row:
     """The row of a line in the words of today, with every field of the table, null where the line does not say.
 
     Args:
@@ -77,8 +79,13 @@ def row_of(line: bytes, where: str) -> dict[str, Any]:
     if wrong is not None:
         raise _wrong(where, *wrong)
     row["sentence"] = row["sentence"] and clean(row["sentence"])
-    usual = {"eye": RANGE if row["noise"] == RANGE else "noise", **USUAL}
-    return MEANING[row["schema"]](row | {name: value for name, value in usual.items() if row[name] is None})
+    return MEANING[row["schema"]](as_usual(row))
+
+
+def as_usual(row: Mapping[str, Any]) -> Row:
+    """A row with what it does not say about how it was run."""
+    usual = {"eye": RANGE if row["noise"] == RANGE else TrialSettings.eye, **USUAL}
+    return cast(Row, {**row, **{name: value for name, value in usual.items() if row.get(name) is None}})
 
 
 def timing_of(line: bytes, where: str) -> dict[str, Any]:

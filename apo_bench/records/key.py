@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import itemgetter
 from typing import Any
 
-Key = tuple[str, float, int, float, float, float, str, str, str, str]
-"""What tells one trial of a sweep from another: the columns `KEY` of its row."""
-KEY = (
-    *("scenario", "clearance_mm", "seed", "careless", "level", "level_deg"),
-    *("noise", "relations", "grasp", "method"),
-)
+from apo_bench.records.settings import SETTINGS, TrialSettings, asked
+
+Key = tuple[Any, ...]
+"""The columns `KEY` of a row."""
+KEY = tuple(info.column for info in SETTINGS.values() if info.key)
+_VALUES = itemgetter(*KEY)
 
 
 def row_key(row: Mapping[str, Any]) -> Key:
     """The key of the trial that a row is of."""
-    return (
-        *(row["scenario"], row["clearance_mm"], row["seed"], row["careless"], row["level"]),
-        *(row["level_deg"], row["noise"], row["relations"], row["grasp"], row["method"]),
-    )
+    key: Key = _VALUES(row)
+    return key
+
+
+def trial_key(trial: TrialSettings, scenario: str) -> Key:
+    """The key of a trial.
+
+    Args:
+        scenario: Its name.
+    """
+    return row_key(asked(trial, scenario))

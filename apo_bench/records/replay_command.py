@@ -6,14 +6,17 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from apo_bench.records.checked import as_usual
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
 from apo_bench.records.method import is_own
-from apo_bench.records.settings import RANGE, USUAL
+from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
 
-USUALLY = {"grasp": "friction", "arm": "six_axis", "timestep_s": 0.001}
-"""What a row that does not say means."""
 SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
+ALWAYS = ("clearance_mm", "method")
+"""Said even if it is as usual."""
+APART = ("scenario", "level_mm", "level_deg", "seed", "salt")
+"""Said in a way of its own."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
 
@@ -27,38 +30,33 @@ def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Lim
     """The same without the seed: what the trials of a cell have in common."""
     given = str((files or {}).get(row["scenario"], row["scenario"]))
     given = f"./{given}" if given.startswith("-") else given
-    usual = {"eye": RANGE if row["noise"] == RANGE else "noise", "fidelity": "full", **USUALLY}
-    return shlex.join(["apo-bench", "replay", given, *_options({**usual, **row}, limits)])
+    return shlex.join(["apo-bench", "replay", given, *_options(as_usual(row), limits)])
 
 
 def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
     said: list[str] = []
 
-    def say(option: str, value: object, default: object) -> None:
+    def say(option: str, value: object, default: object = None) -> None:
         if value != default:
-            said.extend((option, number(value) if isinstance(value, float) else str(value)))
+            said.extend((f"--{option}", number(value) if isinstance(value, float) else str(value)))
 
     measured = row["eye"] == RANGE
     if measured or row["level"] == row["level_deg"]:
-        say("--level", float(row["level"]), 1.0)
+        say(LEVEL.option, float(row["level"]), SETTINGS["level_mm"].default)
     else:
-        say("--level-mm", float(row["level"]), 1.0)
-        say("--level-deg", float(row["level_deg"]), 1.0)
-    say("--careless", float(row["careless"]), 1.0)
-    say("--noise", row["noise"], RANGE if measured else USUAL)
-    say("--relations", row["relations"], "given")
-    say("--eye", row["eye"], "noise")
-    say("--clearance", float(row["clearance_mm"]), None)
-    say("--grasp", row["grasp"], "friction")
-    say("--arm", row["arm"], "six_axis")
-    say("--timestep-ms", milli(row["timestep_s"]), 1.0)
-    say("--fidelity", row["fidelity"], "full")
-    say("--method", row["method"], None)
-    say("--salt-file", SALT_FILE if row.get("salt") else None, None)
+        for name in ("level_mm", "level_deg"):
+            info = SETTINGS[name]
+            say(info.option, float(row[info.column]), info.default)
+    for name, info in SETTINGS.items():
+        if name not in APART and not (name == "noise" and measured):
+            value, usual = row[info.column], None if name in ALWAYS else info.default
+            if value != usual:
+                say(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
+    say(SETTINGS["salt"].option, SALT_FILE if row.get("salt") else None)
     if row.get("failure_stage") == "worker":
-        say("--trial-limit", limits.trial_s, None)
+        say("trial-limit", limits.trial_s)
         if is_own(row["method"]):
-            say("--corrector-limit", limits.corrector_s, CORRECTOR_LIMIT_S)
+            say("corrector-limit", limits.corrector_s, CORRECTOR_LIMIT_S)
     return said
 
 

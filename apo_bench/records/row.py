@@ -1,15 +1,196 @@
-"""A row: all that is kept of one trial."""
+"""A row: all that is kept of one trial, one line of `trials.jsonl`.
+
+Lengths are in mm, angles in degrees, quaternions are wxyz, operations are numbered from 1. What is written and read is
+checked by these types: finite numbers in their range, and no other fields.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, NotRequired, TypedDict, get_args, get_type_hints
 
-Row = dict[str, Any]
-"""One line of `trials.jsonl`: lengths in mm, angles in degrees, quaternions wxyz, operations numbered from 1. What each
-field may be stands in `fields.ROW_FIELDS`."""
+from msgspec import Meta
+
+from apo_bench.records.key import KEY
+from apo_bench.records.outcomes import CODES, STAGES
+from apo_bench.records.settings import (
+    LARGEST_SEED,
+    Carelessness,
+    ClearanceMm,
+    Eye,
+    Fidelity,
+    Name,
+    NoiseLevel,
+    Seed,
+    TimestepS,
+)
+
 LONGEST_SENTENCE = 1000
 LARGEST = 1e15
 """Of a number that physics or a solver gave; beyond, sums and pictures of it say nothing."""
+Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
+Size = Annotated[float, Meta(ge=0.0, le=LARGEST)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Count = Annotated[int, Meta(ge=0, le=1_000_000)]
+Operation = Annotated[int, Meta(ge=1, le=100_000)]
+Pose = Annotated[list[Number], Meta(min_length=7, max_length=7)]
+
+
+class FreedSet(TypedDict):
+    """A set of operations that were freed, and the gap that was left [mm]."""
+
+    step: Operation
+    free: list[Operation]
+    gap_mm: Number | None
+
+
+class Predicted(TypedDict):
+    """What a plan said about itself, and how far off it is then [mm]."""
+
+    fails: bool
+    operation: Operation | None
+    code: Literal["ok", "residual", "interference", "unstable_goal"]
+    size_mm: NotRequired[Number | None]
+
+
+class Row(TypedDict, total=False):
+    """A whole row has all of these, in this order; what a part of a trial finds out is some of them."""
+
+    schema: Name
+    """Version of these fields."""
+    env_id: Name | None
+    """Version of the environment."""
+    spec_hash: Name | None
+    """16 digits over the code, the files and all settings but method and seed: rows with the same may be counted
+    together."""
+    scenario: Name
+    """Its name."""
+    level: NoiseLevel | None
+    """Standard deviation of the poses seen, per axis [mm]; with the eye `range`, of one ray. Null if measured."""
+    level_deg: NoiseLevel | None
+    """The same of angles [deg]; zero with the eye `range`. Null if measured."""
+    careless: Carelessness | None
+    """How far the human deviates: 0 is a careful one, 1 the scenario's. Null if measured."""
+    clearance_mm: ClearanceMm
+    """Per side, of parts that fit into one another."""
+    eye: Eye | None
+    """`noise`: poses with noise that is drawn; `range`: measured in depth images."""
+    noise: Name
+    """The noise model; `range` with that eye, `measured` for an observation from a file."""
+    grasp: Name
+    """`friction`, or `weld` for an ideal gripper."""
+    arm: Name | None
+    """The robot."""
+    relations: Name
+    """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
+    method: Name
+    """Who planned: `oracle`, `none`, `search` or a corrector."""
+    seed: Seed
+    """Number of the trial: trials of one seed meet the same layout, human and noise."""
+    salt: Name | None
+    """Hash of the secret that the trial was drawn with; null for one that everybody can draw."""
+    timestep_s: TimestepS | None
+    """Time step of the physics [s]."""
+    fidelity: Fidelity | None
+    """`full`, or `contact`: only the part of each motion in which things may touch was simulated."""
+    thresholds: dict[str, Size] | None
+    """What the judge demands: lengths in mm, angles in degrees."""
+    demonstration: str | None
+    """How the human's own assembly ended: `ok` or a code."""
+    success: bool | None
+    """Whether the finished assembly is right; null if the demonstration itself was not, so that the trial does not
+    count."""
+    as_demonstrated: bool | None
+    """Whether every contact was also made when and where it was demonstrated."""
+    loose_success: bool | None
+    """Success with the loose thresholds, 5 mm and 5 degrees."""
+    failure_stage: str | None
+    """Where a trial failed that was no success."""
+    failure_code: str | None
+    """Why it failed."""
+    failure_operation: Operation | None
+    """The operation in which it failed, if it is known."""
+    sentence: str | None
+    """How it ended, for a person."""
+    as_demonstrated_code: str | None
+    """Why it is not as demonstrated."""
+    conditions: dict[str, bool] | None
+    """The conditions of success, each by itself."""
+    worst_gap_mm: Number | None
+    """Largest gap, or depth, of faces that should touch [mm]."""
+    worst_angle_deg: Number | None
+    """Largest angle between faces that should touch [deg]."""
+    least_overlap: Number | None
+    """Smallest overlap of faces that should touch, as a part of the true overlap."""
+    penetration_mm: Number | None
+    """Largest depth of one part in another [mm]."""
+    pushed_mm: Number | None
+    """Largest distance by which a part that was in place was moved [mm]."""
+    freed: list[Operation] | None
+    """Operations whose motion parameters were corrected."""
+    tried: list[FreedSet] | None
+    """Which operations were freed at which step, and the gap that was left."""
+    extra_operations: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] | None
+    """Steps of the plan beyond doing every operation once."""
+    predicted: Predicted | None
+    """What the plan said about itself before it was carried out."""
+    gap_before_mm: Number | None
+    """Gap of the contacts at the poses seen [mm]."""
+    gap_after_mm: Number | None
+    """Gap of the contacts at the corrected poses [mm]."""
+    chi_square: Annotated[float, Meta(ge=0.0, le=1e300)] | None
+    """Statistic of the test whether contacts and poses seen are consistent."""
+    chi_square_freedom: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
+    """Its degrees of freedom."""
+    p_value: Share | None
+    """Its p-value."""
+    test_passes: bool | None
+    """Whether they are consistent."""
+    suspects: list[Name] | None
+    """Contacts that the test suspects."""
+    dropped: list[Name] | None
+    """Contacts that the corrector left out."""
+    wrong_relation: Name | None
+    """The contact that is wrong, where wrong ones were given."""
+    inside_95: bool | None
+    """Whether the truth lies in the 95 % region that the corrector states."""
+    planned_error_fixed_mm: Size | None
+    """Root mean square distance of the plan from the truth, along directions that contacts fix [mm]."""
+    planned_error_free_mm: Size | None
+    """The same, along directions that contacts leave free [mm]."""
+    contacts_right: Count | None
+    """Contacts that the corrector was told and that are right."""
+    contacts_missed: Count | None
+    """Contacts that it was not told."""
+    contacts_false: Count | None
+    """Contacts that it was told and that are not there."""
+    reached: dict[str, Pose] | None
+    """Part -> where it ended: x, y, z [mm], qw, qx, qy, qz, world frame."""
+    pose_error_fixed_mm: Size | None
+    """As `planned_error_fixed_mm`, of where the parts ended [mm]."""
+    pose_error_free_mm: Size | None
+    """As `planned_error_free_mm`, of where the parts ended [mm]."""
+    peak_force_n: Size | None
+    """Largest contact force that the gripper met [N]."""
+    sim_seconds: Size | None
+    """Simulated time [s]."""
+
+
+_ENDS: Any = Literal
+_CODE, _STAGE = _ENDS[tuple(CODES)] | None, _ENDS[STAGES] | None
+_CLOSED = {"failure_stage": _STAGE} | dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
+ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
+"""Column -> its type, with the range that it may have."""
+NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
+"""What every row says, besides its key."""
+REQUIRED = ("schema", *KEY, *NEEDED)
+"""Without them a line is no row; what else a row does not say is null, or as usual."""
+
+
+def nullable(column: str) -> bool:
+    """Whether a column may be null."""
+    return type(None) in get_args(ROW_FIELDS[column])
 
 
 def finite(x: float | None) -> float | None:

@@ -21,6 +21,7 @@ from apo_bench.io.reading import each_line
 from apo_bench.io.writing import check_target, to_write
 from apo_bench.records.checked import row_of, unwritable
 from apo_bench.records.key import Key, row_key
+from apo_bench.records.row import Row
 from apo_bench.records.run_file import check_same, write_run
 from apo_bench.records.salt import check_one
 from apo_bench.records.settings import ROW
@@ -93,7 +94,7 @@ class RunFolder:
         with suppress(OSError):
             _append(self._timing.fileno(), timing)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Row]:
         """All rows of the folder."""
         self._keep()
         return read_rows(self._place)
@@ -134,7 +135,7 @@ class RunFolder:
             check_same(self.folder, run)
 
 
-def read_rows(folder: str | Path) -> list[dict[str, Any]]:
+def read_rows(folder: str | Path) -> list[Row]:
     """The rows of a sweep, in the order in which they ended; a torn last line is left out.
 
     Raises:
@@ -143,7 +144,7 @@ def read_rows(folder: str | Path) -> list[dict[str, Any]]:
     return list(each_row(folder))
 
 
-def each_row(folder: str | Path) -> Iterator[dict[str, Any]]:
+def each_row(folder: str | Path) -> Iterator[Row]:
     """The same, one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
     if not path.exists():

@@ -1,77 +1,209 @@
-"""What one trial is made of: every setting of a row, checked at the door."""
+"""What one trial is made of: every setting, stated once and checked at the door.
+
+What else lists settings is made from this: columns and keys of rows, axes of sweeps, keys of sweep files, options and
+help of the command line, replay commands, and the tables of the documentation.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Never, final
+from typing import Annotated, Any, Literal, Never, final, get_args, get_type_hints
 
 import numpy as np
+from msgspec import Meta
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError
 from apo_bench.records.method import checked_method
 from apo_bench.records.relations import checked_relations
 from apo_bench.records.salt import Salt
+from apo_bench.records.setting_info import SettingInfo, about, check_value
 
 ENV_ID = "APOReplay-v0"
 ROW = "apo-bench/row/6"
-EYES = ("noise", "range")
+Eye = Literal["noise", "range"]
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"
 USUAL = "isotropic"
 """The noise model where none is asked for."""
 METHOD = "contact"
 """The method where none is asked for."""
-LARGEST_LEVEL = 50.0
-"""[mm] and [degrees]: five times that is still inside the room."""
-FIDELITIES = ("full", "contact")
+Fidelity = Literal["full", "contact"]
 """Every motion is simulated, or the part of each in which things may touch."""
-LARGEST_CARELESS = 10.0
-LARGEST_CLEARANCE_MM = 5.0
 LARGEST_SEED = 2**53 - 1
 """Whole numbers up to here survive every JSON reader."""
+LONGEST_NAME = 5000
+"""Letters; some names are paths."""
+Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
+NoiseLevel = Annotated[float, Meta(ge=0.0, le=50.0)]
+"""[mm] or [degrees]: five times the largest is still inside the room."""
+Carelessness = Annotated[float, Meta(ge=0.0, le=10.0)]
+ClearanceMm = Annotated[float, Meta(ge=0.0, le=5.0)]
+Seed = Annotated[int, Meta(ge=0, le=LARGEST_SEED)]
+TimestepS = Annotated[float, Meta(gt=0.0, le=1.0)]
+LEVEL = SettingInfo(
+    "Noise: mm and degrees, standard deviation",
+    option="level",
+    usual="1",
+    axis="levels",
+    axis_option="levels",
+    swept=(0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0),
+    name="level",
+    kind=NoiseLevel,
+)
+"""One number stands for `level_mm` and `level_deg`."""
+_PER_AXIS = "where 1 means a standard deviation of 1 mm and 1 degree"
+_PER_RAY = "where 1 means a standard deviation of 1 mm per ray"
 
 
 @final
 @dataclass(frozen=True)
 class TrialSettings:
-    """One trial: with the same code and the same assets it determines its row."""
+    """One trial: with the same code and the same assets it determines its row, which has them in this order."""
 
-    scenario: str
+    scenario: Name = field(metadata=about(key=True, axis="scenarios"))
     """A name, or the path of a scenario file."""
-    level_mm: float = 1.0
-    level_deg: float = 1.0
-    careless: float = 1.0
-    clearance_mm: float = 0.25
-    noise: str = USUAL
-    grasp: str = "friction"
-    arm: str = "six_axis"
-    method: str = METHOD
-    seed: int = 0
-    timestep_s: float = 0.001
-    relations: str = "given"
-    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`, or wrong
-    ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
-    eye: str = "noise"
+    level_mm: NoiseLevel = field(
+        default=1.0,
+        metadata=about(
+            "Only the mm",
+            called="level in mm",
+            meaning=_PER_AXIS,
+            column="level",
+            usual="the level",
+            key=True,
+        ),
+    )
+    """Standard deviation of the poses seen, per axis; with the eye `range`, of one ray."""
+    level_deg: NoiseLevel = field(
+        default=1.0,
+        metadata=about("Only the degrees", called="level in degrees", meaning=_PER_AXIS, usual="the level", key=True),
+    )
+    """The same of angles; zero with the eye `range`."""
+    careless: Carelessness = field(
+        default=1.0,
+        metadata=about(
+            "Carelessness of the human: 0 is a careful one, 1 the scenario's",
+            called="carelessness",
+            meaning="where 0 is a careful human and 1 the scenario's",
+            key=True,
+            axis="careless",
+            swept=(0.0, 1.0),
+        ),
+    )
+    """How far the human deviates: 0 is a careful one, 1 the scenario's, anything else a multiple."""
+    clearance_mm: ClearanceMm = field(
+        default=0.25,
+        metadata=about(
+            "mm per side of parts that fit",
+            called="clearance",
+            meaning="in mm per side",
+            option="clearance",
+            usual="the scenario's",
+            key=True,
+            axis="clearances_mm",
+            scene=True,
+        ),
+    )
+    """Per side, of parts that fit into one another; what a part can have is the scene's to say."""
+    eye: str = field(
+        default="noise",
+        metadata=about(
+            "How poses are seen: noise (drawn), or range (measured in depth images; the level is mm per ray)",
+            called="eye",
+            choices=get_args(Eye),
+            axis="eyes",
+        ),
+    )
     """`noise`, or `range`: poses are measured in depth images; `level_mm` is the noise of a ray then, `level_deg` is
     zero and `noise` is `range`."""
-    fidelity: str = "full"
+    noise: Name = field(
+        default=USUAL,
+        metadata=about(
+            "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name",
+            key=True,
+            axis="noises",
+        ),
+    )
+    """A noise model, by name, as a file, or `module:name`."""
+    grasp: Name = field(
+        default="friction",
+        metadata=about(
+            "friction, or weld for an ideal gripper",
+            called="grasp",
+            choices=("friction", "weld"),
+            key=True,
+            axis="grasps",
+            scene=True,
+        ),
+    )
+    """`friction`, or `weld` for an ideal gripper."""
+    arm: Name = field(
+        default="six_axis", metadata=about("Name of the arm, or package.module:name", shared=True, scene=True)
+    )
+    """The robot, by name, or `module:name`."""
+    relations: Name = field(
+        default="given",
+        metadata=about(
+            "What correctors are told of the contacts: given (right), recognised, recognised-fixed (thresholds), "
+            "recognised-twice, missed, false, shifted:3 (mm)",
+            spelled=checked_relations,
+            key=True,
+            axis="relations",
+        ),
+    )
+    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`, or wrong
+    ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
+    method: Name = field(
+        default=METHOD,
+        metadata=about(
+            "oracle, none, search, a corrector or package.module:name; any of them with +search",
+            spelled=checked_method,
+            key=True,
+            axis="methods",
+            axis_option="methods",
+            swept=("oracle", "none", "paper", "contact"),
+        ),
+    )
+    """Who plans: `oracle`, `none`, `search`, a corrector by name, or `module:name`; with `+search` the robot feels for
+    holes besides."""
+    seed: Seed = field(default=0, metadata=about("Number of the trial", called="seed", key=True))
+    """Number of the trial: trials of one seed meet the same layout, human and noise."""
+    salt: Salt | None = field(
+        default=None,
+        repr=False,
+        metadata=about("The salt of the sweep that the trial is of", option="salt-file", usual="none"),
+    )
+    """Enters every stream of chance; None for a trial that everybody can draw. A row has its hash."""
+    timestep_s: TimestepS = field(
+        default=0.001,
+        metadata=about(
+            "Time step of the physics in ms: 1 for tables, 0.5 to check",
+            option="timestep-ms",
+            scale=1e-3,
+            shared=True,
+            scene=True,
+        ),
+    )
+    """Time step of the physics."""
+    fidelity: str = field(
+        default="full",
+        metadata=about(
+            "full, or contact: only the part of each motion in which things may touch is simulated",
+            called="fidelity",
+            choices=get_args(Fidelity),
+            shared=True,
+        ),
+    )
     """`full`, or `contact`: only the part of each motion in which things may touch is simulated."""
-    salt: Salt | None = field(default=None, repr=False)
-    """Enters every stream of chance; None for a trial that everybody can draw."""
 
     def __post_init__(self) -> None:
-        check_eye(self.eye)
-        check_level(self.level_mm, "level in mm", self.eye)
-        check_level(self.level_deg, "level in degrees")
-        check_careless(self.careless)
-        check_clearance(self.clearance_mm)
-        object.__setattr__(self, "method", checked_method(self.method))
-        check_seed(self.seed)
-        check_fidelity(self.fidelity, self.grasp)
-        object.__setattr__(self, "relations", checked_relations(self.relations))
+        for info in _CHECKED:
+            check(info.name, getattr(self, info.name), self.eye)
+            if info.spelled is not None:
+                object.__setattr__(self, info.name, info.spelled(getattr(self, info.name)))
+        check_together(self.fidelity, self.grasp)
         if self.eye == RANGE:
             if self.noise not in (USUAL, RANGE):
                 refuse_noise(self.noise)
@@ -79,10 +211,69 @@ class TrialSettings:
             object.__setattr__(self, "level_deg", 0.0)
 
 
-def check_level(level: float, what: str = "level", eye: str = "noise") -> None:
-    """Raise an `InputError` unless the level is a number from 0 to the largest."""
-    of = "1 mm per ray" if eye == RANGE else "1 mm and 1 degree"
-    _within(level, 0.0, LARGEST_LEVEL, what, f"where 1 means a standard deviation of {of}")
+def _settings() -> Iterable[SettingInfo]:
+    kinds = get_type_hints(TrialSettings, include_extras=True)
+    for one in fields(TrialSettings):
+        info: SettingInfo = one.metadata["info"]
+        column, option = info.column or one.name, info.option or one.name.replace("_", "-")
+        yield replace(info, name=one.name, kind=kinds[one.name], default=one.default, column=column, option=option)
+
+
+SETTINGS: Mapping[str, SettingInfo] = {info.name: info for info in _settings()}
+"""Name -> what is to be known of it, in the order of a row."""
+COLUMNS = tuple(info.column for info in SETTINGS.values())
+_CHECKED = tuple(info for info in SETTINGS.values() if info.called or info.spelled)
+
+
+def asked(settings: TrialSettings, scenario: str) -> dict[str, Any]:
+    """The settings as they stand in a row.
+
+    Args:
+        scenario: Its name.
+    """
+    said = {info.column: getattr(settings, name) for name, info in SETTINGS.items()}
+    return said | {"scenario": scenario, "salt": None if settings.salt is None else settings.salt.hash}
+
+
+def settings_of(row: Mapping[str, Any], scenario: str) -> TrialSettings:
+    """The settings of the trial that a row is of, without its salt, which no row tells.
+
+    Args:
+        scenario: A name, or the path of a scenario file.
+    """
+    said = {name: row.get(info.column, info.default) for name, info in SETTINGS.items()}
+    return TrialSettings(**(said | {"scenario": scenario, "salt": None}))
+
+
+def in_python(said: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by their names, in the units of Python, out of those by their options; other names stay."""
+    values = dict(said)
+    for name, info in SETTINGS.items():
+        if info.keyword != name and info.keyword in values:
+            value = values.pop(info.keyword)
+            values[name] = value if info.scale == 1.0 else value * info.scale
+    return values
+
+
+def check(name: str, value: object, eye: str = "noise", called: str = "") -> None:
+    """Raise an `InputError` unless a setting may be this, whatever the others are.
+
+    Args:
+        eye: What levels are of.
+        called: What to call it, if not as usual.
+    """
+    info = SETTINGS[name]
+    meaning = _PER_RAY if name == "level_mm" and eye == RANGE else info.meaning
+    check_value(replace(info, meaning=meaning, called=called or info.called), value)
+
+
+def check_together(fidelity: str, *grasps: str) -> None:
+    """Raise an `InputError` unless the verdicts of a fidelity are known to be those of `full` with these grasps."""
+    if fidelity == "contact" and "weld" in grasps:
+        raise InputError(
+            "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
+            "use the grasp friction, or full."
+        )
 
 
 def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[float, float]:
@@ -95,42 +286,9 @@ def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[floa
     if len(given) not in (1, 2):
         raise InputError(f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees.")
     mm, deg = given[0], 0.0 if eye == RANGE else given[-1]
-    check_level(mm, "level in mm", eye)
-    check_level(deg, "level in degrees")
+    check("level_mm", mm, eye)
+    check("level_deg", deg)
     return mm, deg
-
-
-def check_careless(careless: float) -> None:
-    """Raise an `InputError` unless it is a number from 0 to the largest."""
-    _within(careless, 0.0, LARGEST_CARELESS, "carelessness", "where 0 is a careful human and 1 the scenario's")
-
-
-def check_clearance(clearance_mm: float) -> None:
-    """Raise an `InputError` unless the clearance can be one; what a part can have is the scene's to say."""
-    _within(clearance_mm, 0.0, LARGEST_CLEARANCE_MM, "clearance", "in mm per side")
-
-
-def check_seed(seed: int) -> None:
-    """Raise an `InputError` unless the seed is a whole number from 0."""
-    if not 0 <= seed <= LARGEST_SEED:
-        raise InputError(f"a seed of {seed} was given; whole numbers from 0 to {LARGEST_SEED} are allowed.")
-
-
-def check_eye(eye: str) -> None:
-    """Raise an `InputError` unless there is such an eye."""
-    if not isinstance(eye, str) or eye not in EYES:
-        raise InputError(unknown("eye", str(eye), EYES))
-
-
-def check_fidelity(fidelity: str, *grasps: str) -> None:
-    """Raise an `InputError` unless there is such a fidelity, and its verdicts are known to be those of `full`."""
-    if not isinstance(fidelity, str) or fidelity not in FIDELITIES:
-        raise InputError(unknown("fidelity", str(fidelity), FIDELITIES))
-    if fidelity == "contact" and "weld" in grasps:
-        raise InputError(
-            "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
-            "use the grasp friction, or full."
-        )
 
 
 def refuse_noise(*noises: object) -> Never:
@@ -140,10 +298,3 @@ def refuse_noise(*noises: object) -> Never:
         f"the noise {names or 'model'} was given together with the eye 'range', which draws no pose noise; the level "
         "is the noise of its rays in mm, so leave one of the two out."
     )
-
-
-def _within(x: float, low: float, high: float, what: str, meaning: str) -> None:
-    number = isinstance(x, Real)
-    if not (number and math.isfinite(x) and low <= x <= high):
-        given = f"{x:g}" if number else repr(x)
-        raise InputError(f"a {what} of {given} was given; a number from {low:g} to {high:g} is allowed, {meaning}.")

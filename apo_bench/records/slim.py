@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from apo_bench.records.row import ROW_FIELDS, Predicted, Row
 from apo_bench.records.run_folder import each_row
 
 NUMBERS: Mapping[str, str] = {
@@ -27,19 +28,10 @@ NUMBERS: Mapping[str, str] = {
     "sim_seconds": "simulated [s]",
 }
 """Numbers of a row that the page shows, in its order, with what they are called there."""
-SAID = (
-    *("schema", "spec_hash", "scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp"),
-    *("arm", "relations", "method", "seed", "salt", "timestep_s", "fidelity", "demonstration"),
-    *("success", "as_demonstrated", "loose_success", "failure_stage", "failure_code", "failure_operation"),
-    *("sentence", "freed", "predicted"),
-)
-TESTED = (
-    *("chi_square", "chi_square_freedom", "test_passes", "suspects", "dropped", "wrong_relation", "inside_95"),
-    *("contacts_right", "contacts_missed", "contacts_false"),
-)
-COLUMNS = (*SAID, *TESTED, *NUMBERS)
-"""What is kept of a row; the rest (thresholds, conditions, final poses, attempts) is read again where it is needed."""
-Row = dict[str, Any]
+LEFT_OUT = ("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "reached")
+"""Not kept of a row; it is read again where it is needed."""
+COLUMNS = tuple(column for column in ROW_FIELDS if column not in LEFT_OUT)
+"""What is kept of a row."""
 
 
 def slim_rows(folder: str | Path) -> list[Row]:
@@ -48,17 +40,18 @@ def slim_rows(folder: str | Path) -> list[Row]:
     Raises:
         InputError: No such folder, no trials in it, or a line that is not a whole row.
     """
-    foretold: dict[Any, Any] = {}
+    foretold: dict[Any, Predicted] = {}
     return [_slim(row, foretold) for row in each_row(folder)]
 
 
-def _slim(row: Mapping[str, Any], foretold: dict[Any, Any]) -> Row:
-    kept = {name: row[name] for name in COLUMNS}
+def _slim(row: Row, foretold: dict[Any, Predicted]) -> Row:
+    kept: dict[str, Any] = {name: value for name, value in row.items() if name not in LEFT_OUT}
     for name, value in kept.items():
         if type(value) is str:
             kept[name] = sys.intern(value)
-    said = kept["predicted"]
+    said = row["predicted"]
     if said is not None:
         what = (said["fails"], said["operation"], said["code"])
-        kept["predicted"] = foretold.setdefault(what, dict(zip(("fails", "operation", "code"), what, strict=True)))
-    return kept
+        known: Predicted = {"fails": said["fails"], "operation": said["operation"], "code": said["code"]}
+        kept["predicted"] = foretold.setdefault(what, known)
+    return cast(Row, kept)

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from apo_bench.errors import InputError
+from apo_bench.records.row import Row
 from apo_bench.records.settings import ROW
 
 SUCCESS, AS_DEMONSTRATED = "success", "as_demonstrated"
@@ -21,8 +22,6 @@ WORDS = (
     "the sweep again with this version for success."
 )
 
-Row = dict[str, Any]
-
 
 def _as_it_says(row: Row) -> Row:
     return row
@@ -30,7 +29,7 @@ def _as_it_says(row: Row) -> Row:
 
 def _one_verdict(row: Row) -> Row:
     """Null remains null: of a demonstration that was not right itself neither verdict is given."""
-    return row | {SUCCESS: None, AS_DEMONSTRATED: row[SUCCESS]}
+    return row | {"success": None, "as_demonstrated": row["success"]}
 
 
 MEANING: Mapping[str, Callable[[Row], Row]] = MappingProxyType(
@@ -58,7 +57,7 @@ def verdict_of(rows: Sequence[Mapping[str, Any]], folder: str | Path) -> str:
 
 def by_verdict(rows: Sequence[Row], verdict: str) -> Sequence[Row]:
     """The rows with the verdict as their `success`, so that rates, tables and pictures are of it."""
-    return rows if verdict == SUCCESS else [{**row, SUCCESS: row[verdict]} for row in rows]
+    return rows if verdict == SUCCESS else [row | {"success": row["as_demonstrated"]} for row in rows]
 
 
 def words(verdict: str) -> str:

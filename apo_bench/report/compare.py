@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.key import Key, row_key
+from apo_bench.records.row import Row
 from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import one_salt, with_salt
 from apo_bench.records.settings import ROW
-from apo_bench.records.slim import NUMBERS, Row, slim_rows
+from apo_bench.records.slim import NUMBERS, slim_rows
 from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
@@ -20,6 +22,8 @@ from apo_bench.statistics.settings import at
 
 RUN = "run.json can be read"
 ENDING = ("success", "failure_stage", "failure_code")
+_ENDED = itemgetter(*ENDING)
+_TOLD = itemgetter(*ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
 ALL = "all"
 """Stands for every scenario."""
 
@@ -206,7 +210,8 @@ def numbers(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
     """One per number that is in any row."""
     found = []
     for name in NUMBERS:
-        values = [(a.get(name), b.get(name)) for a, b in pairs]
+        value = itemgetter(name)
+        values = [(value(a), value(b)) for a, b in pairs]
         both = [(x, y) for x, y in values if x is not None and y is not None]
         alone = sum((x is None) != (y is None) for x, y in values)
         if both or alone:
@@ -244,7 +249,7 @@ def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
     return Agreement(
         scenario=name,
         same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),
-        same_ending=Rate(sum(all(a[x] == b[x] for x in ENDING) for a, b in counted), len(counted)),
+        same_ending=Rate(sum(_ENDED(a) == _ENDED(b) for a, b in counted), len(counted)),
         same_everywhere=Rate(sum(seeds.values()), len(seeds)),
         only_first=sum((a, b) == (True, False) for a, b in verdicts),
         only_second=sum((a, b) == (False, True) for a, b in verdicts),
@@ -253,8 +258,7 @@ def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
 
 
 def _identical(a: Row, b: Row) -> bool:
-    told = ("as_demonstrated", "loose_success", "failure_operation", "sentence", "freed")
-    return all(a.get(name) == b.get(name) for name in (*ENDING, *told, *NUMBERS))
+    return bool(_TOLD(a) == _TOLD(b))
 
 
 def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
@@ -296,5 +300,5 @@ def _said(side: Side) -> dict[str, Any]:
         else:
             said[name] = value
     for name in ("schema", "fidelity", "arm", "timestep_s"):
-        said[f"rows: {name}"] = sorted({row[name] for row in side.rows if name in row})
+        said[f"rows: {name}"] = sorted(set(map(itemgetter(name), side.rows)))
     return said

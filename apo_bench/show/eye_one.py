@@ -9,7 +9,7 @@ from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.records.settings import RANGE, check_careless, check_level, check_seed
+from apo_bench.records.settings import RANGE, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages
@@ -44,9 +44,9 @@ def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> Se
         InputError: A setting that is not allowed.
         RuntimeError: The demonstration itself failed.
     """
-    check_level(level_mm, "level in mm", RANGE)
-    check_careless(careless)
-    check_seed(seed)
+    check("level_mm", level_mm, RANGE)
+    check("careless", careless)
+    check("seed", seed)
     scene = build_scene(load_scenario(scenario))
     shown = record_demonstration(scene, careless, seed, RANGE)
     if shown.demonstration.code != "ok":

@@ -25,7 +25,7 @@ from apo_bench.records.key import row_key
 from apo_bench.records.own_code import left_out, own_code
 from apo_bench.records.replay_command import Files
 from apo_bench.records.salt import Salt
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records.settings import TrialSettings, settings_of
 from apo_bench.report.failures import FailurePicture, Row
 
 _WIDTH, _HEIGHT, _QUALITY = 640, 480, 82
@@ -71,11 +71,15 @@ def _made(
     from apo_bench.scenario.file import scenario_names
     from apo_bench.simulation.scene.render import picture
     from apo_bench.trial.fingerprint import content_hash, spec_hash
+    from apo_bench.trial.scene import scene_key, scene_of
 
     if row["scenario"] not in files and row["scenario"] not in scenario_names():
         raise InputError(f"run.json says no file of the scenario '{row['scenario']}'")
-    spec = replace(spec_of(row, files), salt=salt)
-    scene = _scene(spec, scenes)
+    spec = replace(settings_of(row, files.get(row["scenario"], row["scenario"])), salt=salt)
+    key = scene_key(spec)
+    if key not in scenes:
+        scenes[key] = scene_of(spec)
+    scene = scenes[key]
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
     if spec_hash(spec, content) == row.get("spec_hash"):
@@ -92,27 +96,7 @@ def _made(
     return FailurePicture(row, _jpeg(image), f"where the parts ended, as the row says; {why}, so it was not run again")
 
 
-def spec_of(row: Row, files: Files) -> TrialSettings:
-    """The specification of the trial that a row is of."""
-    return TrialSettings(
-        scenario=files.get(row["scenario"], row["scenario"]),
-        level_mm=row["level"],
-        level_deg=row["level_deg"],
-        careless=row["careless"],
-        clearance_mm=row["clearance_mm"],
-        noise=row["noise"],
-        grasp=row["grasp"],
-        arm=row.get("arm", "six_axis"),
-        method=row["method"],
-        seed=row["seed"],
-        timestep_s=row.get("timestep_s", 0.001),
-        relations=row["relations"],
-        eye=row.get("eye", "noise"),
-        fidelity=row.get("fidelity", "full"),
-    )
-
-
-def _whole_row(folder: Path, row: Row) -> dict[str, Any]:
+def _whole_row(folder: Path, row: Row) -> Mapping[str, Any]:
     """The row as it stands in `trials.jsonl`, with what a report does not keep; empty if it is not found."""
     wanted = (f'"seed": {row["seed"]},'.encode(), json.dumps(row["spec_hash"]).encode())
     path = folder / "trials.jsonl"
@@ -122,22 +106,6 @@ def _whole_row(folder: Path, row: Row) -> dict[str, Any]:
             if row_key(found) == row_key(row):
                 return found
     return {}
-
-
-def _scene(spec: TrialSettings, scenes: dict[tuple[Any, ...], Any]) -> Any:
-    from apo_bench.scenario.file import load_scenario
-    from apo_bench.simulation.scene.scene import build_scene
-
-    key = (spec.scenario, spec.clearance_mm, spec.grasp, spec.arm, spec.timestep_s)
-    if key not in scenes:
-        scenes[key] = build_scene(
-            load_scenario(spec.scenario),
-            clearance_mm=spec.clearance_mm,
-            grasp=spec.grasp,
-            arm=spec.arm,
-            timestep_s=spec.timestep_s,
-        )
-    return scenes[key]
 
 
 def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:

@@ -2,44 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
 from numbers import Real
 from typing import Any, final
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.records.key import Key
-from apo_bench.records.method import checked_method, knows_relations, knows_truth
-from apo_bench.records.relations import checked_relations
+from apo_bench.records.method import knows_relations, knows_truth
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import (
+    LEVEL,
     RANGE,
-    USUAL,
+    SETTINGS,
     TrialSettings,
-    check_careless,
-    check_clearance,
-    check_eye,
-    check_fidelity,
-    check_level,
-    check_seed,
+    check,
+    check_together,
     level_pair,
     refuse_noise,
 )
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
-LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-METHODS = ("oracle", "none", "paper", "contact")
 LARGEST_TRIALS = 1_000_000
 MOST_TRIALS = 1_000_000
 """Of all cells of a sweep together: their specifications are held in memory, half a kilobyte each."""
-AXES = ("scenarios", "levels", "careless", "methods", "clearances_mm", "noises", "relations", "eyes", "grasps")
+AXES = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 """What a sweep has several of."""
-MAY_BE_EMPTY = ("clearances_mm", "noises")
-SHARED = ("arm", "timestep_s", "fidelity")
+MAY_BE_EMPTY = ("clearance_mm", "noise")
+SHARED = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
+BY_RULE = ("scenario", "careless", "clearance_mm", "eye", "noise", "relations", "method")
+PLAIN = tuple(info for info in SETTINGS.values() if info.axis and info.name not in BY_RULE)
+"""Settings that every trial has, the oracle too."""
 
 Level = float | tuple[float, float]
 """Mm and degrees, or the two apart."""
@@ -52,9 +49,9 @@ class SweepSpec:
 
     scenarios: tuple[str, ...]
     """Names, or paths of scenario files."""
-    levels: tuple[Level, ...] = LEVELS
-    careless: tuple[float, ...] = (0.0, 1.0)
-    methods: tuple[str, ...] = METHODS
+    levels: tuple[Level, ...] = LEVEL.swept
+    careless: tuple[float, ...] = SETTINGS["careless"].swept
+    methods: tuple[str, ...] = SETTINGS["method"].swept
     clearances_mm: tuple[float, ...] = ()
     """Empty stands for each scenario's own."""
     trials: int = 100
@@ -62,52 +59,45 @@ class SweepSpec:
     """The first of the seeds."""
     noises: tuple[str, ...] = ()
     """Empty stands for `isotropic`, and for none where no eye draws any."""
-    relations: tuple[str, ...] = ("given",)
-    """What correctors are told of the contacts, as in `TrialSettings`."""
-    eyes: tuple[str, ...] = ("noise",)
-    """As in `TrialSettings`; noise models are those of the eye `noise`."""
-    grasps: tuple[str, ...] = ("friction",)
-    """`friction`, or `weld` for an ideal gripper."""
-    arm: str = "six_axis"
-    timestep_s: float = 0.001
-    fidelity: str = "full"
-    """As in `TrialSettings`; one for all trials, like the arm and the time step."""
+    relations: tuple[str, ...] = (TrialSettings.relations,)
+    eyes: tuple[str, ...] = (TrialSettings.eye,)
+    """Noise models are those of the eye `noise`."""
+    grasps: tuple[str, ...] = (TrialSettings.grasp,)
+    arm: str = TrialSettings.arm
+    timestep_s: float = TrialSettings.timestep_s
+    fidelity: str = TrialSettings.fidelity
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "relations", tuple(map(checked_relations, self.relations)))
-        object.__setattr__(self, "methods", tuple(map(checked_method, self.methods)))
-        for name in AXES:
-            object.__setattr__(self, name, tuple(dict.fromkeys(map(_plain, getattr(self, name)))))
-        for name in AXES:
-            if name not in MAY_BE_EMPTY and not getattr(self, name):
-                raise InputError(f"no {name} were given for the sweep; at least one is needed.")
+        for info in AXES:
+            given = map(_plain, getattr(self, info.axis))
+            values = tuple(dict.fromkeys(map(info.spelled, given) if info.spelled else given))
+            if not values and info.name not in MAY_BE_EMPTY:
+                raise InputError(f"no {info.axis} were given for the sweep; at least one is needed.")
+            object.__setattr__(self, info.axis, values)
         if not 1 <= self.trials <= LARGEST_TRIALS:
             raise InputError(f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.")
-        check_seed(self.seed)
-        check_seed(self.seed + self.trials - 1)
+        check("seed", self.seed)
+        check("seed", self.seed + self.trials - 1)
         for eye in self.eyes:
-            check_eye(eye)
+            check("eye", eye)
         drawn = set(self.eyes) != {RANGE}
         if self.noises and not drawn:
             refuse_noise(*self.noises)
-        object.__setattr__(self, "noises", self.noises or (USUAL,) * drawn)
+        object.__setattr__(self, "noises", self.noises or (TrialSettings.noise,) * drawn)
         for level, eye in product(self.levels, self.eyes):
             if isinstance(level, tuple):
                 level_pair(level, eye)
             else:
-                check_level(level, eye=eye)
-        for careless in self.careless:
-            check_careless(careless)
-        for clearance in self.clearances_mm:
-            check_clearance(clearance)
-        for name in (*self.noises, *self.methods, *self.relations, self.arm):
-            if UNSHOWN.search(name):
-                raise InputError(
-                    f"the name {name!r} was given, which has control characters or half letters; use another one."
-                )
-        for grasp in self.grasps:
-            check_grasp(grasp)
-        check_fidelity(self.fidelity, *self.grasps)
+                check("level_mm", level, eye, "level")
+        several = {name: getattr(self, info.axis) for name, info in SETTINGS.items() if info.axis}
+        for name, values in (several | {name: (getattr(self, name),) for name in SHARED}).items():
+            for value in values:
+                check(name, value)
+                if SETTINGS[name].is_text and name != "scenario" and UNSHOWN.search(value):
+                    raise InputError(
+                        f"the name {value!r} was given, which has control characters or half letters; use another one."
+                    )
+        check_together(self.fidelity, *self.grasps)
 
 
 @final
@@ -170,21 +160,6 @@ def described(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> lis
     return [_described(grid, loaded) for grid in grids]
 
 
-def trial_key(trial: TrialSettings, name: str) -> Key:
-    """The key of a trial whose scenario is called `name`."""
-    t = trial
-    where = (name, t.clearance_mm, t.seed, t.careless, t.level_mm, t.level_deg)
-    return (*where, t.noise, t.relations, t.grasp, t.method)
-
-
-def check_grasp(grasp: str) -> None:
-    """Raise an `InputError` unless there is such a grasp."""
-    from apo_bench.simulation.scene.scene import GRASPS
-
-    if grasp not in GRASPS:
-        raise InputError(unknown("grasp", str(grasp), GRASPS))
-
-
 def _per_seed(grid: SweepSpec) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
     ways = sum(len(_ways(eye, grid.noises)) for eye in grid.eyes)
@@ -192,7 +167,12 @@ def _per_seed(grid: SweepSpec) -> int:
         len(grid.relations) if knows_relations(method) else 1 for method in grid.methods if not knows_truth(method)
     )
     trials = len(grid.careless) * len(grid.levels) * ways * told + sum(map(knows_truth, grid.methods))
-    return len(grid.scenarios) * max(1, len(grid.clearances_mm)) * len(grid.grasps) * trials
+    return (
+        len(grid.scenarios)
+        * max(1, len(grid.clearances_mm))
+        * math.prod(len(getattr(grid, info.axis)) for info in PLAIN)
+        * trials
+    )
 
 
 def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int, salt: Salt | None) -> Iterator[Unit]:
@@ -206,35 +186,26 @@ def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int
 
 
 def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: Salt | None) -> Iterator[TrialSettings]:
+    same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
+    same |= {"scenario": given, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
+
     def trial(
-        method: str, level: Level, careless: float, way: tuple[str, str], relations: str, grasp: str
+        method: str, level: Level, careless: float, way: tuple[str, str], relations: str, plain: Sequence[Any]
     ) -> TrialSettings:
         mm, deg = level_pair(level, way[0])
-        return TrialSettings(
-            scenario=given,
-            level_mm=mm,
-            level_deg=deg,
-            careless=careless,
-            clearance_mm=clearance_mm,
-            noise=way[1],
-            grasp=grasp,
-            arm=grid.arm,
-            method=method,
-            seed=seed,
-            timestep_s=grid.timestep_s,
-            relations=relations,
-            eye=way[0],
-            fidelity=grid.fidelity,
-            salt=salt,
-        )
+        eye, noise = way
+        others: dict[str, Any] = {info.name: value for info, value in zip(PLAIN, plain, strict=True)}
+        others |= {"level_mm": mm, "level_deg": deg, "careless": careless, "eye": eye, "noise": noise}
+        return TrialSettings(**same, **others, relations=relations, method=method)
 
     ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]
-    for method, grasp in product(filter(knows_truth, grid.methods), grid.grasps):
-        yield trial(method, 0.0, 0.0, ways[0], "given", grasp)
-    for grasp, careless, level, way, method in product(grid.grasps, grid.careless, grid.levels, ways, grid.methods):
+    plain = list(product(*(getattr(grid, info.axis) for info in PLAIN)))
+    for method, others in product(filter(knows_truth, grid.methods), plain):
+        yield trial(method, 0.0, 0.0, ways[0], TrialSettings.relations, others)
+    for others, careless, level, way, method in product(plain, grid.careless, grid.levels, ways, grid.methods):
         if not knows_truth(method):
-            for relations in grid.relations if knows_relations(method) else ("given",):
-                yield trial(method, level, careless, way, relations, grasp)
+            for relations in grid.relations if knows_relations(method) else (TrialSettings.relations,):
+                yield trial(method, level, careless, way, relations, others)
 
 
 def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:

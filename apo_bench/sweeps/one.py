@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, final
@@ -19,17 +19,18 @@ from apo_bench.records.method import parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row
 from apo_bench.records.salt import read_salt
-from apo_bench.records.settings import METHOD, RANGE, TrialSettings, check_clearance
+from apo_bench.records.settings import LEVEL, RANGE, TrialSettings, in_python
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
 from apo_bench.simulation.scene.arm import find_arm
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.local.alone import Say, run_alone
 from apo_bench.sweeps.worker import lost, row_of
 from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
-from apo_bench.trial.trial import MEASURED, noise_of, run_measured, scene_of
+from apo_bench.trial.trial import MEASURED, noise_of, run_measured
 
 MEASURED_AIR_M = 5e-3
 """A start that was measured may be wrong by so much: as far apart as `loose_success` lets faces be."""
@@ -38,24 +39,12 @@ MEASURED_AIR_M = 5e-3
 @final
 @dataclass(frozen=True)
 class Request:
-    """One replay; None stands for the default."""
+    """One replay."""
 
     scenario: str
-    level: float | None = None
-    level_mm: float | None = None
-    level_deg: float | None = None
-    careless: float | None = None
-    noise: str | None = None
-    relations: str | None = None
-    eye: str | None = None
-    seed: int | None = None
-    salt_file: Path | None = None
-    method: str = METHOD
-    clearance_mm: float | None = None
-    grasp: str = "friction"
-    arm: str = "six_axis"
-    timestep_s: float = 0.001
-    fidelity: str = "full"
+    asked: Mapping[str, Any] = field(default_factory=dict)
+    """Option as an argument (`level`, `clearance`, `salt_file`, ...) -> value; what is not there or None is as usual.
+    """
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
@@ -118,7 +107,7 @@ def looked_at(
     """What is seen of a trial, or stands in a file, and whether standard deviations had to be assumed.
 
     Args:
-        asked: What only a trial knows: level, seed, noise and so on, as in `Request`; None stands for the default.
+        asked: What only a trial knows: level, seed, noise and so on, as in `Request`.
         deviations: What only a file may need: `deviation_mm` and `deviation_deg`.
 
     Raises:
@@ -127,10 +116,12 @@ def looked_at(
     refused, reason = (deviations, "is for files") if observation is None else (asked, "draws a trial")
     for name, value in refused.items():
         if value is not None:
-            option, where = "--" + name.replace("_", "-"), "without" if observation is None else "together with"
-            raise InputError(f"{option}, which {reason}, was given {where} --observation; leave one of them out.")
+            where = "without" if observation is None else "together with"
+            raise InputError(
+                f"{_option(name)}, which {reason}, was given {where} --observation; leave one of them out."
+            )
     if observation is None:
-        return watched(Request(scenario=scenario, **asked)), False
+        return watched(Request(scenario, asked)), False
     stated = {name: value for name, value in deviations.items() if value is not None}
     seen, _, assumed = read_observation_file(observation, scenario, **stated)
     return seen, assumed
@@ -145,7 +136,7 @@ def watched(request: Request) -> Observation:
     """
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
-    scene = build_scene(scenario, clearance_mm=spec.clearance_mm, grasp=spec.grasp, arm=spec.arm)
+    scene = scene_of(spec, scenario)
     shown = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if shown.demonstration.code != "ok":
         raise RuntimeError(f"{demonstration_failure(shown.demonstration).sentence}; try another seed")
@@ -175,46 +166,38 @@ def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: 
 
 
 def _spec(request: Request, clearance_mm: float) -> TrialSettings:
+    asked = {name: value for name, value in request.asked.items() if value is not None}
     if request.observation:
-        _refuse_contradictions(request)
+        _refuse_contradictions(request, asked)
     for name in ("noise", "level_deg"):
-        if request.eye == RANGE and getattr(request, name) is not None:
+        if asked.get("eye") == RANGE and name in asked:
             raise InputError(
-                f"--{name.replace('_', '-')} was given together with --eye range, which draws no pose noise; "
+                f"{_option(name)} was given together with --eye range, which draws no pose noise; "
                 "--level is the noise of its rays in mm."
             )
-    if request.clearance_mm is not None:
-        check_clearance(request.clearance_mm)
-    level = 1.0 if request.level is None else request.level
-    return TrialSettings(
-        scenario=request.scenario,
-        level_mm=level if request.level_mm is None else request.level_mm,
-        level_deg=level if request.level_deg is None else request.level_deg,
-        careless=1.0 if request.careless is None else request.careless,
-        clearance_mm=clearance_mm if request.clearance_mm is None else request.clearance_mm,
-        noise="isotropic" if request.noise is None else request.noise,
-        grasp=request.grasp,
-        arm=request.arm,
-        method=request.method,
-        seed=0 if request.seed is None else request.seed,
-        timestep_s=request.timestep_s,
-        relations="given" if request.relations is None else request.relations,
-        eye="noise" if request.eye is None else request.eye,
-        fidelity=request.fidelity,
-        salt=None if request.salt_file is None else read_salt(request.salt_file),
-    )
+    usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
+    if "level" in asked:
+        usual |= dict.fromkeys(("level_mm", "level_deg"), asked.pop("level"))
+    if "salt_file" in asked:
+        asked["salt_file"] = read_salt(asked["salt_file"])
+    return TrialSettings(**(usual | in_python(asked)))
 
 
-def _refuse_contradictions(request: Request) -> None:
-    """Nothing is drawn for an observation that comes from a file, but its contacts may be recognised."""
-    drawn = ("level", "level_mm", "level_deg", "careless", "noise", "relations", "eye", "seed", "salt_file")
-    for name in (*drawn, "save_observation"):
-        allowed = name == "relations" and request.relations in ("given", *RECOGNISED)
-        if getattr(request, name) is not None and not allowed:
-            option = "--" + name.replace("_", "-")
-            raise InputError(
-                f"{option} was given together with --observation, which draws nothing; leave one of them out."
-            )
+DRAWN = (LEVEL.name, "level_mm", "level_deg", "careless", "noise", "relations", "eye", "seed", "salt_file")
+"""What has no meaning for an observation that comes from a file, though its contacts may be recognised."""
+
+
+def _refuse_contradictions(request: Request, asked: Mapping[str, Any]) -> None:
+    may_be = asked.get("relations") in ("given", *RECOGNISED)
+    given = [name for name in DRAWN if name in asked and not (name == "relations" and may_be)]
+    for name in (*given, *["save_observation"] * (request.save_observation is not None)):
+        raise InputError(
+            f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
+        )
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
 
 
 def _film(scene: Scene) -> Any:

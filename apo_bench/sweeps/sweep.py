@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from apo_bench.correction.own_code.own import check_correctors
 from apo_bench.errors import InputError, unknown
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
+from apo_bench.records.key import trial_key
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, Limits
 from apo_bench.records.method import parsed
 from apo_bench.records.relations import RECOGNISED
@@ -17,14 +19,14 @@ from apo_bench.records.row import Row
 from apo_bench.records.run_file import run_record
 from apo_bench.records.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
-from apo_bench.records.settings import level_pair
+from apo_bench.records.settings import METHOD, level_pair
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, find_arm
 from apo_bench.simulation.scene.physics import physics
 from apo_bench.sweeps.dispatch import check_limit
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, trial_key, units
+from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, units
 from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.stopping import Check, listening
@@ -134,7 +136,7 @@ def _left(
             if row_hash is None:
                 trials.append(trial)
                 continue
-            cell = (trial.scenario, *(getattr(trial, name) for name in _CELL))
+            cell = replace(trial, method=METHOD, seed=0)
             if cell not in hashes:
                 hashes[cell] = spec_hash(trial, lock.content[trial.scenario])
             if row_hash != hashes[cell]:
@@ -145,9 +147,6 @@ def _left(
         if trials:
             left.append(Unit(tuple(trials)))
     return left
-
-
-_CELL = ("clearance_mm", "careless", "level_mm", "level_deg", "noise", "relations", "grasp", "eye")
 
 
 def _check_spread(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:

@@ -22,17 +22,16 @@ from typing import Any
 from apo_bench.errors import InputError
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
-from apo_bench.records.settings import LARGEST_CARELESS, LARGEST_CLEARANCE_MM, LARGEST_LEVEL, LARGEST_SEED
-from apo_bench.sweeps.grid import LARGEST_TRIALS, SweepSpec
+from apo_bench.records.settings import LEVEL, SETTINGS, in_python
+from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSpec
 
-TEXTS = ("scenarios", "noises", "methods", "grasps", "relations", "eyes")
-NUMBERS = {"levels": LARGEST_LEVEL, "careless": LARGEST_CARELESS, "clearances_mm": LARGEST_CLEARANCE_MM}
-"""And the largest that is allowed; the smallest is 0."""
-COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": (0, LARGEST_SEED)}
-SHARED = ("arm", "timestep_ms", "fidelity")
+SEVERAL = {info.axis: info for info in AXES}
+"""Keys whose values are lists."""
+COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": SETTINGS["seed"].range}
+ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """One for the whole sweep: they stand at the top of the file only."""
 MOST_ENTRIES = 1000
-KEYS = (*TEXTS, *NUMBERS, *COUNTS)
+KEYS = (*SEVERAL, *COUNTS)
 
 
 def is_sweep_file(given: str) -> bool:
@@ -56,7 +55,7 @@ def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
     Raises:
         InputError: Anything in the file that is not as described.
     """
-    top = read_toml(path, "sweep file").fields(("scenarios",), (*KEYS[1:], *SHARED, "also"))
+    top = read_toml(path, "sweep file").fields(("scenarios",), (*KEYS[1:], *ALONE, "also"))
     tables = [entry.fields((), KEYS) for entry in _tables(top["also"])] if "also" in top else []
     first = {key: _value(key, node) for key, node in top.items() if key != "also"}
     further = [first | {key: _value(key, node) for key, node in table.items()} for table in tables]
@@ -73,23 +72,22 @@ def _tables(node: JsonNode) -> Sequence[JsonNode]:
 
 
 def _grid(name: str, said: Mapping[str, Any]) -> SweepSpec:
-    in_mm = {key: value for key, value in said.items() if key != "timestep_ms"}
-    step = {"timestep_s": said["timestep_ms"] * 1e-3} if "timestep_ms" in said else {}
     try:
-        return SweepSpec(**in_mm, **step)
+        return SweepSpec(**in_python(said))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 
 
 def _value(key: str, node: JsonNode) -> Any:
-    if key in TEXTS:
-        return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
-    if key in NUMBERS:
-        read = _level if key == "levels" else partial(JsonNode.number, low=0.0, high=NUMBERS[key])
-        return tuple(read(entry) for entry in _entries(node, key, "numbers"))
     if key in COUNTS:
         return _count(node, *COUNTS[key])
-    return node.number(0.0, above=True) if key == "timestep_ms" else node.text()
+    if key in ALONE:
+        return node.text() if ALONE[key].is_text else node.number(0.0, above=True)
+    if SEVERAL[key].is_text:
+        return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
+    low, high = SEVERAL[key].range
+    read = _level if key == LEVEL.axis else partial(JsonNode.number, low=low, high=high)
+    return tuple(read(entry) for entry in _entries(node, key, "numbers"))
 
 
 def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
@@ -113,7 +111,7 @@ def _few(entries: Sequence[JsonNode], node: JsonNode) -> Sequence[JsonNode]:
 def _level(node: JsonNode) -> float | tuple[float, float]:
     """A number, or a pair of mm and degrees."""
     if not isinstance(node.value, list):
-        return node.number(0.0, LARGEST_LEVEL)
+        return node.number(*LEVEL.range)
     mm, deg = map(float, node.numbers(2))
     return mm, deg
 

@@ -14,7 +14,7 @@ from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.records.checked import unwritable
-from apo_bench.records.key import KEY
+from apo_bench.records.key import KEY, row_key
 from apo_bench.records.method import parsed
 from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import Row
@@ -27,8 +27,9 @@ from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.row import head, result
+from apo_bench.trial.scene import scene_key, scene_of
 from apo_bench.trial.stages import Recording, record_demonstration
-from apo_bench.trial.trial import run_trial, scene_of
+from apo_bench.trial.trial import run_trial
 
 Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
@@ -51,7 +52,7 @@ class Worker:
         lock.check_versions()
         self._number = number
         self._lock = lock
-        self._scenes: dict[tuple[str, float, str], tuple[Scene, str]] = {}
+        self._scenes: dict[tuple[Any, ...], tuple[Scene, str]] = {}
         self._own = OwnCorrectors(lock.corrector_limit_s)
 
     def run(self, unit: Unit, stopped: Callable[[], bool] = lambda: False) -> Iterator[Message]:
@@ -96,7 +97,7 @@ class Worker:
             return partial(_raise, CorrectorMisbehaved(str(error)))
 
     def _scene(self, spec: TrialSettings) -> tuple[Scene, str]:
-        key = (spec.scenario, spec.clearance_mm, spec.grasp)
+        key = scene_key(spec)
         if key not in self._scenes:
             scene = scene_of(spec)
             content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
@@ -168,7 +169,7 @@ def timing(
         worker: The number of the worker, and where it is, if that is not here.
     """
     return {
-        **{key: row[key] for key in KEY},
+        **dict(zip(KEY, row_key(row), strict=True)),
         "compile_s": compile_s,
         "demonstrate_s": demonstrate_s,
         "trial_s": trial_s,

@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from apo_bench.assembly.goals import Correction, Observation, Plan
 from apo_bench.correction.posterior import contains_truth
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit
+from apo_bench.records.row import Row
 from apo_bench.trial.planning import Planned
 from apo_bench.trial.pose_error import goal_errors
 
-UNKNOWN: dict[str, Any] = {
-    "chi_square": None,
-    "chi_square_freedom": None,
-    "p_value": None,
-    "test_passes": None,
-    "suspects": None,
-    "dropped": None,
-    "wrong_relation": None,
-    "inside_95": None,
-    "planned_error_fixed_mm": None,
-    "planned_error_free_mm": None,
-}
-"""Where nothing was corrected or planned; rows that were written before these were known have it too."""
 
-
-def confidence(planned: Planned, seen: Observation, told: Observation, truth: Array | None) -> dict[str, Any]:
+def confidence(planned: Planned, seen: Observation, told: Observation, truth: Array | None) -> Row:
     """The test of the correction, whether the truth lies in its posterior, and how far the plan is from the truth.
 
     Args:
@@ -36,13 +22,14 @@ def confidence(planned: Planned, seen: Observation, told: Observation, truth: Ar
         truth: (n, 4, 4), world frame, [m]; None if it is not known.
     """
     wrong = None if told.assembly is seen.assembly else culprit(seen.assembly, told.assembly)
-    return {"wrong_relation": wrong} | _test(planned.correction) | _truth(planned, told, truth)
+    first: Row = {"wrong_relation": wrong}
+    return first | _test(planned.correction) | _truth(planned, told, truth)
 
 
-def _test(made: Correction | None) -> dict[str, Any]:
+def _test(made: Correction | None) -> Row:
     if made is None:
         return {}
-    dropped = {"dropped": list(made.dropped)}
+    dropped: Row = {"dropped": list(made.dropped)}
     if made.test is None:
         return dropped
     return dropped | {
@@ -54,7 +41,7 @@ def _test(made: Correction | None) -> dict[str, Any]:
     }
 
 
-def _truth(planned: Planned, told: Observation, truth: Array | None) -> dict[str, Any]:
+def _truth(planned: Planned, told: Observation, truth: Array | None) -> Row:
     if truth is None:
         return {}
     made = planned.correction

@@ -10,10 +10,7 @@ The truth, the robot and the judge keep the relations of the scenario.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Any
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact
@@ -21,11 +18,6 @@ from apo_bench.correction.correctors import correct
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.contacts import Recognised, recognise
 from apo_bench.recognition.thresholds import FIXED_RULES
-
-UNCOUNTED: Mapping[str, Any] = MappingProxyType(
-    {"contacts_right": None, "contacts_missed": None, "contacts_false": None}
-)
-"""Of methods that are not told what touches what, and of rows that were written before this was counted."""
 
 
 def recognised(seen: Observation, kind: str = "recognised") -> Recognised:
@@ -41,7 +33,7 @@ def understood(seen: Observation, kind: str) -> Observation:
     return replace(seen, assembly=recognised(seen, kind).assembly)
 
 
-def counted(right: Assembly, told: Assembly) -> dict[str, Any]:
+def counted(right: Assembly, told: Assembly) -> dict[str, int]:
     """How many of the contacts that were told are right, how many were missed, how many are false."""
     there, named = _contacts(right), _contacts(told)
     return {

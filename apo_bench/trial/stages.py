@@ -20,6 +20,7 @@ from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import predict
 from apo_bench.records.outcomes import sentence
+from apo_bench.records.row import Predicted
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE
 from apo_bench.scenario.layout import draw_layout
@@ -96,7 +97,7 @@ def observation_failure(observation: Observation) -> Outcome | None:
     return Outcome("observe", "not_seen", k, sentence("not_seen", operation=k))
 
 
-def predicted_outcome(plan: Plan, scene: Scene) -> dict[str, Any]:
+def predicted_outcome(plan: Plan, scene: Scene) -> Predicted:
     """What the plan says about itself before it is carried out, as it stands in a row: operations from 1, mm."""
     prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
     operation = None if prediction.operation is None else prediction.operation + 1

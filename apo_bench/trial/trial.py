@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,15 +17,15 @@ from apo_bench.records.method import knows_relations, knows_truth, parsed
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row, finite
 from apo_bench.records.settings import RANGE, TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.confidence import confidence
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.planning import Planned, plan
 from apo_bench.trial.pose_error import pose_errors
 from apo_bench.trial.recognised import counted, understood
 from apo_bench.trial.row import head, result
+from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import (
     RELATIONS,
     Attempt,
@@ -41,7 +40,7 @@ from apo_bench.trial.stages import (
     trial_outcome,
 )
 
-MEASURED = MappingProxyType({"level": None, "level_deg": None, "careless": None, "noise": "measured"})
+MEASURED: Row = {"level": None, "level_deg": None, "careless": None, "noise": "measured"}
 """What a row says of a trial that was not drawn."""
 
 
@@ -83,17 +82,6 @@ def run_trial(
     return first | _carry_out(planned, scene, truth, truth, watch, spec, cache) | said | _contacts(spec, seen, given)
 
 
-def scene_of(spec: TrialSettings) -> Scene:
-    """The scene of a trial, compiled."""
-    return build_scene(
-        load_scenario(spec.scenario),
-        clearance_mm=spec.clearance_mm,
-        grasp=spec.grasp,
-        arm=spec.arm,
-        timestep_s=spec.timestep_s,
-    )
-
-
 def noise_of(spec: TrialSettings, scene: Scene, recording: Recording) -> Noise:
     """The noise model of a trial, or the range finder that recorded its demonstration."""
     if spec.eye == RANGE:
@@ -122,7 +110,7 @@ def run_measured(
             "paper."
         )
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    first = head(spec, scene.scenario, spec_hash(spec, content, text)) | {**MEASURED, "demonstration": "ok"}
+    first = head(spec, scene.scenario, spec_hash(spec, content, text)) | MEASURED | {"demonstration": "ok"}
     given = _corrector_input(spec, seen, None)
     planned = plan(method or parsed(spec.method).plan, seen, None, given)
     said = confidence(planned, seen, given, None) | _contacts(spec, seen, given)
@@ -155,7 +143,7 @@ def _corrector_input(spec: TrialSettings, seen: Observation, truth: Array | None
 
 def _contacts(spec: TrialSettings, seen: Observation, given: Observation) -> Row:
     """How many of the contacts that a method was given are right."""
-    return counted(seen.assembly, given.assembly) if knows_relations(spec.method) else {}
+    return cast(Row, counted(seen.assembly, given.assembly)) if knows_relations(spec.method) else {}
 
 
 def _carry_out(
@@ -221,7 +209,7 @@ def _physics(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
     }
 
 
-def _poses(final: Snapshot | None) -> Mapping[str, list[float]] | None:
+def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
     """Part -> [x, y, z in mm, qw, qx, qy, qz], world frame."""
     if final is None:
         return None

@@ -138,18 +138,18 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from inspect import signature
 
     from apo_bench.cli.correction import correct as correct_command
-    from apo_bench.cli.replay_command import replay
+    from apo_bench.cli.setting_options import trial_options
     from apo_bench.cli.show import show
     from apo_bench.correction.correctors import correct
     from apo_bench.envs.corrected import Corrected
     from apo_bench.records.settings import METHOD, TrialSettings
-    from apo_bench.sweeps.grid import METHODS
-    from apo_bench.sweeps.one import Request
+    from apo_bench.sweeps.grid import SweepSpec
 
-    commands = [signature(command).parameters["method"].default for command in (replay, correct_command, show)]
+    commands = [signature(command).parameters["method"].default for command in (correct_command, show)]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
-    assert {*commands, *doors, Request("").method, TrialSettings("").method} == {METHOD}
-    assert METHOD in METHODS
+    assert {*commands, *doors, TrialSettings("").method} == {METHOD}
+    assert METHOD in SweepSpec(("stick_in_tower",)).methods
+    assert f"default: {METHOD}." in trial_options("method")[0].annotation.__metadata__[0].help
 
 
 def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:

@@ -44,7 +44,7 @@ def run(**changed: Any) -> dict[str, Any]:
 
 
 def row(seed: int) -> dict[str, Any]:
-    key = ("block_on_block", 0.25, seed, 1.0, 1.0, 1.0, "isotropic", "given", "friction", "none")
+    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "given", "none", seed)
     ended = {"demonstration": "ok", **result(Outcome("done", "ok", None, "all was done"), success=True)}
     ended |= {"sim_seconds": 20.0, "extra_operations": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
@@ -107,7 +107,7 @@ def test_a_place_where_nothing_can_be_put_back_is_one_sentence(tmp_path: Path) -
 def write(folder: Path, seeds: range, pause_s: float = 0.0) -> None:
     """What a sweep does: the rows that are not there yet."""
     with RunFolder(folder, run()) as store:
-        there = {key[2] for key in store.finished}
+        there = {key[KEY.index("seed")] for key in store.finished}
         for seed in seeds:
             if seed not in there:
                 store.append(row(seed), {"seed": seed, "trial_s": 1.0})

@@ -12,11 +12,11 @@ import pytest
 
 from apo_bench.cli import app as cli
 from apo_bench.records.replay_command import milli, number, replay_command
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records.settings import TrialSettings, settings_of
 from apo_bench.report.failures import sample
 from apo_bench.report.report import report
 from apo_bench.scenario.file import load_scenario
-from apo_bench.show.failure_pictures import failure_pictures, spec_of
+from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.trial import run_trial
 from tests import pages
@@ -85,30 +85,21 @@ def test_a_page_without_graphics_says_so(
 
 def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
     usual = {"eye": "noise", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
-    assert replay_command(row("none", 3, **usual)) == "apo-bench replay stick_in_tower --method none --seed 3"
+    said = "apo-bench replay stick_in_tower --clearance 0.25 --method none --seed 3"
+    assert replay_command(row("none", 3, **usual)) == replay_command(row("none", 3)) == said
     other = row(
         "my mod:it's", 9, level=0.1, level_deg=0.3, careless=0.5, noise="a b.toml", relations="shifted:3", grasp="weld",
         clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "contact", "arm": "mine:arm"}),
     )  # fmt: skip
-    said = shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"}))
-    assert said == [
+    assert shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == [
         *("apo-bench", "replay", "my dir/tower.toml", "--level-mm", "0.1", "--level-deg", "0.3", "--careless", "0.5"),
-        *("--noise", "a b.toml", "--relations", "shifted:3", "--clearance", "0.3", "--grasp", "weld"),
-        *(
-            "--arm",
-            "mine:arm",
-            "--timestep-ms",
-            "0.5",
-            "--fidelity",
-            "contact",
-            "--method",
-            "my mod:it's",
-            "--seed",
-            "9",
-        ),
+        *("--clearance", "0.3", "--noise", "a b.toml", "--grasp", "weld", "--arm", "mine:arm"),
+        *("--relations", "shifted:3", "--method", "my mod:it's", "--timestep-ms", "0.5", "--fidelity", "contact"),
+        *("--seed", "9"),
     ]
     seen = row("contact", 1, level=0.5, level_deg=0.0, noise="range", eye="range")
-    assert replay_command(seen) == "apo-bench replay stick_in_tower --level 0.5 --eye range --method contact --seed 1"
+    shown = "apo-bench replay stick_in_tower --level 0.5 --clearance 0.25 --eye range --method contact --seed 1"
+    assert replay_command(seen) == shown
 
 
 @pytest.mark.parametrize("x", [0.1, 0.25, 1.0, 3.0, 1e-7, 0.30000000000000004, 12345.678])
@@ -118,7 +109,7 @@ def test_numbers_are_read_as_they_were(x: float) -> None:
 
 
 def test_the_specification_of_a_row_is_that_of_its_trial(trials: list[dict[str, Any]]) -> None:
-    assert [spec_of(r, {}) for r in trials] == list(SPECS)
+    assert [settings_of(r, r["scenario"]) for r in trials] == list(SPECS)
 
 
 def test_the_sample_does_not_depend_on_the_order() -> None:

@@ -9,15 +9,13 @@ from typing import Any
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.records.fields import ROW_FIELDS
+from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.run_folder import read_rows
 from apo_bench.report.report import report
 from apo_bench.report.tables.calibration import calibration_lines
 from apo_bench.statistics.calibration import calibrations
-from apo_bench.trial.confidence import UNKNOWN
-from apo_bench.trial.recognised import UNCOUNTED
 from tests import pages
-from tests.statistics.test_rates import row, write
+from tests.statistics.test_rates import UNCOUNTED, UNKNOWN, row, write
 
 
 def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:

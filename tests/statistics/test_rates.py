@@ -21,8 +21,17 @@ from apo_bench.report.tables.confusion import summary
 from apo_bench.statistics.confusion import Confusion, confusions
 from apo_bench.statistics.effort import Effort, efforts
 from apo_bench.statistics.rates import Rate, place_of, tally, wilson
-from apo_bench.trial.confidence import UNKNOWN
 from tests import pages
+
+UNKNOWN = dict.fromkeys(
+    (
+        *("chi_square", "chi_square_freedom", "p_value", "test_passes", "suspects", "dropped", "wrong_relation"),
+        *("inside_95", "planned_error_fixed_mm", "planned_error_free_mm"),
+    )
+)
+"""What a row says where nothing was corrected or planned."""
+UNCOUNTED = dict.fromkeys(("contacts_right", "contacts_missed", "contacts_false"))
+"""What a row says of a method that is told no contacts."""
 
 
 def row(method: str = "none", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:

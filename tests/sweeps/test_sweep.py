@@ -22,7 +22,7 @@ import pytest
 
 from apo_bench.assembly.goals import Outcome
 from apo_bench.errors import InputError
-from apo_bench.records.key import KEY, row_key
+from apo_bench.records.key import KEY, row_key, trial_key
 from apo_bench.records.run_folder import read_rows
 from apo_bench.records.settings import ROW
 from apo_bench.records.short_names import CORRECTORS
@@ -30,7 +30,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps import worker
-from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, trial_key, units
+from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.row import result
 

@@ -8,8 +8,9 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
+from apo_bench.records.key import trial_key
 from apo_bench.resources import folder
-from apo_bench.sweeps.grid import SweepSpec, load_all, trial_key, units
+from apo_bench.sweeps.grid import SweepSpec, load_all, units
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 

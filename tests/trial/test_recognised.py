@@ -17,10 +17,10 @@ from apo_bench.report.figures.recognised import draw_recognitions
 from apo_bench.report.tables.recognised import ALL, NONE, recognition_lines, recognitions, write_recognitions
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.recognised import UNCOUNTED
 from apo_bench.trial.stages import Recording, record_demonstration
 from apo_bench.trial.trial import run_trial
 from tests import pages
+from tests.statistics.test_rates import UNCOUNTED
 
 SEEN = str(Path(__file__).parents[2] / "docs" / "seen.csv")
 SPEC = TrialSettings("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)

@@ -9,11 +9,12 @@ from xml.etree import ElementTree
 
 import mujoco
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import Box
 from apo_bench.parts import read_part
+from apo_bench.records.settings import check
 from apo_bench.records.thresholds import Criteria
 from apo_bench.resources import folder
 from apo_bench.scenario.layout import layout_at
@@ -23,7 +24,6 @@ from apo_bench.simulation.scene.graphics import import_mjcf
 from apo_bench.simulation.scene.physics import Physics, physics
 from apo_bench.simulation.scene.world import World, world
 
-GRASPS = ("friction", "weld")
 _Grasp = Literal["friction", "weld"]
 HANDS = ("hand0", "hand1")
 _HAND_WELD = {"solref": (0.01, 1.0), "solimp": (0.95, 0.99, 0.001, 0.5, 2.0)}
@@ -68,8 +68,7 @@ def build_scene(
     Raises:
         InputError: Unknown grasp or arm, a clearance that a part cannot have, an unchecked time step.
     """
-    if grasp not in GRASPS:
-        raise InputError(unknown("grasp", grasp, GRASPS))
+    check("grasp", grasp)
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     found, settings = find_arm(arm), physics(timestep_s)
     return Scene(

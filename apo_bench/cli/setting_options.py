@@ -1,0 +1,79 @@
+"""Options of the command line for the settings of a trial, made from what is stated with each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from apo_bench.cli.arguments import numbers, path_given, words
+from apo_bench.records.replay_command import milli, number
+from apo_bench.records.setting_info import SettingInfo
+from apo_bench.records.settings import LEVEL, SETTINGS
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+CorrectorLimit = Annotated[
+    float,
+    typer.Option(metavar="SECONDS", help="A corrector given as package.module:name that takes longer has failed."),
+]
+Command = TypeVar("Command", bound=Callable[..., None])
+
+
+def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
+    """Give a command more options, between its plain and its keyword-only arguments; it gets them as `**asked`."""
+
+    def wrap(command: Command) -> Command:
+        own = signature(command, eval_str=True)
+        said = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        first = [p for p in said if p.kind is not Parameter.KEYWORD_ONLY]
+        vars(command)["__signature__"] = own.replace(parameters=[*first, *options, *said[len(first) :]])
+        return command
+
+    return wrap
+
+
+def trial_options(*names: str) -> list[Parameter]:
+    """Options of one trial, none of which need be given: those of these settings, or of all."""
+    infos = {LEVEL.name: LEVEL, **SETTINGS}
+    return [_of_trial(info) for name, info in infos.items() if info.help and (not names or name in names)]
+
+
+def sweep_options() -> list[Parameter]:
+    """Options of a sweep: its axes, and what all of its trials have in common."""
+    axes = {info.axis: info for info in (LEVEL, *SETTINGS.values()) if info.axis and info.help}
+    shared = [info for info in SETTINGS.values() if info.shared]
+    return [*map(_axis, axes.values()), *map(_of_trial, shared)]
+
+
+def axis_option(info: SettingInfo) -> str:
+    """What the option of an axis is called, as an argument."""
+    return (info.axis_option or info.option).replace("-", "_")
+
+
+def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
+    """What was given for an axis: `0,0.5,1` or `none,contact`."""
+    return (words if info.is_text else numbers)(text, f"--{axis_option(info)}")
+
+
+def _of_trial(info: SettingInfo) -> Parameter:
+    said = f"{info.help}; default: {info.usual or _shown(info, info.default)}."
+    if info.name == "salt":
+        return _option(info.keyword, Path, said, parser=path_given, metavar="<path>")
+    return _option(info.keyword, info.kind.__origin__ if hasattr(info.kind, "__origin__") else info.kind, said)
+
+
+def _axis(info: SettingInfo) -> Parameter:
+    usual = ",".join(_shown(info, value) for value in info.swept) or info.usual or _shown(info, info.default)
+    return _option(axis_option(info), str, f"{info.help}; several with commas; default: {usual}.")
+
+
+def _option(name: str, kind: Any, said: str, **more: Any) -> Parameter:
+    annotation = Annotated[kind | None, typer.Option(help=said, **more)]
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+def _shown(info: SettingInfo, value: Any) -> str:
+    return str(value) if info.is_text else number(milli(value) if info.scale != 1.0 else value)

@@ -1,0 +1,89 @@
+"""What is to be known of a setting of a trial besides its name, type and default, said where the setting is stated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import Any, final
+
+from apo_bench.errors import InputError, unknown
+
+
+@final
+@dataclass(frozen=True)
+class SettingInfo:
+    """One setting, as the command line, files and rows know it; a number there, times `scale`, is that in Python."""
+
+    help: str = ""
+    """Of its option, without default and full stop; empty if it has none."""
+    called: str = ""
+    """In words, for complaints; empty if what it may be is checked where it is used."""
+    meaning: str = ""
+    """How a complaint about a number ends."""
+    choices: tuple[str, ...] = ()
+    spelled: Callable[[str], str] | None = None
+    """Checks a name and says how rows spell it."""
+    column: str = ""
+    """Of a row; the setting's own name if empty."""
+    option: str = ""
+    """Of the command line, without dashes; the setting's own name if empty."""
+    scale: float = 1.0
+    usual: str = ""
+    """What help says of the default; the default itself if empty."""
+    key: bool = False
+    """Whether it tells the trials of one sweep apart."""
+    axis: str = ""
+    """Field of `SweepSpec` and key of a sweep file, if a sweep has several of it."""
+    axis_option: str = ""
+    """Of `apo-bench sweep`; that of one trial if empty."""
+    swept: tuple[Any, ...] = ()
+    """What a sweep has where nothing is said; the default alone if empty."""
+    shared: bool = False
+    """Whether a sweep has one for all of its trials."""
+    scene: bool = False
+    """Whether a scene is compiled for it."""
+    name: str = ""
+    kind: Any = None
+    """Its type, with the range that it may have."""
+    default: Any = None
+
+    @property
+    def range(self) -> tuple[Any, Any]:
+        """The smallest and the largest number."""
+        (limits,) = self.kind.__metadata__
+        return limits.ge, limits.le
+
+    @property
+    def keyword(self) -> str:
+        """The option as an argument, or as a key of a file."""
+        return self.option.replace("-", "_")
+
+    @property
+    def is_text(self) -> bool:
+        return getattr(self.kind, "__origin__", self.kind) is str
+
+
+def about(help: str = "", **more: Any) -> Mapping[str, Any]:
+    """The metadata of a field that is a setting; `more` as in `SettingInfo`."""
+    return {"info": SettingInfo(help, **more)}
+
+
+def check_value(info: SettingInfo, value: object) -> None:
+    """Raise an `InputError` unless a setting may be this; nothing is asked of one that is not `called` anything."""
+    if info.choices:
+        if not isinstance(value, str) or value not in info.choices:
+            raise InputError(unknown(info.called, str(value), info.choices))
+    elif info.called and info.kind.__origin__ is int:
+        low, high = info.range
+        if not (isinstance(value, Integral) and low <= int(value) <= high):
+            raise InputError(f"a {info.called} of {value} was given; whole numbers from {low} to {high} are allowed.")
+    elif info.called:
+        low, high = info.range
+        number = float(value) if isinstance(value, Real) else math.nan
+        if not low <= number <= high:
+            given = f"{number:g}" if isinstance(value, Real) else repr(value)
+            raise InputError(
+                f"a {info.called} of {given} was given; a number from {low:g} to {high:g} is allowed, {info.meaning}."
+            )
