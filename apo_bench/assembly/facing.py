@@ -112,7 +112,7 @@ class _Posed(NamedTuple):
     normals: Array
     """(f, 3)."""
     corners: list[Array]
-    """Of each outline, (k, 3), [m]."""
+    """The corners of each outline, (k, 3), [m]."""
 
 
 def _posed(solid: Solid, T: Array) -> _Posed:

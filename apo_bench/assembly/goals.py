@@ -242,7 +242,7 @@ class Correction:
     test: Consistency | None = None
     """Whether the stated noise explains the correction; None of correctors that do not ask."""
     test_after: Consistency | None = None
-    """The same without what was left out; None if nothing was."""
+    """The test without the contacts that were left out; None if none was."""
     covariance: Array | None = None
     """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown.
     Contacts that are walls are not counted, so with walls it is an upper bound."""

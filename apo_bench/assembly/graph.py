@@ -115,7 +115,7 @@ def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) 
 
 
 def observed_residuals(observation: Observation, graph: Graph) -> tuple[float | None, ...]:
-    """The same at what was seen; None for an arc whose equations need an operation that was not."""
+    """The largest |e| of every arc at the observed goals, [m]; None where an operation that it needs was not seen."""
     residuals = arc_residuals(observation.assembly, observation.start, observation.goals, graph)
     known = [all(observation.seen[k] for k in arc.operations) for arc in graph.arcs]
     return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))

@@ -49,7 +49,7 @@ class Gap(NamedTuple):
 
     kind: Kind = "centred"
     low_m: float | None = None
-    """Of `clearance`: the least distance, negative for overlap; None stands for all the play there is."""
+    """The least distance of a `clearance`, negative for overlap; None stands for all the play there is."""
     high_m: float | None = None
 
     def __str__(self) -> str:
@@ -135,7 +135,7 @@ class Assembly:
         return self.gaps.get(contact, Gap()).interval(play_m if self.is_fit(contact) else 0.0)
 
     def intervals(self, play_m: float) -> Array:
-        """Those of all contacts, (c, 2), in the order of `relations()`, [m]."""
+        """The least and the largest distance of every contact, (c, 2), in the order of `relations()`, [m]."""
         return np.array([self.interval(relation.contact, play_m) for relation in self.relations()]).reshape(-1, 2)
 
     def first(self, n: int) -> Assembly:
@@ -150,7 +150,7 @@ class Assembly:
         return tuple(MappingProxyType(dict(now)) for now in self.walk())
 
     def walk(self) -> Iterator[Mapping[str, ODL]]:
-        """The same one after the other; what was yielded changes when the next operation is asked for."""
+        """The ODL of every part after each operation in turn; the mapping changes when the next one is asked for."""
         current: dict[str, ODL] = {}
         for k, operation in enumerate(self.operations):
             before = current.get(operation.main, ())
@@ -208,7 +208,7 @@ def inverted(odl: Iterable[Term]) -> ODL:
 
 
 def simplified(odl: Sequence[Term]) -> ODL:
-    """The same product with neighbours that cancel taken out."""
+    """An ODL without neighbours that cancel, such as T2 T2^-1."""
     out: list[Term] = []
     for term in odl:
         if out and out[-1] == (term.operation, not term.inverse):

@@ -26,7 +26,7 @@ class TouchedContact(NamedTuple):
 def touched_contacts(
     assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses
 ) -> list[TouchedContact]:
-    """Those contacts of which one face moves and the other one rests."""
+    """The contacts between a part that moves and a part that rests."""
     moving, found = set(moves), []
     for contact in contacts:
         rests = [of for of in contact if of.part not in moving]

@@ -13,7 +13,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.rigid import FARTHEST_M, is_rigid
 
 _ASYMMETRY = 1e-9
-"""Of its largest entry, how far a covariance may be from symmetric."""
+"""How far a covariance may be from symmetric, as a part of its largest entry."""
 
 
 def check_observations(observations: Sequence[Any]) -> None:

@@ -52,7 +52,7 @@ def suspects(
 def contact_suspects(
     assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, relation: str
 ) -> tuple[Suspect, ...]:
-    """The same for every contact of one relation, such as `R3`; each is called `R3: stick.py on castle1.spy`."""
+    """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
     arc = assembly.arcs()[int(relation.removeprefix("R")) - 1]
     contacts = assembly.relations()
     return _ranked(assembly, among, measure, [(f"{relation}: {contacts[j].contact}", (j,)) for j in arc if among[j]])

@@ -59,7 +59,7 @@ class ContactCorrector:
         return self.given(observation, None)
 
     def given(self, observation: Observation, found: NearestGoals | None) -> Correction:
-        """The same, if the nearest goals without walls are known already."""
+        """Correct an observation; `found` are its nearest goals without inequalities, if they are known already."""
         if not observation.seen.all():
             return refused_correction(observation)
         asked = problem(observation, self.solver)

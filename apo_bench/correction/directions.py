@@ -59,7 +59,7 @@ class Direction:
 
     @property
     def point(self) -> Array:
-        """Of a turn, the point of its axis that is nearest to the origin of the part, (3,), [m]."""
+        """The point of the axis of a turn that is nearest to the origin of the part, (3,), [m]."""
         return np.cross(self.twist[3:], self.twist[:3])
 
     @property
@@ -97,7 +97,7 @@ def _span(columns: Array) -> Array:
 
 
 def _aligned(basis: Array) -> list[Array]:
-    """Of a space of vectors, (3, d), an orthonormal basis that takes the nearest axis each time, (3,) each."""
+    """An orthonormal basis, (3,) each, of a space of vectors (3, d), the nearest axis first each time."""
     P, found = basis @ basis.T, list[Array]()
     for _ in range(basis.shape[1]):
         i = int(np.argmax(np.diag(P).round(6)))

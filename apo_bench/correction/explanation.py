@@ -30,7 +30,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
 _ZERO = 1e-7
-"""Of an orthonormal basis, components below are rounding."""
+"""Components of an orthonormal basis below this are rounding."""
 
 
 @final
@@ -99,7 +99,7 @@ class Explanation:
     """(n, 4, 4), at which it was asked."""
     operations: tuple[OperationExplanation, ...]
     parts: tuple[PartExplanation, ...]
-    """Those that were moved, in the order in which they were placed."""
+    """The parts that were moved, in the order in which they were placed."""
     rank: int
     freedom: int
     redundant: int
@@ -172,7 +172,7 @@ def _too_many(n: int) -> InputError:
 
 
 def _own(known: Freedom, n: int) -> Iterator[Array]:
-    """Of each operation, (6 n, f_k): its free directions, orthonormal in its own block, with what must go along.
+    """The free directions of each operation, (6 n, f_k), orthonormal in its own block, with what must go along.
 
     One operation after the other is held fast; what goes along is the least, in standard deviations.
     """

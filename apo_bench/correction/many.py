@@ -25,7 +25,7 @@ BATCH = 64
 
 
 def correct_many(observations: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
-    """The same corrections as one after the other, to rounding, some times faster.
+    """Correct many observations of one assembly at once: as one after the other up to rounding, and faster.
 
     Args:
         observations: Observations of one and the same assembly with the same start poses and play.

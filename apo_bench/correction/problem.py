@@ -37,9 +37,9 @@ class Problem:
 
     observation: Observation
     system: Equations
-    """Of every contact, planes shifted to where they are asked to be."""
+    """The equations of every contact, planes shifted to where they are asked to be."""
     compact: CompactEquations
-    """The same, three per contact."""
+    """The equations of `system` in compact form, three per contact."""
     exact: NDArray[np.bool_]
     """(c,): contacts that are equations; the others are walls."""
     inequalities: Inequalities

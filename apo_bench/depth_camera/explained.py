@@ -15,7 +15,7 @@ from apo_bench.geometry.arrays import Array
 
 _CLOSE_M = 0.005
 _DEVIATIONS = 2.5
-"""Of one ray, over a smoothed image in which noise is half of that."""
+"""Standard deviations of one ray; noise in a smoothed image is half of that."""
 _AROUND = 12
 """Pixels around a region that a wrong model may cover."""
 
@@ -23,7 +23,7 @@ _AROUND = 12
 def share_explained(
     shape: Shape, T: Array, views: Sequence[View], images: Array, appeared: Sequence[Mask], noise_m: float
 ) -> float:
-    """Of the pixels that appeared, or that the model at T should cover, the share that agrees with it, 0 to 1.
+    """The share of pixels that agree with a model at T, 0 to 1, of those that appeared or that it should cover.
 
     Args:
         images: (views, height, width), measured distances, smoothed, [m].

@@ -28,7 +28,7 @@ _WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
 """A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
 _WELL_SEEN.flags.writeable = False
 _WIDE_M = 0.012
-"""The same at the beginning of a fit: from there the width is narrowed, so that no end of a part is left behind."""
+"""The width at which a fit begins; it is narrowed from there, so that no end of a part is left behind."""
 _LEAST_EXPLAINED = 0.6
 """A model that explains less was not recognised."""
 ALIKE = 0.03

@@ -21,7 +21,7 @@ class RangeImage(NamedTuple):
     distance: Array
     """Along the ray, [m]; infinite where nothing is."""
     cosine: Array
-    """Of the angle between the ray and the normal of what it strikes, 0 (grazing) to 1."""
+    """The cosine of the angle between the ray and the normal of what it strikes, 0 (grazing) to 1."""
 
 
 @lru_cache(maxsize=4)

@@ -55,7 +55,7 @@ class RangeSensor:
         return [self.finder.sense(image, self.level_m, rng) for image in self.images]
 
     def events(self, demonstration: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
-        """What it makes of measured images, operation by operation."""
+        """What the sensor makes of measured images, operation by operation."""
         return follow_demonstration(
             images,
             self.finder,

@@ -14,7 +14,7 @@ _LEAST_M = 0.010
 """A difference below is no change. Half of the thinnest part: a part that was nudged sideways by 4 mm changes the
 distance to a side that is seen at 60 degrees by 8 mm, which goes unnoticed."""
 _DEVIATIONS = 6.0
-"""So many standard deviations of the smoothed difference are no change either."""
+"""Standard deviations of the smoothed difference that are no change either."""
 _SMOOTHED = 0.46
 """Standard deviation of the median of three medians of three numbers over that of one."""
 _LEAST_PIXELS, _LEAST_WIDTH = 40, 5

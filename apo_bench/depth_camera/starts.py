@@ -39,7 +39,7 @@ def starts(shape: Shape, points: Array, same: Array) -> Array:
 
 
 def distinct(turns: Array, same: Array) -> Array:
-    """Of rotations (k, 3, 3) one of each set that symmetries make alike."""
+    """Rotations without repetition: one, (3, 3), of each set in (k, 3, 3) that symmetries make alike."""
     kept: list[Array] = []
     for R in turns:
         if not any((np.abs(K @ same[:, :3, :3] - R).max(axis=(1, 2)) < 1e-9).any() for K in kept):

@@ -15,7 +15,7 @@ from apo_bench.geometry.arrays import Array, frozen
 @final
 @dataclass(frozen=True, eq=False)
 class View:
-    """Where a camera stands and how it divides its picture into pixels."""
+    """A pinhole camera: its pose, and how it divides its picture into pixels."""
 
     T_world_view: Array
     """(4, 4), [m]; x to the right of the picture, y down, z along the optical axis."""

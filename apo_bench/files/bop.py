@@ -74,7 +74,7 @@ def read_results(path: str | Path) -> PoseRows:
 
 
 def check_rows(rows: PoseRows) -> PoseRows:
-    """The same rows.
+    """The rows, once every pose in them makes sense.
 
     Raises:
         InputError: One is no rotation, the unit is not mm, or a row stands twice.

@@ -92,7 +92,7 @@ def _read_scene(path: Path, scene: int) -> PoseRows:
 
 
 def _entries(root: JsonNode, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:
-    """Of every entry: scene, image and object, R (3, 3), t (3,), and where it stands."""
+    """Every entry: its scene, image and object, R (3, 3), t (3,), and where it stands."""
     if not isinstance(root.value, dict):
         root.fail("an object is needed whose keys are the numbers of images")
     for image, entries in root.value.items():

@@ -121,7 +121,7 @@ def read_json_observation(path: str | Path, scenario: Scenario | None = None) ->
 def read_json_observed(
     path: str | Path, scenario: Scenario | None, assumed: tuple[float, float] | None
 ) -> tuple[Observation, bool]:
-    """The same, and whether a standard deviation had to be assumed.
+    """An observation from its file, and whether a standard deviation had to be assumed.
 
     Args:
         assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.

@@ -38,7 +38,7 @@ def read_observation(
     Args:
         scenario: The scenario it is of, its name, or its file.
         deviation_mm: Standard deviation along each axis where the file states none.
-        deviation_deg: The same about each axis.
+        deviation_deg: Standard deviation about each axis where the file states none.
 
     Raises:
         InputError: Anything that is not as described, with the place where it stands.
@@ -53,7 +53,7 @@ def read_observation_file(
     deviation_mm: float = DEVIATION_MM,
     deviation_deg: float = DEVIATION_DEG,
 ) -> ObservationFile:
-    """The same, with what is known of it."""
+    """An observation from a file, with its scenario, and whether a standard deviation had to be assumed."""
     from apo_bench.files import json_forms as files
     from apo_bench.scenario.file import load_scenario
 
@@ -73,7 +73,7 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
     """An observation from a file that states every standard deviation itself.
 
     Raises:
-        InputError: As `read_observation`, or one is missing.
+        InputError: Anything that is not as described, or a standard deviation is missing.
     """
     if Path(path).suffix.lower() != ".csv":
         from apo_bench.files import json_forms as files

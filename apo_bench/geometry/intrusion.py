@@ -27,7 +27,7 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 
 def intrusion_depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: Array) -> Array:
-    """As `intrusion`, of boxes that keep their orientation at k places; negative where they are apart.
+    """How deep boxes that only shift are in others, at k places, (k,), [m]; negative where they are apart.
 
     Args:
         R_a: (3, 3), the orientation of `a`.

@@ -30,7 +30,7 @@ class Overlap:
     area: float
     """[m^2]."""
     shape: Any = None
-    """The same as a shapely geometry in the frame of the lower face, so that overlaps on one face can be compared."""
+    """The overlap as a shapely geometry in the frame of the lower face, so that overlaps on one face compare."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "corners", frozen(self.corners, None, 3))

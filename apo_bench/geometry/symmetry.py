@@ -71,7 +71,7 @@ def nearest_symmetry(symmetric: Array, off: Array) -> Array:
 
 
 def nearest_symmetric_pose(T: Array, symmetric: Array, expected: Array) -> Array:
-    """Of all poses T g that look the same, (4, 4), the one turned least away from an expected rotation (3, 3)."""
+    """The pose T g, (4, 4), that looks like T and is turned least away from an expected rotation (3, 3)."""
     poses = T @ symmetric
     return np.asarray(poses[np.einsum("nij,ij->n", poses[:, :3, :3], expected).argmax()])
 

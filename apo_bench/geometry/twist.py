@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from apo_bench.geometry.arrays import Array
 
 _TERMS, _SHORT = 24, 9
-"""Of the series in the square of the angle: up to two whole turns, and up to one radian, the rest is rounding."""
+"""Terms of the series in the squared angle: for up to two turns, and for up to one radian, the rest is rounding."""
 
 
 def _generators() -> Array:

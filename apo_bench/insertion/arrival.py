@@ -38,7 +38,7 @@ class Arrival:
     """(4, 4), where the main part then is; directions below are in the frame of the same world."""
     touched: tuple[TouchedContact, ...]
     chain: Chain
-    """Its macros, contacts by their number in `touched`."""
+    """The macros by which the part comes, contacts by their number in `touched`."""
     departs: tuple[Macro, ...]
     """By which the part leaves again, apart from being lifted."""
     line: Attach
@@ -58,7 +58,7 @@ class Arrival:
         return self.chain.macros
 
     def contacts(self, macro: Macro) -> tuple[Contact, ...]:
-        """Those that a macro makes, or opens."""
+        """The contacts that a macro makes, or opens."""
         return tuple(self.touched[i].contact for i in macro.makes)
 
     def own(self, direction: Array) -> Array:
@@ -135,7 +135,7 @@ def turning_state(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
 
 
 def _readable(basis: Array, T: Array) -> Array:
-    """Another basis of the span of (m, 3): axes of the part at T as far as they lie in it, then what is left."""
+    """A basis of the span of (m, 3) that people can read: axes of the part at T that lie in it, then what is left."""
     found: list[Array] = []
     for axis in (*T[:3, :3].T, *basis):
         rest = basis.T @ (basis @ axis)

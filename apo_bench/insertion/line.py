@@ -33,5 +33,5 @@ class Preference(NamedTuple):
     """What of a line of attach is stated; the rest is left to the plan."""
 
     direction: Array | None = None
-    """As in `Attach`."""
+    """The direction of the line, (3,), as in `Attach`; None where it is not stated."""
     travel_m: float | None = None

@@ -14,7 +14,7 @@ class Layer(NamedTuple):
     """The contacts that one motion takes off, by their row numbers."""
 
     cone: Cone
-    """Of all contacts that are left before the motion."""
+    """The cone of all contacts that are left before the motion."""
     breaks: tuple[int, ...]
     keeps: tuple[int, ...]
     """Walls along which the motion goes."""

@@ -17,7 +17,7 @@ class Screw(NamedTuple):
     """The state of a part that may also turn."""
 
     all: State
-    """Of the six degrees of freedom together."""
+    """The state in all six degrees of freedom."""
     translation: State
     rotation: State
     """What is left of `all` when translation is taken out."""

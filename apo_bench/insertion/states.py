@@ -46,7 +46,7 @@ class State(NamedTuple):
 
     @property
     def letter(self) -> str:
-        """Of a state of translation; empty for screws."""
+        """The letter of a state of translation; empty for screws."""
         return STATE_LETTERS.get((self.maintaining, self.detaching, self.constraining), "")
 
     def __str__(self) -> str:

@@ -8,7 +8,7 @@ _OBEYED = "\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
 CONTROL = re.compile(f"[{_OBEYED}]")
 """What a terminal obeys instead of showing it, and what turns the direction of text."""
 UNSHOWN = re.compile(f"[{_OBEYED}\ud800-\udfff]")
-"""The same, and halves of letters, which names of files that are not UTF-8 hold."""
+"""Control characters, and the half letters that stand in names of files which are not UTF-8."""
 
 _LONGEST = 1500
 

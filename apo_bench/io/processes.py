@@ -48,7 +48,7 @@ def flush() -> None:
 
 
 def _children(pid: int) -> list[int]:
-    """As Linux lists them for every thread of a process."""
+    """The processes that a process has started, from what Linux lists for each of its threads."""
     found: list[int] = []
     with suppress(OSError):
         for thread in Path(f"/proc/{pid}/task").iterdir():

@@ -46,7 +46,7 @@ def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES) -> byte
     """What stands in a file.
 
     Raises:
-        InputError: As `opened`, or it is larger than the limit.
+        InputError: It is no ordinary file, cannot be opened, or is larger than the limit.
     """
     with opened(path, kind) as file:
         found = file.read(limit + 1)
@@ -59,7 +59,7 @@ def read_text(path: str | Path, kind: str, limit: int = _LARGEST_BYTES) -> str:
     """The text of a file, without a byte order mark.
 
     Raises:
-        InputError: As `read_bytes`, or it is not UTF-8.
+        InputError: It cannot be read, is larger than the limit, or is not UTF-8.
     """
     return decoded(read_bytes(path, kind, limit), str(path), kind)
 
@@ -68,7 +68,7 @@ def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
     """The lines of a file, numbered from 1; a last one without an end, torn as it was written, is left out.
 
     Raises:
-        InputError: As `opened`, or a line is longer than any that is written.
+        InputError: It is no ordinary file, cannot be opened, or has a line longer than any that is written.
     """
     with opened(path, kind) as file:
         number = 0
@@ -83,7 +83,7 @@ def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
 
 
 def decoded(raw: bytes, file: str, kind: str) -> str:
-    """The same of bytes; `file` is their name in messages."""
+    """The text in bytes, without a byte order mark; `file` is their name in messages."""
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -26,7 +26,7 @@ class CsvRow:
     file: str
     line: int
     cells: Mapping[str, tuple[str, str, float]]
-    """Of each meaning: the column, the text, the unit."""
+    """Meaning -> its column, its text, and its unit."""
 
     def fail(self, meaning: str, wanted: str) -> NoReturn:
         column, text, _ = self.cells[meaning]

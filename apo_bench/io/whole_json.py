@@ -16,7 +16,7 @@ from apo_bench.io.plain_text import clean
 HALF_LETTER = re.compile("[\ud800-\udfff]")
 """Half a letter, such as a lone \\ud800, which no file can hold as UTF-8."""
 HALF_BUT_OF_FILES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
-"""The same but for those that stand for bytes in names of files that are not UTF-8."""
+"""Half letters, but for those that stand for bytes in names of files which are not UTF-8."""
 WHOLE_LETTERS = "text without half letters (a lone \\ud800 to \\udfff) is needed"
 _LONGEST_KEY = 60
 

@@ -60,7 +60,7 @@ def _unlinked(path: str, flags: int) -> int:
 
 
 def _mode(path: Path) -> int | None:
-    """Of what stands there, links not followed; None if nothing does."""
+    """The mode of what stands at a path, links not followed; None if nothing does."""
     try:
         return os.lstat(path).st_mode
     except (FileNotFoundError, NotADirectoryError):

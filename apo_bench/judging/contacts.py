@@ -74,7 +74,7 @@ class ContactJudge(NamedTuple):
 
 
 def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
-    """Of the contacts that are worst: `gap` and `overlap`, each with what is wrong, if there is anything."""
+    """`gap` and `overlap`, each with what is wrong at the worst contact, if there is anything."""
     apart = [c for c in contacts if not c.touching]
     if apart:
         worst = max(apart, key=lambda c: (c.angle_deg > thresholds.loose_angle_deg, c.gap_mm or 0.0))

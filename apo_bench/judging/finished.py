@@ -73,7 +73,7 @@ def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
 
 
 def _contacts(asked: ContactJudge, final: Snapshot, reference: Array, away: frozenset[str]) -> Iterator[ContactVerdict]:
-    """Those that stand at the end, of parts that are no fixtures."""
+    """The contacts that stand at the end, of parts that are no fixtures."""
     assembly = asked.assembly
     true = placements(assembly, final.poses, reference)[-1]
     poses = {part: _nearest_alike(assembly, part, T, true[part]) for part, T in final.poses.items()}
@@ -112,5 +112,5 @@ def _displacements(
 
 
 def _corners(solid: Solid) -> Array:
-    """Of every box, (8 k, 3), in the frame of the solid, [m]."""
+    """The corners of all boxes, (8 k, 3), in the frame of the solid, [m]."""
     return np.concatenate([box.center + _SIGNS * box.half for box in solid.boxes])

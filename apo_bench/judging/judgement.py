@@ -59,7 +59,7 @@ def judgement(
     """Compare what was measured with the thresholds.
 
     Args:
-        contacts: Those that are asked for.
+        contacts: The contacts that are asked for.
         states: The snapshots in which nothing may be inside anything, held or moving.
         pushes: Part, and how far it was pushed [mm].
         all_made: Whether every operation ended and there is a snapshot of the end.

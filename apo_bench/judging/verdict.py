@@ -23,9 +23,9 @@ class Verdict:
 
     meaning: Meaning
     finished: Judgement
-    """Of the end: what a person says who sees the finished assembly."""
+    """The judgement of the end: what a person says who sees the finished assembly."""
     demonstrated: Judgement
-    """Of every contact when it was made, too: what a person says who watched the demonstration."""
+    """The judgement of every contact when it was made, too: what a person says who watched the demonstration."""
 
     @property
     def success(self) -> bool:

@@ -62,7 +62,7 @@ def make_relations(given: Any) -> Relations | None:
 def with_relations(
     observation: Observation, relations: Relations | None, truth: Array, rng: np.random.Generator
 ) -> Observation:
-    """The same observation with wrong relations.
+    """An observation with wrong relations in place of the right ones.
 
     Args:
         truth: (n, 4, 4), the true goals, world frame, [m].
@@ -198,7 +198,7 @@ def _moved(face: Face, name: str, by: Array) -> Face:
 
 
 def _with(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly:
-    """The same assembly where operation k makes these contacts."""
+    """An assembly in which operation k makes these contacts, all else unchanged."""
     operations = list(assembly.operations)
     operations[k] = replace(operations[k], contacts=contacts)
     return replace(assembly, operations=tuple(operations))

@@ -21,7 +21,7 @@ class NumbersRule(NamedTuple):
     spans: tuple[tuple[float, float], ...]
     """The least and the largest value of each."""
     least: int
-    """So many of them at least."""
+    """The least count of numbers."""
     unit: str = ""
 
     def allows(self, text: str) -> bool:

@@ -11,7 +11,7 @@ from apo_bench.geometry.overlap import face_area
 from apo_bench.geometry.solid import Solid
 
 _APART_M = 1e-8
-"""So far may surfaces of the two be from each other; planes of boxes are one within a tenth of it."""
+"""The largest distance between the surfaces of the two; planes of boxes are one within a tenth of it."""
 
 
 def check_solid(solid: Solid, file: str) -> None:

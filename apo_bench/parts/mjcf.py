@@ -43,7 +43,7 @@ class PartFile:
     density: float
     """[kg/m^3]."""
     xml: str
-    """The same as MJCF again: all that a simulator may be told of the part."""
+    """The part as MJCF, written anew: all that a simulator may be told of it."""
 
 
 def read_part(path: Path) -> PartFile:

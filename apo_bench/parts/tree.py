@@ -44,7 +44,7 @@ class _Reader:
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.ProcessingInstructionHandler = self._instruction
         self._open: list[tuple[str, ElementRule, Counter[str]]] = []
-        """Of each element that has begun: its tag, what it may have, and how many elements it had of each tag."""
+        """Every element that has begun: its tag, what it may have, and how many elements it had of each tag."""
         self._classes = 0
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:

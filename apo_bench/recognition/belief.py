@@ -57,7 +57,7 @@ class Belief:
         return PartBeliefs(poses, reach)
 
     def given(self, e: Array, J: Array, noise: Array) -> Belief:
-        """The same after learning that three quantities, now e (3,) with derivative J (3, 6 n), are zero up to noise.
+        """The belief after learning that three quantities, now e (3,) with derivative J (3, 6 n), are zero up to noise.
 
         Args:
             noise: (3, 3), covariance of what the quantities really are.

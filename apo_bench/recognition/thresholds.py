@@ -27,7 +27,7 @@ class Rules:
     gap_m: float = 10e-3
     """No gap beyond this is believed to be noise; with `fixed`, the threshold itself."""
     angle_rad: float = math.radians(20.0)
-    """The same of the angle between a normal and the opposite of the other."""
+    """The largest angle between a normal and the opposite of the other."""
     share: float = 0.15
     """The overlap is at least this part of the smaller face."""
     fixed: bool = False

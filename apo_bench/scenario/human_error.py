@@ -20,7 +20,7 @@ _Displaced = dict[str, Array]
 
 
 class ErrorSpread(NamedTuple):
-    """Where an error goes."""
+    """The error that each operation inherits from a careless one."""
 
     offsets: Array
     """(n, 3): how far each operation puts its main part from its goal, in the frame of that part, [m]."""

@@ -22,7 +22,7 @@ from apo_bench.records.thresholds import Meaning, Thresholds
 @copyable
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """Where the gripper holds the main part, from above."""
+    """A grasp from above: where the gripper holds the main part."""
 
     point: Array
     """Centre between the fingertips, (3,), part frame, [m]."""
@@ -54,7 +54,7 @@ class Shift:
 @final
 @dataclass(frozen=True)
 class Site:
-    """Where the assembly may stand: a rigid planar pose, drawn uniformly per seed."""
+    """The place of the assembly: a rigid planar pose, drawn uniformly per seed."""
 
     center_m: tuple[float, float] = (0.0, 0.0)
     spread_m: tuple[float, float] = (0.0, 0.0)

@@ -29,7 +29,7 @@ class SensorRun:
     """A demonstration, what was measured of it, and what was made of that."""
 
     name: str
-    """Of the scenario."""
+    """The name of the scenario."""
     shown: Recording
     watched: DemonstrationImages
     images: tuple[Array, ...]

@@ -49,7 +49,7 @@ def _one(event: Event | None, run: SensorRun, k: int) -> dict[str, Any]:
 
 
 def eye_lines(form: dict[str, Any]) -> list[str]:
-    """The same to be read."""
+    """A form of `eye_form` as lines to be read."""
     lines = [
         f"{form['scenario']}: seed {form['seed']}, careless {form['careless']:g}, "
         f"{form['level_mm']:g} mm per ray, {len(form['firings_s'])} range images",

@@ -56,7 +56,7 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
 
 
 def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> list[str]:
-    """The same in words."""
+    """A fit in words, line by line."""
     n, found, inlier = len(residuals.where), int(residuals.found.sum()), int(residuals.inlier.sum())
     turned, (mean, error) = inlier - int(residuals.upright.sum()), _bias(residuals)
     turns = _percentiles(residuals.angle_deg[residuals.inlier])[:2]

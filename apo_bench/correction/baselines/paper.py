@@ -25,7 +25,7 @@ def paper(observation: Observation) -> Correction:
 
 
 def at_once(observation: Observation, known: NDArray[np.bool_]) -> Correction:
-    """The same on a graph that holds the `known` contacts, (c,) in the order of `observation.assembly.relations()`.
+    """The correction of the paper on a graph of the `known` contacts, (c,), in the order of `relations()`.
 
     The status says whether those hold; the gaps are those of every contact ever made.
     """

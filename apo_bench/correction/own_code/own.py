@@ -54,7 +54,7 @@ class OwnCorrectors:
         self._servers: dict[str, Server] = {}
         self._found: dict[str, _OwnCorrector] = {}
         self.files: set[str] = set()
-        """Of the modules that were imported, as they say themselves."""
+        """The files of the modules that were imported, as these say themselves."""
 
     def find(self, method: Any) -> Any:
         """What to pass to `correct`: a stand-in for what is named as `module:name`, anything else as it is.
@@ -88,10 +88,10 @@ class OwnCorrectors:
 
 
 def correct_named(observation: Observation, corrector: Any) -> Correction:
-    """As `correct`, but what is named as `module:name` runs in a process of its own.
+    """Correct an observation; a corrector named as `module:name` runs in a process of its own.
 
     Raises:
-        InputError: As `correct`.
+        InputError: There is no such corrector, or the observation makes no sense.
     """
     with OwnCorrectors() as own:
         return correct(observation, own.find(corrector))

@@ -145,7 +145,7 @@ class Server:
         return self._code is not None
 
     def _exit_code(self) -> int | None:
-        """Of the fork that is gone; None if the process of the module is gone too, or does not say."""
+        """The exit code of the fork that is gone; None if the process of the module is gone too, or does not say."""
         deadline, control = time.monotonic() + _NOTICE_S, self._control
         assert control is not None
         try:

@@ -28,7 +28,7 @@ NOTICE = struct.Struct("!Ii")
 """To the process that asks: how many requests there were, and the exit code of the one that ended; first 0, 0."""
 _TURN_S = 0.02
 _DEATH_SIGNAL, _SUBREAPER = 1, 36
-"""Of `prctl`, on Linux."""
+"""Two options of `prctl`, on Linux."""
 _LARGEST_FILE = 1 << 30
 """Bytes; also of a file that standard error goes to, so that endless output does not fill the disk."""
 _LIKELIEST = "1000"
@@ -132,7 +132,7 @@ def _text(error: BaseException) -> str:
 
 
 def _files() -> list[str]:
-    """Of all modules that importing the corrector brought in."""
+    """The files of all modules that importing the corrector brought in."""
     found = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
     return [path for path in found if isinstance(path, str)]
 

@@ -51,7 +51,7 @@ class CompactEquations:
         return len(self.letters)
 
     def only(self, some: NDArray[np.bool_]) -> CompactEquations:
-        """The same for some of the observations, if each has points of its own."""
+        """The equations of some of the observations, if each has points of its own."""
         return self if self.points.ndim == 3 else replace(self, points=self.points[some])
 
     def among(self, contacts: NDArray[np.bool_]) -> CompactEquations:
@@ -159,7 +159,7 @@ class CompactEquations:
 
 
 def compact_equations(system: Equations, n: int) -> CompactEquations:
-    """The same equations, three per contact, in the motion parameters of `n` operations."""
+    """Equations in compact form: three per contact, in the motion parameters of `n` operations."""
     letters = system.letters
     k = letters - len(system.start)
     columns = np.where((k >= 0) & (k < n), k, n)
@@ -180,7 +180,7 @@ def _points(system: Equations) -> Array:
 
 
 def _moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
-    """Of vertices (m, 3), those of one contact next to each other, each contact with some.
+    """Moments of vertices (m, 3); those of one contact stand next to each other, and each contact has some.
 
     They lie in a plane, so the sum S of off off^t, over their ways off the centre, is a a^t + b b^t: two steps of a
     Cholesky factorisation that takes the largest pivot first.

@@ -55,7 +55,7 @@ _RULE = (
 def nearest_goals_compiled(
     system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None
 ) -> NearestGoals:
-    """As `manifold.nearest_goals`, and with the same results but for rounding.
+    """Compiled `manifold.nearest_goals`: equal results but for rounding.
 
     One observation of very many operations is left to sparse matrices there.
 
@@ -90,7 +90,7 @@ def nearest_goals_compiled(
 
 
 def compact_equations_compiled(system: Equations, n: int) -> CompactEquations:
-    """As `compact.compact_equations`.
+    """Compiled `compact.compact_equations`.
 
     Raises:
         InputError: Numba is not installed.
@@ -138,7 +138,7 @@ def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
 
 
 def _own(x: Any, dtype: Any = np.float64) -> NDArray[Any]:
-    """The same, contiguous and such that it could be written: the compiled code knows one kind of array."""
+    """An array made contiguous and writable: the compiled code knows one kind of array."""
     known = x.flags
     if x.dtype == dtype and known.c_contiguous and known.writeable:
         return np.asarray(x)

@@ -22,7 +22,7 @@ from apo_bench.geometry.twist import exp_and_jacobian
 def nearest_goals_sparse(
     system: CompactEquations, observed: Array, L: Array, soft_m: Array | None = None
 ) -> NearestGoals:
-    """As `manifold.nearest_goals`, of goals (n, 4, 4); the Jacobian of the result is a sparse matrix."""
+    """Sparse `manifold.nearest_goals` of one set of goals (n, 4, 4); the Jacobian of the result is sparse, too."""
     n, m = system.n, 3 * len(system)
     where = incidence(system)
     solve = sparse_solver(where)

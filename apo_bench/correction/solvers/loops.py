@@ -53,7 +53,7 @@ def solve_each(
         seen: (b, n, 4, 4).
         L: (b or 1, n, 6, 6).
         soft_m: (3 c,); (0,) demands every equation.
-        series: As in `twist`.
+        series: `geometry.twist.SERIES`.
         out: goals (b, n, 4, 4), z (b, 6 n), e (b, 3 c), Jt (b, 6 n, 3 c), B (b, n, 6, 6), as in `NearestGoals`.
         rest: (b,), overwritten; so is `finite`.
         trace: (TURNS, 2), zeros: the largest |e| and the largest step of each turn.

@@ -55,7 +55,7 @@ class SolverTurn(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class NearestGoals:
-    """Where the solver ended, for each observation."""
+    """The result of the solver, for each observation."""
 
     goals: Array
     """(*, n, 4, 4); the seen ones, if a number was not finite on the way."""
@@ -72,7 +72,7 @@ class NearestGoals:
     finite: NDArray[np.bool_]
     """(*,)."""
     trace: tuple[SolverTurn, ...]
-    """Of the observation that took longest."""
+    """The turns of the observation that took longest."""
 
 
 def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
@@ -194,7 +194,7 @@ def damping(gap2: Array, turn: int) -> Array:
 
 
 def shortened_step(step: Array, L: Array) -> Array:
-    """The same step, shortened for an observation in which a goal would turn further than `LARGEST_TURN`."""
+    """A step, shortened where a goal of an observation would turn further than `LARGEST_TURN`."""
     turned = (L[:, :, 3:] @ step.reshape(*L.shape[:2], 6, 1))[..., 0]
     largest = np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0))
     if (largest <= LARGEST_TURN).all():

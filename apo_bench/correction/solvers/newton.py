@@ -35,7 +35,7 @@ REST_M = 1e-9
 @final
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the solver ended, whatever that is worth."""
+    """The result of the solver, converged or not."""
 
     goals: Array
     """(n, 4, 4); the given ones, if a number was not finite on the way."""

@@ -1,4 +1,4 @@
-"""The same solver for many operations: time and memory grow with the contacts, not with their square.
+"""Sparse matrices for the solver of `manifold`: time and memory grow with the contacts, not with their square.
 
 Two contacts meet in J J^t only where an operation occurs in both. Contacts are numbered so that those that meet are
 near each other (reverse Cuthill-McKee); if all entries then lie in a narrow band, as in a row of castles, a banded
@@ -36,7 +36,7 @@ _Solver = Callable[[Array, Array, Array], Array]
 @final
 @dataclass(frozen=True, eq=False)
 class Incidence:
-    """Where the letters of the words are: i pairs of a contact and an operation that occurs in it."""
+    """The unknown letters of a system: i pairs of a contact and an operation that occurs in it."""
 
     contact: NDArray[np.intp]
     """(i,)."""

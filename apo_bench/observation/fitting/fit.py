@@ -26,7 +26,7 @@ class Figures(NamedTuple):
     observed: Array
     fitted: Array
     distance: float
-    """Of Kolmogorov and Smirnov: the largest difference of the two cumulative distributions."""
+    """Kolmogorov and Smirnov's distance: the largest difference of the two cumulative distributions."""
 
 
 def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:

@@ -39,7 +39,7 @@ def _default_pose() -> Array:
 @final
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Where a camera stands in the world."""
+    """A camera: its pose in the world, and the rays on which it sees parts."""
 
     T_world_camera: Array = field(default_factory=_default_pose)
     """(4, 4), axes of OpenCV, [m]."""

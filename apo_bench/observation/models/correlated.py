@@ -23,7 +23,7 @@ CORRELATION = 0.9
 @final
 @dataclass(frozen=True, eq=False)
 class Correlated:
-    """As `isotropic` in every single operation, but the error follows a first-order autoregression over operations.
+    """Isotropic Gaussian noise whose errors follow a first-order autoregression from operation to operation.
 
     It drifts in the axes of the camera, whatever part is moved, as with a mount that warms up. After any number of
     operations its standard deviation is the level.

@@ -56,7 +56,7 @@ class Sample:
 @final
 @dataclass(frozen=True, eq=False)
 class Empirical:
-    """As `Fitted`, but every error is one that was measured, drawn with its six numbers together, at random.
+    """Noise whose every error is one that was measured of a pose estimator, its six numbers drawn together.
 
     It is taken as it is or with the opposite sign, both alike often, so that it is 0 in the mean: a bias of the
     estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers that are

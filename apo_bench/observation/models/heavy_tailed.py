@@ -22,7 +22,7 @@ FREEDOM = 5.0
 @final
 @dataclass(frozen=True)
 class HeavyTailed:
-    """As `isotropic`, with a multivariate Student t in place of the Gaussian: position and turn are bad together.
+    """Isotropic noise from a multivariate Student t in place of a Gaussian: position and turn are bad together.
 
     It is scaled so that the level is the true standard deviation, which is finite above two degrees of freedom.
     """

@@ -29,7 +29,7 @@ UNSEEN_DEVIATION.flags.writeable = False
 @final
 @dataclass(frozen=True)
 class Outliers:
-    """As `isotropic`, but some errors are many times larger, nobody says which, and some operations are missed.
+    """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
 
     What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
     it is wrong; `inflation` says how much larger the covariance of all errors is. Shares do not depend on the level:

@@ -21,7 +21,7 @@ LEAST, MOST = 0.3, 4.0
 @final
 @dataclass(frozen=True)
 class PerPart:
-    """As `isotropic`, but every part has a factor of its own on the level, in every operation that moves it.
+    """Isotropic noise with one factor per part on the level, in every operation that moves the part.
 
     Factors are log-uniform, and drawn after the unit draws of the twists: at all levels a part has the same factor,
     and its errors are those of `isotropic` times that.

@@ -24,7 +24,7 @@ WORSE, _MANY = 3.0, 3.0
 @final
 @dataclass(frozen=True)
 class Symmetric:
-    """As `isotropic` about the centre of volume, but turns that hardly change how a part looks are less certain.
+    """Isotropic noise about the centre of volume, larger for turns that hardly change how a part looks.
 
     About an axis of fourfold symmetry the second moments of a part are those of a body of revolution, and only its
     edges tell how far it is turned: there the standard deviation is `WORSE` times the level.
@@ -73,7 +73,7 @@ class Symmetric:
         return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 
     def _deviations(self, fold: Array) -> tuple[Array, Array]:
-        """Those that are drawn and those that are stated, (6,) each, about the centre of volume, [m, rad]."""
+        """The standard deviations drawn and those stated, (6,) each, about the centre of volume, [m, rad]."""
         turn = np.radians(self.level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
         place = np.full(3, self.level.mm * 1e-3)
         return np.append(place, turn), np.append(place, np.minimum(turn, np.pi / fold / np.sqrt(3.0)))
@@ -82,7 +82,7 @@ class Symmetric:
 @final
 @dataclass(frozen=True)
 class AnyTurn:
-    """As `symmetric`, but any of the equal poses is reported, each as likely, whatever the level.
+    """Noise of `symmetric` that reports any of the poses that look the same, each as likely, whatever the level.
 
     The covariance is that about the pose of the same look which is nearest to what is reported.
     """

@@ -61,19 +61,19 @@ class Split:
 
     @cached_property
     def variances(self) -> tuple[float, float]:
-        """Of one direction across and of the one along, within the limit."""
+        """The variance in one direction across and in the one along, within the limit."""
         x, w = self._nodes
         left = self._left(x, self.limit)
         across = float(w @ _square_below(self.across, left)) / self.inside / 2.0
         return across, float(w @ (x * x * _below_across(self.across, left))) / self.inside
 
     def cdf_across(self, r: ArrayLike) -> Array:
-        """Of the length of the error across."""
+        """The cumulative distribution of the length of the error across."""
         r, (x, w) = np.asarray(r, dtype=np.float64), self._nodes
         return _below_across(self.across, np.minimum(r[..., None], self._left(x, self.limit))) @ w / self.inside
 
     def cdf_along(self, a: ArrayLike) -> Array:
-        """Of the size of the error along."""
+        """The cumulative distribution of the size of the error along."""
         a = np.minimum(np.asarray(a, dtype=np.float64), self.limit)[..., None]
         top = np.arcsinh(a / self.along.scale)
         x = self.along.scale * np.sinh(top * _X)
@@ -81,7 +81,7 @@ class Split:
         return np.sum(w * _below_across(self.across, self._left(x, self.limit)), axis=-1) / self.inside
 
     def cdf_length(self, r: ArrayLike) -> Array:
-        """Of the length of the whole error."""
+        """The cumulative distribution of the length of the whole error."""
         r = np.minimum(np.asarray(r, dtype=np.float64), self.limit)[..., None]
         top = np.arcsinh(r / self.along.scale)
         x = self.along.scale * np.sinh(top * _X)
@@ -112,7 +112,7 @@ def of_numbers(at: Array, limit: float) -> Split:
 
 
 def log_density_along(tail: Tail, x: Array) -> Array:
-    """Of Student t in one direction."""
+    """The logarithm of the density of Student t in one direction."""
     from scipy.special import gammaln
 
     h, u = tail.heaviness, (x / tail.scale) ** 2
@@ -124,7 +124,7 @@ def log_density_along(tail: Tail, x: Array) -> Array:
 
 
 def log_density_across(tail: Tail, r: Array) -> Array:
-    """Of Student t in two directions, per area, at a distance r."""
+    """The logarithm of the density, per area, of Student t in two directions, at a distance r."""
     h, u = tail.heaviness, (r / tail.scale) ** 2
     falls = u / 2.0 if h == 0.0 else (0.5 / h + 1.0) * np.log1p(h * u)
     return np.asarray(-falls - np.log(2.0 * np.pi * tail.scale**2))

@@ -18,7 +18,7 @@ from apo_bench.geometry.arrays import Array
 
 
 class Passing(NamedTuple):
-    """Where an arc, counted from 0, passes a row."""
+    """The place at which an arc, counted from 0, passes a row."""
 
     arc: int
     row: int
@@ -36,7 +36,7 @@ _SPACE = 0.35
 _LOOSE = 0.01
 """How much an item without neighbours counts."""
 _FEW = 3000
-"""So many orders are all tried; of more, those that differ by the place of one item from the best so far."""
+"""Up to this count every order is tried; else those that differ from the best so far by the place of one item."""
 
 
 class Layers(NamedTuple):

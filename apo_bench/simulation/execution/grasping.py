@@ -165,7 +165,7 @@ def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Seque
 def _clear(
     scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
 ) -> list[Grasp]:
-    """Those at which the open gripper, about to close or having let go, strikes nothing at any place."""
+    """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place."""
     kept = []
     for across, those in groupby(grasps, key=lambda grasp: tuple(grasp.across)):
         same = list(those)

@@ -28,7 +28,7 @@ def motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion,
 
 
 def departure_motions(found: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
-    """The same backwards, for a part that leaves T: off its sides, the last first, then out of what encloses it."""
+    """The macros backwards, for a part that leaves T: off its sides, the last first, then out of what encloses it."""
     out = [macro for macro in found.departs if macro.length_m is not None]
     drawn = [Motion(macro.name, T[:3, :3] @ found.own(macro.direction)) for macro in out]
     return (*(Motion("depart", -side) for side in reversed(sides)), *drawn)

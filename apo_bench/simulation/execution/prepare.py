@@ -35,7 +35,7 @@ _PLACE_WEIGHTS, _INSERT_WEIGHTS, _SLIDE_WEIGHTS = 6.0, 2.5, 0.5
 """Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
 _FINGER_M = 0.01
-"""So far fingers reach below their tip."""
+"""How far fingers reach below their tip."""
 
 
 class Move(NamedTuple):

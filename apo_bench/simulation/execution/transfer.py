@@ -16,7 +16,7 @@ UP = np.array([0.0, 0.0, 1.0])
 SAFE_M = 0.15
 """Least height of the tip at which parts are carried over the others."""
 _HOVER_M = 0.11
-"""So far above a grasp the hand comes to a stand."""
+"""How far above a grasp the hand comes to a stand."""
 ASIDE_M = 0.006
 """A slide begins this far from the side it shall touch; what touches at its side is moved off as far before it is
 lifted, since in the hand it drifts into its neighbour."""
@@ -81,7 +81,7 @@ class Transfer:
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
     weight_n: float
-    """Of the part and what it carries, [N]."""
+    """The weight of the part and what it carries, [N]."""
     place_n: float
     """Guard of a motion onto a support, [N]."""
     insert_n: float

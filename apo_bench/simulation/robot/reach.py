@@ -12,7 +12,7 @@ from apo_bench.simulation.scene.arm import Kinematics
 _KNOT_M, _KNOT_RAD = 0.03, 0.15
 """Inverse kinematics is solved at least this densely along a line."""
 _FAR_M, _FAR_RAD = 0.1, 0.5
-"""So densely where only the joint angles at the end are asked for."""
+"""The spacing of knots where only the joint angles at the end are asked for."""
 
 
 def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Array | None:

@@ -45,7 +45,7 @@ class ShiftArrows:
 
     @property
     def tips(self) -> Array:
-        """Where its name may stand, (2, 3)."""
+        """Where the name of the arrows may stand, (2, 3)."""
         return self.center + np.outer((-1.0, 1.0), (self.outer_m + _NAME_M) * self.axis)
 
 
@@ -71,7 +71,7 @@ class TurnRing:
 
     @property
     def tips(self) -> Array:
-        """Where its name may stand, (1, 3): at the opening, a little outside."""
+        """Where the name of the ring may stand, (1, 3): at the opening, a little outside."""
         return (self.center - (self.radius_m + _NAME_M) * _frame(self)[0])[None]
 
 
@@ -82,7 +82,7 @@ class Marks:
 
     marks: Sequence[ShiftArrows | TurnRing]
     opacity: float = 1.0
-    """Of the parts."""
+    """The opacity of the parts."""
 
     def __call__(self, scene: Any) -> None:
         """Draw into an abstract scene of MuJoCo (`mjvScene`)."""

@@ -49,7 +49,7 @@ def picture_with_arm(
     height: int = 480,
     camera: Camera = "overview",
 ) -> _Image:
-    """The same with the arm, at home with its fingers open, (height, width, 3).
+    """The parts where `poses` says, with the arm at home and its fingers open, (height, width, 3).
 
     Args:
         state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.

@@ -18,7 +18,7 @@ _AWAY_M = -5.0
 
 
 class Strike(NamedTuple):
-    """Where the rays of a view end, one number per ray."""
+    """The ends of the rays of a view, one number per ray."""
 
     distance: Array
     """[m], infinite where nothing is."""

@@ -82,7 +82,7 @@ class DemonstrationCamera:
         return self.camera.brightness(self._sight.strike(self.camera.view), self._rgba)
 
     def _keep(self, until_s: float) -> None:
-        """Of the firings of a quiet spell that is over, the last one before a motion could have begun counts."""
+        """Keep the last firing of a quiet spell from before a motion could have begun."""
         before = [firing for firing in self._spell if firing[0] <= until_s + 1e-9]
         if before:
             self._fire(*before[-1])
