@@ -20,7 +20,7 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
 
     Args:
         across: Percentile -> size of the error across the ray; two or more.
-        along: Level -> quantile of the error along the ray, [m].
+        along: Percentile -> size of the error along the ray.
         limit: No error is longer.
 
     Raises:
