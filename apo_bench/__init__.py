@@ -1,48 +1,73 @@
 """Does a robot's replay of an observed assembly fit, with and without correction by face contacts?
 
-Importing the package registers `APOReplay-v0` with Gymnasium and does nothing else; what needs MuJoCo is imported
-by `gymnasium.make`. Without a simulator: `read_observation`, `recognise`, `correct`, `correct_many` and `explain`.
+Importing the package registers `APOReplay-v0` with Gymnasium and does nothing else: what is exported is imported when
+it is first asked for. `demonstrate`, `replay`, `run_trial`, `run_sweep` and pictures need MuJoCo; the rest does not.
+Static types are those of `__init__.pyi`.
 """
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from types import MappingProxyType
 from typing import Any
 
 import gymnasium
 
+from apo_bench.moved import MovedModules
+
 __version__ = "0.1.0"
-__all__ = [
-    "ContactCorrector",
-    "Corrected",
-    "__version__",
-    "correct",
-    "correct_many",
-    "explain",
-    "load_scenario",
-    "read_observation",
-    "recognise",
-]
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
+sys.meta_path.append(MovedModules())
 
-_LATER = MappingProxyType(
+_EXPORTS = MappingProxyType(
     {
+        "Assembly": "apo_bench.assembly.topology",
         "ContactCorrector": "apo_bench.correction.contact",
         "Corrected": "apo_bench.envs.corrected",
+        "Correction": "apo_bench.assembly.goals",
+        "Criteria": "apo_bench.records.thresholds",
+        "Demonstration": "apo_bench.assembly.goals",
+        "Film": "apo_bench.simulation.scene.render",
+        "InputError": "apo_bench.errors",
+        "Layout": "apo_bench.assembly.goals",
+        "Observation": "apo_bench.assembly.goals",
+        "Plan": "apo_bench.assembly.goals",
+        "ReplayResult": "apo_bench.assembly.goals",
+        "Scenario": "apo_bench.scenario.scenario",
+        "Scene": "apo_bench.simulation.scene.scene",
+        "SweepSpec": "apo_bench.sweeps.grid",
+        "TrialSettings": "apo_bench.records.settings",
+        "Verdict": "apo_bench.judging.verdict",
+        "build_scene": "apo_bench.simulation.scene.scene",
         "correct": "apo_bench.correction.correctors",
         "correct_many": "apo_bench.correction.many",
+        "demonstrate": "apo_bench.simulation.human.demonstration",
+        "draw_layout": "apo_bench.scenario.layout",
         "explain": "apo_bench.correction.explanation",
+        "judge": "apo_bench.judging.verdict",
         "load_scenario": "apo_bench.scenario.file",
+        "observe": "apo_bench.observation.observing",
+        "picture": "apo_bench.simulation.scene.render",
         "read_observation": "apo_bench.files.observation",
         "recognise": "apo_bench.recognition.contacts",
+        "replay": "apo_bench.simulation.execution.controller",
+        "run_sweep": "apo_bench.sweeps.sweep",
+        "run_trial": "apo_bench.trial.trial",
     }
 )
+"""Name -> the module that it is imported from when it is first asked for."""
+
+__all__ = ("__version__", *_EXPORTS)
 
 
 def __getattr__(name: str) -> Any:
     """What is exported, imported when it is first asked for."""
-    if name in _LATER:
-        return getattr(import_module(_LATER[name]), name)
+    if name in _EXPORTS:
+        return getattr(import_module(_EXPORTS[name]), name)
     raise AttributeError(f"module 'apo_bench' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_EXPORTS})

@@ -7,7 +7,7 @@ from pathlib import Path
 from apo_bench.assembly.graph import relation_graph
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.show.card import cards
-from apo_bench.show.graph.picture import draw_graph
+from apo_bench.show.graph.drawing import draw_graph
 from apo_bench.show.graph.text import graph_title
 
 HERE = Path(__file__).parent

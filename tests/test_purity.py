@@ -65,6 +65,7 @@ HEAVY = (
     "glfw",
     "OpenGL",
     "msgspec",
+    "pandas",
 )
 
 
@@ -81,3 +82,13 @@ def test_the_heart_needs_neither_trimesh_nor_matplotlib() -> None:
     )
     done = python(f"import sys, {rooms}; print([name for name in {unwanted!r} if name in sys.modules])")
     assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
+
+
+def test_the_help_of_the_command_line_is_light() -> None:
+    done = python(
+        "import contextlib, io, sys\n"
+        "from apo_bench.cli.app import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()) as said: code = main(['--help'])\n"
+        f"print(code, 'sweep' in said.getvalue(), [name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "0 True []\n", "")

@@ -126,7 +126,7 @@ def graph(
     from apo_bench.assembly.graph import observed_residuals, relation_graph
     from apo_bench.files.observation import read_observation
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.graph.picture import draw_graph
+    from apo_bench.show.graph.drawing import draw_graph
     from apo_bench.show.graph.text import graph_form, graph_lines, graph_title
 
     if out is not None:

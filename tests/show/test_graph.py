@@ -10,9 +10,9 @@ import pytest
 
 from apo_bench.assembly.graph import Graph, relation_graph
 from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.show.graph.drawing import draw_graph
 from apo_bench.show.graph.layers import Links, arrange_layers, links_of
 from apo_bench.show.graph.layout import Rectangle, arrange, shared_area
-from apo_bench.show.graph.picture import draw_graph
 from tests import scenes
 
 CASES = [(name, step) for name in scenes.ALL for step in range(1, len(scenes.ALL[name]().assembly) + 1)]

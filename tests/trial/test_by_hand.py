@@ -1,0 +1,47 @@
+"""The river by hand: the exported verbs, one after the other, are the trial of the same seed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import apo_bench
+
+SETTINGS = apo_bench.TrialSettings("stick_in_tower", level_mm=2.0, level_deg=2.0, seed=7)
+
+
+def test_the_verbs_by_hand_give_the_row_of_the_trial(tower: apo_bench.Scene) -> None:
+    layout_rng, human_rng, noise_rng = (np.random.default_rng([SETTINGS.seed, stage]) for stage in range(3))
+    layout = apo_bench.draw_layout(tower.scenario, layout_rng)
+    demonstration = apo_bench.demonstrate(tower, layout, SETTINGS.careless, human_rng)
+    observation = apo_bench.observe(demonstration, "isotropic", noise_rng, level=2.0)
+    correction = apo_bench.correct(observation)
+    result = apo_bench.replay(correction.plan(observation), tower)
+    verdict = apo_bench.judge(observation.assembly, result.reached, layout.goals, tower.criteria)
+    row = apo_bench.run_trial(SETTINGS, tower)
+    found = verdict.rests_on
+    assert verdict.success
+    assert (verdict.success, verdict.as_demonstrated) == (row["success"], row["as_demonstrated"])
+    assert (found.gap_mm, found.angle_deg, found.overlap) == (
+        row["worst_gap_mm"],
+        row["worst_angle_deg"],
+        row["least_overlap"],
+    )
+    assert (result.sim_seconds, result.peak_force_n) == (row["sim_seconds"], row["peak_force_n"])
+    assert 1e3 * correction.gap_after_m == row["gap_after_mm"]
+
+
+def test_what_was_observed_is_replayed_as_it_is_unless_an_operation_was_not_seen(tower: apo_bench.Scene) -> None:
+    scenario = tower.scenario
+    seen = apo_bench.Observation(
+        scenario.assembly, scenario.start, scenario.goals, np.tile(1e-6 * np.eye(6), (3, 1, 1)), np.ones(3, dtype=bool)
+    )
+    np.testing.assert_array_equal(seen.plan().goals, scenario.goals)
+    missed = apo_bench.Observation(
+        seen.assembly, seen.start, seen.goals, seen.covariance, np.array([True, False, True])
+    )
+    with pytest.raises(apo_bench.InputError, match="operation 2 was not seen"):
+        missed.plan()
+    refused = apo_bench.correct(missed)
+    with pytest.raises(apo_bench.InputError, match=r"ended as not_seen .* which no robot should carry out"):
+        refused.plan(missed)
