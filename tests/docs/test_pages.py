@@ -1,0 +1,137 @@
+"""What README and documentation tell a person to type works: all commands are parsed, quick ones and all Python run.
+
+Each page is a session in an empty folder, from top to bottom. A block with a title is a file of that name. What stands
+on several pages runs on the first of them.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import typer
+
+from apo_bench.cli.app import app, main
+from apo_bench.parts.load import load_part
+
+ROOT = Path(__file__).parents[2]
+SWEEP = ROOT / "tests" / "kept" / "row5"
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(
+    r"^```(?P<language>\w+)(?: title=\"(?P<title>[^\"]+)\")?\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+)
+PARSED_ONLY: Mapping[str, str] = {
+    r"sweep ": "minutes: many trials; tests/cli and tests/sweeps run small ones",
+    r"report runs/mine$": "draws pictures of failures, which replays them; the one with --pictures 0 runs",
+    r"noise fit ": "needs the results of a pose estimator; tests/observation/test_fit.py runs it",
+    r"replay .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
+    r"replay .*--noise megapose-lmo ": "a replay of seconds; tests/observation/test_measured_noise.py runs the model",
+    r"replay .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
+    r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
+    r"eye ": "many depth images; tests/depth_camera runs them",
+    r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",
+    r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",
+}
+"""Commands that are not run, by how they begin, and why."""
+
+
+class Block(NamedTuple):
+    """What stands between two fences."""
+
+    language: str
+    title: str | None
+    text: str
+
+
+class Line(NamedTuple):
+    """A command, as a shell would split it."""
+
+    page: Path
+    words: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.page.relative_to(ROOT)}: {' '.join(self.words)}"
+
+
+def blocks(page: Path) -> list[Block]:
+    return [Block(**found.groupdict()) for found in BLOCK.finditer(page.read_text(encoding="utf-8"))]
+
+
+def commands(page: Path, block: Block) -> Iterator[Line]:
+    """The lines of a shell block that call the program."""
+    for line in block.text.replace("\\\n", " ").splitlines() if block.language == "sh" else ():
+        words = shlex.split(line, comments=True)
+        if words[:1] == ["apo-bench"]:
+            yield Line(page, tuple(words[1:]))
+
+
+LINES = [line for page in PAGES for block in blocks(page) for line in commands(page, block)]
+
+
+def why_not(line: Line) -> str | None:
+    """Why a command is only parsed."""
+    return next((why for how, why in PARSED_ONLY.items() if re.match(how, " ".join(line.words))), None)
+
+
+@pytest.mark.parametrize("line", LINES, ids=str)
+def test_the_command_line_takes_every_command_of_the_pages(line: Line) -> None:
+    command, words = typer.main.get_command(app), list(line.words)
+    while hasattr(command, "commands"):
+        command = command.commands[words.pop(0)]
+    command.make_context("apo-bench", words)
+
+
+def test_an_option_that_is_not_there_would_be_noticed() -> None:
+    with pytest.raises(Exception, match="--nothing"):
+        test_the_command_line_takes_every_command_of_the_pages(Line(PAGES[0], ("scenarios", "--nothing")))
+
+
+def test_each_reason_not_to_run_a_command_is_of_a_command() -> None:
+    assert [how for how in PARSED_ONLY if not any(re.match(how, " ".join(line.words)) for line in LINES)] == []
+
+
+def sessions() -> Iterator[tuple[Path, list[Block | Line]]]:
+    """What is run of each page, in its order."""
+    before: set[object] = set()
+    for page in PAGES:
+        todo: list[Block | Line] = []
+        for block in blocks(page):
+            todo += [block] if block.title or (block.language == "python" and block not in before) else []
+            todo += [c for c in commands(page, block) if why_not(c) is None and c.words not in before]
+            before |= {block, *(line.words for line in commands(page, block))}
+        if todo:
+            yield page, todo
+
+
+SESSIONS = dict(sessions())
+
+
+@pytest.mark.parametrize("page", SESSIONS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_what_a_page_says_works_from_top_to_bottom(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    (tmp_path / "docs").mkdir()
+    shutil.copy(ROOT / "docs" / "seen.csv", tmp_path / "docs")
+    if page.name == "report.md":
+        for sweep in ("mine", "other"):
+            shutil.copytree(SWEEP, tmp_path / "runs" / sweep)
+    known, names = set(sys.modules), {"__name__": "__main__"}
+    for each in SESSIONS[page]:
+        if isinstance(each, Line):
+            assert main(list(each.words)) == 0, f"{each}: {capsys.readouterr().err}"
+        elif each.title is None:
+            exec(compile(each.text, str(page), "exec"), names)
+        else:
+            Path(each.title).write_text(each.text, encoding="utf-8")
+            assert not each.title.endswith(".xml") or load_part(Path(each.title)).faces
+    for name in set(sys.modules) - known:
+        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
+            del sys.modules[name]
