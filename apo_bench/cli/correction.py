@@ -8,7 +8,8 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from apo_bench.assembly.goals import Correction, Observation, Plan
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation, Plan
 from apo_bench.cli.arguments import check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError

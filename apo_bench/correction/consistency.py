@@ -15,7 +15,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Consistency, Suspect
+from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations

@@ -11,7 +11,8 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Consistency, Correction, Iterate, Observation, Suspect
+from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.consistency import LEVEL
 from apo_bench.correction.ending import refused_correction, status_sentence
 from apo_bench.correction.posterior import freedom, jacobian_rank, marginals

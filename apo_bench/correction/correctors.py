@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.own_code.returned import RIGID, check_correction, check_near

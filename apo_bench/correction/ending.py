@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.solvers.newton import Solution
 from apo_bench.records import outcomes
 

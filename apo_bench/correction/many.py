@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import Equations, equations, lies_on
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact

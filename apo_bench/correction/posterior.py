@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpstrf
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.solvers import sparse
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.manifold import NearestGoals

@@ -9,8 +9,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.equations import Equations, equations, largest
-from apo_bench.assembly.goals import Consistency, Observation, Suspect
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.consistency import (
     LEVEL,
     SOFT_M,

@@ -12,7 +12,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Observation, Outcome, Plan, Poses, Step
+from apo_bench.assembly.goals import Observation, Plan, Poses, Step
+from apo_bench.assembly.reached import Outcome
 from apo_bench.assembly.topology import Assembly
 from apo_bench.envs.episode import Scenes, Settings, with_options
 from apo_bench.envs.nullable import predicted_info, whole

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from apo_bench.assembly.goals import Reached, Snapshot
 from apo_bench.assembly.placement import placements
+from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly, Contact, Relation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Snapshot
+from apo_bench.assembly.reached import Snapshot
 from apo_bench.judging.contacts import ContactVerdict, faults_in_words
 from apo_bench.records.thresholds import Thresholds
 

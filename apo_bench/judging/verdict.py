@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Reached, Snapshot
+from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.demonstrated import judge_demonstrated

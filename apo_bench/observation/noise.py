@@ -26,11 +26,11 @@ NOISES = MappingProxyType(
         "isotropic": "apo_bench.observation.models.isotropic:Isotropic",
         "anisotropic": "apo_bench.observation.models.anisotropic:Anisotropic",
         "per-part": "apo_bench.observation.models.per_part:PerPart",
-        "camera": "apo_bench.observation.models.sighted:Sighted",
+        "camera": "apo_bench.observation.models.anisotropic:Sighted",
         "heavy-tailed": "apo_bench.observation.models.heavy_tailed:HeavyTailed",
         "outliers": "apo_bench.observation.models.outliers:Outliers",
         "bias": "apo_bench.observation.models.bias:Bias",
-        "bias-view": "apo_bench.observation.models.bias_view:BiasView",
+        "bias-view": "apo_bench.observation.models.bias:BiasView",
         "correlated": "apo_bench.observation.models.correlated:Correlated",
         "symmetric": "apo_bench.observation.models.symmetric:Symmetric",
     }

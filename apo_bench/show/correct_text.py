@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Consistency, Correction, Observation
+from apo_bench.assembly.correction_record import Consistency, Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.explanation import Explanation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -14,7 +14,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.names import resolve
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.facts import Facts
+from apo_bench.observation.models.level import Facts
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.observation.noise_file import noise_of_file, presets, read_noise
 from apo_bench.observation.observing import observe

@@ -17,7 +17,8 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from apo_bench.assembly.goals import Correction, Observation, Plan
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation, Plan
 from apo_bench.correction.posterior import contains_truth
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit

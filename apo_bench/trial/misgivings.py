@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from apo_bench.assembly.goals import Correction, Plan
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Plan
 from apo_bench.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Poses, Reached
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.reached import Reached
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.solvers.newton import LENGTH_M
 from apo_bench.geometry import pose

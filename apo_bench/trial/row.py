@@ -6,7 +6,7 @@ from dataclasses import asdict
 from itertools import dropwhile
 from typing import cast
 
-from apo_bench.assembly.goals import Outcome
+from apo_bench.assembly.reached import Outcome
 from apo_bench.io.plain_text import clean
 from apo_bench.records.row import LONGEST_SENTENCE, ROW_FIELDS, Row
 from apo_bench.records.settings import ENV_ID, ROW, TrialSettings, asked

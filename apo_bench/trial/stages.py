@@ -11,7 +11,8 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
+from apo_bench.assembly.goals import Demonstration, Layout, Observation, Plan
+from apo_bench.assembly.reached import Outcome, ReplayResult
 from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -7,7 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Plan, Snapshot
+from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.assembly.reached import Snapshot
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

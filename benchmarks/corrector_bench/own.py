@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.geometry.arrays import Array

@@ -9,7 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench.assembly.correction_record import Consistency, Correction
 from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Consistency, Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.cli import app as cli
 from apo_bench.files.json_forms import observation_form, read_plan, write_form
 from apo_bench.files.observation import read_observation

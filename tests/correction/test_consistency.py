@@ -10,7 +10,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest
 
-from apo_bench.assembly.goals import Consistency, Correction, Observation
+from apo_bench.assembly.correction_record import Consistency, Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.correction.consistency import MOST_SUSPECTS, p_value
 from apo_bench.correction.contact import ContactCorrector

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, lies_on
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.many import BATCH, compact_many, correct_many

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Correction, Layout, Observation
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Layout, Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved, correct
 from apo_bench.correction.own_code import own
 from apo_bench.correction.own_code import process as own_process

@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from apo_bench.assembly.correction_record import Correction, Try
 from apo_bench.assembly.equations import Equations, equations, largest_gap
-from apo_bench.assembly.goals import Correction, Observation, Step, Try
+from apo_bench.assembly.goals import Observation, Step
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.correctors import correct

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Correction, Observation, once_each
+from apo_bench.assembly.goals import Observation, once_each
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import nested, paper_track, reached_back
 from apo_bench.correction.correctors import correct

@@ -14,7 +14,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import apo_bench
-from apo_bench.assembly.goals import Correction, Observation, Outcome, Step
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation, Step
+from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.correctors import correct
 from apo_bench.envs import apo_replay as envs
 from apo_bench.envs.apo_replay import APOReplay

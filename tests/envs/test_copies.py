@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.goals import Observation
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError

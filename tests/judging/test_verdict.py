@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.goals import Reached
 from apo_bench.assembly.placement import placements
+from apo_bench.assembly.reached import Reached
 from apo_bench.geometry import pose
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import FAULTS

@@ -13,14 +13,12 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
-from apo_bench.observation.models.anisotropic import line_of_sight
-from apo_bench.observation.models.bias import Bias
-from apo_bench.observation.models.bias_view import BiasView
+from apo_bench.observation.models.anisotropic import Sighted, line_of_sight
+from apo_bench.observation.models.bias import Bias, BiasView
 from apo_bench.observation.models.camera import DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
 from apo_bench.observation.models.correlated import CORRELATION, Correlated
 from apo_bench.observation.models.heavy_tailed import FREEDOM, HeavyTailed
 from apo_bench.observation.models.outliers import MISSES, OUTLIERS, TIMES, UNSEEN_DEVIATION, Outliers, last_seen
-from apo_bench.observation.models.sighted import Sighted
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
 from apo_bench.observation.observing import observe

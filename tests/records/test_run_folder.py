@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench.assembly.goals import Outcome
+from apo_bench.assembly.reached import Outcome
 from apo_bench.errors import InputError
 from apo_bench.records import run_folder
 from apo_bench.records.key import KEY

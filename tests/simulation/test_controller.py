@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Demonstration, Layout, Plan, ReplayResult, Step
+from apo_bench.assembly.goals import Demonstration, Layout, Plan, Step
+from apo_bench.assembly.reached import ReplayResult
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.verdict import Verdict, judge

@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench.assembly.goals import Outcome
+from apo_bench.assembly.reached import Outcome
 from apo_bench.errors import InputError
 from apo_bench.records.key import KEY, row_key, trial_key
 from apo_bench.records.run_folder import read_rows

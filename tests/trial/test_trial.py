@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Consistency, Correction, Observation, Step, Suspect, Try
+from apo_bench.assembly.correction_record import Consistency, Correction, Suspect, Try
+from apo_bench.assembly.goals import Observation, Step
 from apo_bench.assembly.graph import relation_graph
 from apo_bench.cli.terminal import print_row
 from apo_bench.correction.correctors import correct

@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Correction, Observation, Poses
+from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import PartFace, Relation
 from apo_bench.correction.baselines.measured import as_it_ends

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.errors import InputError

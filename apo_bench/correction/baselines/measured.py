@@ -6,8 +6,9 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.ending import refused_correction, status_sentence
 from apo_bench.correction.solvers.inequalities import demanded, violation
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, least_step

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.correction.baselines.candidates import candidates

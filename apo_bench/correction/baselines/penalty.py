@@ -18,8 +18,9 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Correction, Observation
+from apo_bench.assembly.goals import Observation
 from apo_bench.correction.baselines.intruding import Meeting, intruding, meeting
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import Whitened, whitened

@@ -14,8 +14,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly.correction_record import Correction, Iterate, Try
 from apo_bench.assembly.equations import Equations, equations, largest
-from apo_bench.assembly.goals import Correction, Iterate, Observation, Step, Try
+from apo_bench.assembly.goals import Observation, Step
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.ending import refused_correction, solver_status, status_sentence

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Consistency, Correction, Iterate, Observation, Step, Suspect, Try
+from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect, Try
+from apo_bench.assembly.goals import Observation, Step
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.correction.own_code.message import Arrays, GarbledMessage, Message, MessageForm
 from apo_bench.geometry.solid import Box, Face, Solid

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Consistency, Correction, Step, Try
+from apo_bench.assembly.correction_record import Consistency, Correction, Try
+from apo_bench.assembly.goals import Step
 from apo_bench.assembly.schedule import REMEDY, schedule_fault
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError

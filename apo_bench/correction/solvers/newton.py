@@ -19,8 +19,8 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.assembly.correction_record import Iterate
 from apo_bench.assembly.equations import Equations, largest
-from apo_bench.assembly.goals import Iterate
 from apo_bench.geometry.arrays import Array
 
 LENGTH_M = 0.04

@@ -12,9 +12,8 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 CORRELATION = 0.9
 """Between the errors of an operation and the next."""
@@ -47,7 +46,7 @@ class Correlated:
             raise InputError(f"a correlation of {self.correlation:g} was given; give a number from 0 to 1.")
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        sigma = self.level.sigma()
         unit = rng.standard_normal((len(assembly), 6))
         for k in range(1, len(unit)):
             unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]

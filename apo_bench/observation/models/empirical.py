@@ -16,9 +16,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.io.strict_csv import CsvRow, read_csv
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.residuals import Residuals
 
 _KINDS = _INLIER, _TURNED, _OUTLIER, _MISSED = "inlier", "turned", "outlier", "missed"

@@ -14,9 +14,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
 

@@ -11,9 +11,8 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 FREEDOM = 5.0
 """Degrees of freedom: an excess kurtosis of 6, where public pose estimates on T-LESS have 5.6 along the ray."""
@@ -46,7 +45,7 @@ class HeavyTailed:
             )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        sigma = self.level.sigma()
         unit = rng.standard_normal((len(assembly), 6))
         scale = np.sqrt((self.freedom - 2.0) / rng.chisquare(self.freedom, (len(assembly), 1)))
         return observe_displaced(assembly, demonstration, unit * scale * sigma, np.diag(sigma**2))

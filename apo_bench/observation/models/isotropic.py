@@ -11,8 +11,7 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.facts import Facts
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 COVARIANCE_FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)
 """Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
@@ -39,7 +38,7 @@ class Isotropic:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        sigma = self.level.sigma()
         xi = rng.standard_normal((len(assembly), 6)) * sigma
         return observe_displaced(assembly, demonstration, xi, np.diag(sigma**2))
 

@@ -13,9 +13,8 @@ from apo_bench.assembly.goals import Demonstration, Observation, Poses
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 OUTLIERS, MISSES = 0.1, 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
@@ -74,7 +73,7 @@ class Outliers:
         return 1.0 + self.outliers * (self.times**2 - 1.0)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3)
+        sigma = self.level.sigma()
         unit, chance = rng.standard_normal((len(assembly), 6)), rng.random((len(assembly), 2))
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
         made = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))

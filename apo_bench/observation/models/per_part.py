@@ -10,9 +10,8 @@ import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 LEAST, MOST = 0.3, 4.0
 """Range of the factor of a part on the level."""
@@ -42,9 +41,9 @@ class PerPart:
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         unit = rng.standard_normal((len(assembly), 6))
         factor = factors(assembly.solids, rng)
-        sigma = np.repeat([self.level.mm * 1e-3, np.radians(self.level.deg)], 3) * np.array(
-            [[factor[operation.main]] for operation in assembly.operations]
-        ).reshape(-1, 1)
+        sigma = self.level.sigma() * np.array([[factor[operation.main]] for operation in assembly.operations]).reshape(
+            -1, 1
+        )
         return observe_displaced(
             assembly, demonstration, unit * sigma, sigma[:, :, None] * np.eye(6) * sigma[:, None, :]
         )

@@ -13,9 +13,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.geometry.symmetry import folds, nearest_symmetry, symmetries
-from apo_bench.observation.models.facts import Facts
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 WORSE, _MANY = 3.0, 3.0
 """Factor on the level of a turn about an axis with so many equal places in a whole turn, or more."""

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from apo_bench.assembly.goals import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step
+from apo_bench.assembly.goals import Plan, Poses, Step
+from apo_bench.assembly.reached import Outcome, Reached, ReplayResult, Snapshot
 from apo_bench.geometry.arrays import Array
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.outcomes import sentence

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Layout, Reached, Snapshot
+from apo_bench.assembly.goals import Demonstration, Layout
 from apo_bench.assembly.placement import placements
+from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.verdict import judge

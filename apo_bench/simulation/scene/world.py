@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Poses, Snapshot
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.reached import Snapshot
 from apo_bench.geometry.arrays import Array
 
 Ints = NDArray[np.int64]

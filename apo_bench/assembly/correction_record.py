@@ -1,0 +1,133 @@
+"""What a corrector returns: goals, how the solver ended, and what the test of the correction says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation, Plan, Step
+from apo_bench.assembly.topology import Contact
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
+
+
+class Iterate(NamedTuple):
+    """One turn of a solver, kept for the reader and the plots."""
+
+    gap_m: float
+    """Largest |e| before the step."""
+    rank: int
+    step: float
+    """Length of the scaled step, [m]."""
+
+
+class Try(NamedTuple):
+    """One trial of the iterative correction (Section 4.2)."""
+
+    step: int
+    """The operation that had just been observed, counted from 0."""
+    free: tuple[int, ...]
+    """The operations whose motion parameters were free, most recent first."""
+    gap_m: float
+    """Largest |e| over the equations of the trial, after solving."""
+
+
+class Suspect(NamedTuple):
+    """A relation, and how well everything else fits without it."""
+
+    relation: str
+    """R1, R2, ... as in the relation graph: all contacts of one operation between one pair of parts; or one of them."""
+    contacts: tuple[Contact, ...]
+    made: int
+    """The operation that made it, counted from 0."""
+    chi_square: float
+    """Squared Mahalanobis length of the correction when its equations are left out."""
+    freedom: int
+    """Rank of the equations that are left."""
+    p_value: float
+
+
+@final
+@dataclass(frozen=True)
+class Consistency:
+    """The chi-square test of a correction: is it larger than the stated noise explains?"""
+
+    chi_square: float
+    """Squared Mahalanobis length of the correction, what is left of contradictory contacts added."""
+    freedom: int
+    """Degrees of freedom: the rank of the contact equations at the solution."""
+    p_value: float
+    level: float
+    """The test fails if the p-value is below."""
+    suspects: tuple[Suspect, ...] = ()
+    """Every relation, the most suspect first; looked for only if the test fails."""
+
+    @property
+    def passes(self) -> bool:
+        return self.p_value >= self.level
+
+    @property
+    def ambiguous(self) -> tuple[Suspect, ...]:
+        """The ambiguity set: relations without any one of which the test would pass."""
+        return tuple(suspect for suspect in self.suspects if suspect.p_value >= self.level)
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What a corrector returns: the goals, and what happened."""
+
+    goals: Array
+    status: str
+    """`converged`, or one of the endings in `apo_bench.records.outcomes`."""
+    sentence: str
+    freed: tuple[int, ...]
+    """Operations whose motion parameters were free, counted from 0, most recent first."""
+    gap_before_m: float
+    gap_after_m: float
+    rank: int
+    trace: tuple[Iterate, ...] = ()
+    tried: tuple[Try, ...] = ()
+    """Every set of motion parameters that was tried, in order."""
+    schedule: tuple[Step, ...] = ()
+    """What to do and undo, in order; empty stands for: every operation once."""
+    targets: Array | None = None
+    """(steps, 4, 4) as in `Plan`; None stands for `goals` throughout."""
+    test: Consistency | None = None
+    """Whether the stated noise explains the correction; None of correctors that do not ask."""
+    test_after: Consistency | None = None
+    """The test without the contacts that were left out; None if none was."""
+    covariance: Array | None = None
+    """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown.
+    Contacts that are walls are not counted, so with walls it is an upper bound."""
+    dropped: tuple[str, ...] = ()
+    """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
+        if self.covariance is not None:
+            object.__setattr__(self, "covariance", frozen(self.covariance, len(self.goals), 6, 6))
+        if self.targets is not None:
+            object.__setattr__(self, "targets", frozen(self.targets, len(self.schedule), 4, 4))
+
+    @property
+    def ok(self) -> bool:
+        return self.status == "converged"
+
+    def plan(self, observation: Observation) -> Plan:
+        """What the robot is to do after this correction of `observation`.
+
+        Raises:
+            InputError: The correction did not converge, so its goals are not meant to be executed.
+        """
+        if not self.ok:
+            raise InputError(
+                f"the correction ended as {self.status} ({self.sentence}), which no robot should carry out; look at "
+                "`correction.ok` first."
+            )
+        targets = np.zeros((0, 4, 4)) if self.targets is None else self.targets
+        return Plan(observation.assembly, observation.start, self.goals, self.schedule, targets)

@@ -1,0 +1,73 @@
+"""What a replay reached: the states of the parts, which the judge looks at, and how the replay ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+from apo_bench.assembly.goals import Poses, Step, frozen_poses
+from apo_bench.geometry.records import copyable
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The physical state when an operation was over, or at the end."""
+
+    poses: Poses
+    """Every part, fixed ones too."""
+    penetration_m: float
+    """Deepest overlap of two physical geoms of different parts, >= 0."""
+    speed_m_s: float
+    """Fastest centre of a part."""
+    spin_rad_s: float
+    """Fastest turning part."""
+    released: bool
+    """Whether no hand or gripper touches a part."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "poses", frozen_poses(self.poses))
+
+
+@final
+@dataclass(frozen=True)
+class Outcome:
+    """How a replay ended, as the robot knows it, or a whole trial, as the judge knows it."""
+
+    stage: str
+    """`done`, or where it failed."""
+    code: str
+    """`ok`, or one of the codes in `apo_bench.records.outcomes`."""
+    operation: int | None
+    """Counted from 0."""
+    sentence: str
+
+    @property
+    def failed(self) -> bool:
+        return self.stage != "done"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """What the judge looks at: nothing but physics."""
+
+    after: tuple[Snapshot | None, ...]
+    """After each operation; None for one that was not finished."""
+    final: Snapshot | None
+    """None if the simulation became unstable."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ReplayResult:
+    """One replay: what was reached and how it went."""
+
+    reached: Reached
+    outcome: Outcome
+    peak_force_n: float
+    """Largest net contact force on a part that the robot held (the gripper's own forces excluded)."""
+    sim_seconds: float
+    timeline: tuple[tuple[Step, float], ...] = ()
+    """Each step that was finished, with the simulated time at which it was over, [s]."""
