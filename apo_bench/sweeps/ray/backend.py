@@ -90,15 +90,27 @@ def spread(
         return
     check_ray(address)
     named = names(work)
-    plan = Plan(tuple(work), lock, pickle.dumps((lock, named)), runtime_files(named), address, workers, limit_s)
-    try:
-        _drive(plan, emit, check)
-    except _TokenWanted:
-        _drive(replace(plan, token=True), emit, check)
+    auth = None if address == "local" or os.environ.get("RAY_AUTH_MODE") == "disabled" else "disabled"
+    plan = Plan(tuple(work), lock, pickle.dumps((lock, named)), runtime_files(named), address, workers, limit_s, auth)
+    while True:
+        try:
+            _drive(plan, emit, check)
+            return
+        except _OtherWay as error:
+            plan = error.plan
 
 
-class _TokenWanted(Exception):
-    """The cluster does not let anybody in."""
+@final
+class _OtherWay(Exception):
+    """The cluster wants a token, or there is none: to be tried once more.
+
+    Ray tells neither in advance, and one process can try one way: a driver that shows a token to a cluster that wants
+    none never hears of its tasks.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        super().__init__()
+        self.plan = plan
 
 
 def _drive(plan: Plan, emit: Emit, check: Check) -> None:
@@ -106,7 +118,7 @@ def _drive(plan: Plan, emit: Emit, check: Check) -> None:
         log = Path(folder) / "ray.log"
         driver, patience_s = Process(drive, plan, str(log)), 0.0
         try:
-            _listen(driver, _Joining(plan, log), emit, check)
+            _listen(driver, plan, _Joining(plan, log), emit, check)
             patience_s = GOING_S
         except KeyboardInterrupt:
             _end_cleanly(driver, emit)
@@ -115,7 +127,7 @@ def _drive(plan: Plan, emit: Emit, check: Check) -> None:
             driver.end(patience_s)
 
 
-def _listen(driver: Process, joining: _Joining, emit: Emit, check: Check) -> None:
+def _listen(driver: Process, plan: Plan, joining: _Joining, emit: Emit, check: Check) -> None:
     """Take rows until the last word."""
     while True:
         is_alive = driver.exit_code is None
@@ -126,6 +138,8 @@ def _listen(driver: Process, joining: _Joining, emit: Emit, check: Check) -> Non
             joining.give(STARTING_S)
         elif kind == "connected":
             joining.give(math.inf)
+        elif kind == "none":
+            raise _OtherWay(replace(plan, address="local", auth=None))
         elif kind == "done":
             return
         elif is_alive:
@@ -149,12 +163,12 @@ class _Joining:
         self._seconds, self._deadline = seconds, time.monotonic() + seconds
 
     def look(self) -> None:
-        """Raise an `InputError` if there is no hope."""
+        """Raise an `InputError` if there is no hope, or what else to try."""
         if math.isinf(self._seconds):
             return
         if NO_TOKEN in self._text():
-            if not self._plan.token and "RAY_AUTH_MODE" not in os.environ:
-                raise _TokenWanted
+            if self._plan.auth == "disabled":
+                raise _OtherWay(replace(self._plan, auth="token"))
             raise InputError(
                 "the Ray cluster wants another token; have the ~/.ray/auth_token of its head here, and "
                 "RAY_AUTH_MODE=token or unset."

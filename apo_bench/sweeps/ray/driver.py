@@ -52,20 +52,20 @@ class Plan:
     address: str | None
     workers: int | None
     limit_s: float
-    token: bool = False
-    """Show the token of this machine's user, as Ray does by itself only where no address is named."""
+    auth: str | None = None
+    """What RAY_AUTH_MODE is for Ray: `disabled`, `token` to show that of this machine's user, or None to leave it."""
 
 
 def drive(plan: Plan, log: str, say: Callable[..., None], pipe: Any) -> None:
     """The work of the process: connect, spread the work, say one last word.
 
-    Says "starting" if it starts a cluster, "connected", "row" with row and timing, and last "done", "refused" or
-    "failed"; ends early when it is sent anything, or when the sweep is gone.
+    Says "starting" if it starts a cluster, "connected", "row" with row and timing, and last "none" where no cluster
+    runs, "done", "refused" or "failed"; ends early when it is sent anything, or when the sweep is gone.
     """
     file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     os.dup2(file, 1)
     os.dup2(file, 2)
-    os.environ.update(SETTINGS | {"RAY_AUTH_MODE": "token"} if plan.token else SETTINGS)
+    os.environ.update(SETTINGS | ({} if plan.auth is None else {"RAY_AUTH_MODE": plan.auth}))
     import ray
 
     last: Message = ("done",)
@@ -73,6 +73,8 @@ def drive(plan: Plan, log: str, say: Callable[..., None], pipe: Any) -> None:
         _connect(plan, say)
         say("connected")
         _spread(plan, say, pipe)
+    except _NoCluster:
+        last = ("none",)
     except InputError as error:
         last = last_message(error)
     except Exception as error:
@@ -82,8 +84,17 @@ def drive(plan: Plan, log: str, say: Callable[..., None], pipe: Any) -> None:
     say(*last)
 
 
+class _NoCluster(Exception):
+    """None runs on this machine."""
+
+
 def _connect(plan: Plan, say: Callable[..., None]) -> None:
-    """Join the cluster that was named, or the one that runs here, or start one for the time of the sweep."""
+    """Join the cluster that was named, or the one that runs here, or start one for the time of the sweep.
+
+    Raises:
+        InputError: It cannot be joined.
+        _NoCluster: None runs here, and no other was named.
+    """
     import ray
     from ray.exceptions import RayError
 
@@ -102,8 +113,9 @@ def _connect(plan: Plan, say: Callable[..., None]) -> None:
                 ray.init(address=plan.address or "auto", **quiet)
                 return
         except (ConnectionError, ValueError, RuntimeError, RayError) as error:
-            if plan.address is not None or not isinstance(error, ConnectionError):
-                raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
+            if plan.address is None and isinstance(error, ConnectionError):
+                raise _NoCluster from error
+            raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
         cpus = max(plan.workers or 1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
         say("starting")
         ray.init(address="local", num_cpus=cpus, include_dashboard=False, object_store_memory=OBJECT_STORE, **quiet)
