@@ -15,11 +15,9 @@ from typing import Any, final
 _MODELS = (
     "anisotropic",
     "bias",
-    "bias_view",
     "camera",
     "correlated",
     "empirical",
-    "facts",
     "fitted",
     "heavy_tailed",
     "isotropic",
@@ -28,7 +26,6 @@ _MODELS = (
     "per_part",
     "plain",
     "residuals",
-    "sighted",
     "symmetric",
     "tails",
 )
@@ -49,6 +46,9 @@ MODULES = MappingProxyType(
         "observation.observe": "observation.observing",
         "observation.quantiles": "observation.fitting.quantiles",
         **{f"observation.{name}": f"observation.models.{name}" for name in _MODELS},
+        "observation.bias_view": "observation.models.bias",
+        "observation.facts": "observation.models.level",
+        "observation.sighted": "observation.models.anisotropic",
         "outcomes": "records.outcomes",
         "program": "assembly.goals",
         "scenario_file": "scenario.file",
@@ -60,9 +60,21 @@ NAMES = MappingProxyType(
     {
         "benchmark.spec": {"TrialSpec": "TrialSettings"},
         "benchmark.sweep": {"sweep": "run_sweep"},
+        "correction.equations": {"gap": "largest_gap"},
+        "observation.bop": {"Located": "PoseRows", "checked": "check_rows"},
+        "observation.fit": {"fit": "fit_noise", "compared": "goodness_of_fit"},
+        "observation.fitted": {"Measured": "MeasuredNoise"},
+        "observation.isotropic": {"FLOOR": "COVARIANCE_FLOOR", "seen_at": "observe_displaced"},
+        "observation.outliers": {"UNKNOWN": "UNSEEN_DEVIATION"},
+        "observation.residuals": {"compare": "match_residuals"},
+        "program": {
+            **{name: f"assembly.correction_record.{name}" for name in ("Consistency", "Correction", "Iterate")},
+            **{name: f"assembly.correction_record.{name}" for name in ("Suspect", "Try")},
+            **{name: f"assembly.reached.{name}" for name in ("Outcome", "Reached", "ReplayResult", "Snapshot")},
+        },
     }
 )
-"""Old path -> names in it that are called otherwise now."""
+"""Old path -> names in it that are called otherwise now, with the module that has them if it is another one."""
 
 
 @final
@@ -85,7 +97,10 @@ class MovedModules(MetaPathFinder, Loader):
             _warn(module.__name__, now, stacklevel=3)
             found = vars(importlib.import_module(now))
             vars(module).update({name: value for name, value in found.items() if not name.startswith("__")})
-            vars(module).update({before: found[after] for before, after in NAMES.get(old, {}).items()})
+            for before, after in NAMES.get(old, {}).items():
+                place, _, name = after.rpartition(".")
+                there = importlib.import_module(f"apo_bench.{place}" if place else now)
+                setattr(module, before, getattr(there, name))
 
 
 def moved_names(package: str, places: Mapping[str, str]) -> Callable[[str], Any]:
