@@ -21,11 +21,12 @@ from typing import Any
 from apo_bench.records.method import as_seen
 from apo_bench.records.run_folder import read_rows
 from apo_bench.report.compare import compare
-from apo_bench.report.figures.levels import draw
-from apo_bench.report.figures.times import read_timing
+from apo_bench.report.figures.levels import success_figure
+from apo_bench.report.figures.sheet import draw
 from apo_bench.report.report import report
 from apo_bench.statistics.paired import Paired, paired
 from apo_bench.statistics.rates import Cell, rank, tally, wilson
+from apo_bench.statistics.times import read_timing
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "headline"
@@ -70,9 +71,10 @@ def shorten(folder: Path, copy: Path, trials: int | None) -> None:
 def keep(folder: Path, full: Path | None) -> None:
     rows = read_rows(folder)
     KEPT.mkdir(parents=True, exist_ok=True)
-    shutil.copy(report(folder).table, KEPT / "table.csv")
+    shutil.copy(report(folder).tables["cells"], KEPT / "table.csv")
     cells = tally(rows)
-    draw([cell for cell in cells if cell.method in METHODS and cell.level > 0], FIGURE)
+    shown = [cell for cell in cells if cell.method in METHODS and cell.level > 0]
+    draw(success_figure(shown)).write(FIGURE)
     ran = what_was_run(folder, rows)
     (KEPT / "run.json").write_text(json.dumps(ran, indent=2) + "\n", encoding="utf-8")
     lines = sorted(json.dumps({k: v for k, v in row.items() if k not in LEFT_OUT}) for row in rows)

@@ -26,10 +26,12 @@ from typing import Any
 from apo_bench.assembly.topology import Assembly
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records.relations import RECOGNISED
-from apo_bench.report.figures.recognised import draw_recognitions
-from apo_bench.report.tables.recognised import ALL, Recognition, recognition_lines, recognitions, write_recognitions
+from apo_bench.report.figures.levels import recognition_figure
+from apo_bench.report.figures.sheet import draw
+from apo_bench.report.tables.recognition import recognition_table
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.statistics.recognition import ALL, Recognition, recognitions
 from apo_bench.trial.recognised import counted, recognised
 from apo_bench.trial.stages import observe_recording, record_demonstration
 
@@ -83,8 +85,8 @@ def main(workers: int = 2, seeds: int = 100, wide: int = 30, twice: int = 10) ->
 def written(rows: list[dict[str, Any]]) -> None:
     """Files, figure and page of what is known so far."""
     found = recognitions(rows)
-    write_recognitions(found, RESULTS / "recognition.csv")
-    draw_recognitions(found, FIGURE)
+    recognition_table(found).write(RESULTS / "recognition.csv")
+    draw(recognition_figure(found)).write(FIGURE)
     wrongs = {
         f"{kind}, careless {careless:g}, level {level:g}": {
             what: Counter(f"{row['scenario']} {contact}" for row in rows if place(row) == (kind, careless, level)
@@ -111,7 +113,7 @@ def table(found: tuple[Recognition, ...]) -> list[str]:
     each = [
         r for r in found if r.place.scenario != ALL and r.place.relations == RECOGNISED[0] and r.place.careless == 0.0
     ]
-    return [*recognition_lines(overall), "", *matrix(each)]
+    return [*recognition_table(overall).markdown(), "", *matrix(each)]
 
 
 def matrix(found: list[Recognition]) -> list[str]:

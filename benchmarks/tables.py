@@ -11,9 +11,9 @@ from typing import Any
 from apo_bench.records.run_folder import read_rows
 from apo_bench.records.verdicts import by_verdict, verdict_of
 from apo_bench.report.tables.calibration import WORDS as CALIBRATION
-from apo_bench.report.tables.calibration import calibration_lines
+from apo_bench.report.tables.calibration import calibration_table
 from apo_bench.report.tables.confusion import WORDS as CONFUSION
-from apo_bench.report.tables.confusion import confusion_lines
+from apo_bench.report.tables.confusion import confusion_table
 from apo_bench.statistics.calibration import calibrations
 from apo_bench.statistics.confusion import confusions
 from apo_bench.statistics.paired import paired
@@ -117,13 +117,13 @@ def main() -> None:
         "",
         CALIBRATION,
         "",
-        *calibration_lines([c for c in calibrations(known) if c.method.startswith("contact")]),
+        *calibration_table([c for c in calibrations(known) if c.method.startswith("contact")]).markdown(),
         "",
         "## Prediction and physics",
         "",
         CONFUSION,
         "",
-        *confusion_lines(confusions(rows)),
+        *confusion_table(confusions(rows)).markdown(),
     ]
     PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
     print(f"Wrote {PAGE}")

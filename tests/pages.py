@@ -21,7 +21,7 @@ class Reader(HTMLParser):
         self._inside: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in ("img", "meta", "rect", "line", "path", "circle"):
+        if tag not in ("img", "meta", "rect", "path", "use"):
             self._inside.append(tag)
         if tag == "tr":
             self.lines.append([])
@@ -50,7 +50,8 @@ def read(page: Path) -> Reader:
 
 def lines(page: Path) -> str:
     """The tables of a page as lines, cells with bars between them."""
-    return "\n".join(f"| {' | '.join(line)} |" for line in read(page).lines)
+    made = ([" ".join(cell.split()) for cell in line] for line in read(page).lines)
+    return "\n".join(f"| {' | '.join(line)} |" for line in made)
 
 
 def words(page: Path) -> str:
@@ -58,10 +59,10 @@ def words(page: Path) -> str:
     return " ".join("".join(read(page).text).split())
 
 
-def behind(page: Path) -> dict[str, Any]:
-    """What is packed for the script."""
+def trials(page: Path) -> dict[str, Any]:
+    """The trials of every cell, as they are packed for the script."""
     found = re.search(
-        r'<script type="text/plain" id="behind">([A-Za-z0-9+/=]+)</script>', page.read_text(encoding="utf-8")
+        r'<script type="text/plain" id="trials">([A-Za-z0-9+/=]+)</script>', page.read_text(encoding="utf-8")
     )
     assert found is not None
     return dict(json.loads(gzip.decompress(base64.b64decode(found[1]))))

@@ -11,12 +11,14 @@ from rich.table import Table
 
 from apo_bench.io.plain_text import clean
 from apo_bench.records import verdicts
-from apo_bench.records.method import knows_relations, knows_truth
 from apo_bench.records.settings import RANGE
+from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.confusion import summary
+from apo_bench.report.tables.table import Column
+from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.statistics.confusion import confusions
-from apo_bench.statistics.rate_text import failures, interval, level_label, percent
+from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Cell
 
 if TYPE_CHECKING:
@@ -27,12 +29,25 @@ MOST_NAMES = 8
 """Settings that differ, named on the terminal."""
 
 
+def print_table(table: Data) -> None:
+    """A table for people."""
+    made = Table(box=None, pad_edge=False)
+    for column in table.shown:
+        made.add_column(column.head, justify="left" if column.words else "right")
+    for line in table.lines:
+        _add(made, *line)
+    _console().print(made)
+
+
 def print_scenarios(scenarios: Sequence[Scenario]) -> None:
     """Name, operations, title and place in the paper of each."""
-    table = Table("scenario", "operations", "title", "paper", box=None, pad_edge=False)
-    for s in scenarios:
-        _add(table, s.name, str(len(s.assembly)), s.title, s.paper)
-    _console().print(table)
+    columns = (
+        Column("name", "scenario", words=True),
+        Column("operations", "operations", lambda s: len(s.assembly), words=True),
+        Column("title", "title", words=True),
+        Column("paper", "paper", words=True),
+    )
+    print_table(Data(scenarios, columns))
 
 
 def print_row(row: Mapping[str, Any]) -> None:
@@ -45,30 +60,14 @@ def print_row(row: Mapping[str, Any]) -> None:
 
 def print_cells(cells: Sequence[Cell]) -> None:
     """Success rates with their intervals."""
-    table = Table(box=None, pad_edge=False)
-    unusual = [
-        n for n, usual in (("noise", "isotropic"), ("relations", "given")) if {getattr(c, n) for c in cells} - {usual}
-    ]
-    for name in ("scenario", "clearance", *unusual, "careless", "level", "method"):
-        table.add_column(name)
-    for name in ("success", "95 % interval", "n", "as demonstrated", "loose"):
-        table.add_column(name, justify="right")
-    table.add_column("failures")
-    for c in cells:
-        level = level_label(c.level, c.level_deg, c.noise)
-        where = (f"{c.careless:g}", level) if not knows_truth(c.method) else ("any", "any")
-        met = {"noise": not knows_truth(c.method), "relations": knows_relations(c.method)}
-        axes = [str(getattr(c, name)) if met[name] else "any" for name in unusual]
-        rates = (percent(c.rate), interval(c), str(c.trials), percent(c.demonstrated_rate), percent(c.loose_rate))
-        _add(table, c.scenario, f"{c.clearance_mm:g} mm", *axes, *where, c.method, *rates, failures(c))
-    _console().print(table)
+    print_table(cell_table(cells))
     excluded = sum(c.excluded for c in cells)
     if excluded:
         _console().print(f"{excluded} rows are left out, since the demonstration itself was not right.")
 
 
 def print_report(made: Report) -> None:
-    """Where everything was written, and in one line how often plans foretold what happened."""
+    """The answer, how often plans foretold what happened, and where everything was written."""
     console = _console()
 
     def say(text: str) -> None:
@@ -80,11 +79,10 @@ def print_report(made: Report) -> None:
     if made.no_pictures:
         drawn = "1 failure was" if made.pictures == 1 else f"{made.pictures} failures were"
         say(f"{drawn} drawn. Not drawn: {'; '.join(made.no_pictures)}.")
-    say(f"Tables:  {made.table} and {len(made.tables) - 1} more there, the same as .parquet")
-    png = [path for path in (made.figure, made.tightness, made.recognised and made.recognised[1]) if path]
-    figures = [*png, *made.figures]
-    if figures:
-        say(f"Figures: {figures[0]} and {len(figures) - 1} more there")
+    say(f"Answer:  {made.answer.replace('`', '')}")
+    say(f"Tables:  {made.tables['cells']} and {len(made.tables) - 1} more there, the same as .parquet")
+    if made.figures:
+        say(f"Figures: {made.figures[0]} and {len(made.figures) - 1} more there")
     say(f"Report:  {made.page}")
 
 
@@ -92,14 +90,8 @@ def print_comparison(found: Comparison) -> None:
     """How far two sweeps agree, and what is not the same in them."""
     from apo_bench.report.compare_text import agreement_table, in_words
 
-    table = Table(box=None, pad_edge=False)
-    said = agreement_table(found)
-    for i, name in enumerate(said.head):
-        table.add_column(name, justify="left" if i < said.words else "right")
-    for row in said.rows:
-        _add(table, *("–" if x is None else str(x) for x in row))
     _console().print(clean(in_words(found)))
-    _console().print(table)
+    print_table(agreement_table(found))
     names = [d.what for d in found.differences]
     more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
     differ = clean(f"Not the same: {', '.join(names[:MOST_NAMES])}{more}")

@@ -26,7 +26,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]])
 
 
 def _cell(x: object) -> object:
-    """Texts that have ' in front already get another one, so that `parquet_beside` can take one away."""
+    """Texts that have ' in front already get another one, so that a reader can take one away."""
     if not isinstance(x, str) or not x.lstrip("'").startswith(tuple(OBEYED)) or _number(x):
         return x
     return f"'{x}"

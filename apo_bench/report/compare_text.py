@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from apo_bench.records import verdicts
-from apo_bench.records.method import knows_truth
 from apo_bench.records.replay_command import replay_command
 from apo_bench.records.slim import NUMBERS
-from apo_bench.report.compare import Agreement, Comparison, Pair
-from apo_bench.report.page.behind import verdict, why
-from apo_bench.report.page.markup import Table
-from apo_bench.report.page.ran import limits_of, scenario_files, words
-from apo_bench.report.tables.pairs import points
-from apo_bench.statistics.rate_text import level_label, percent
-from apo_bench.statistics.rates import Cell, Interval, place_of
-from apo_bench.statistics.settings import at, level_of, setting_of
+from apo_bench.report.compare import Agreement, Comparison, Pair, Side
+from apo_bench.report.page.trials import verdict, why
+from apo_bench.report.run_facts import limits_of, scenario_files, words
+from apo_bench.report.tables.saying import level_text, percents, points
+from apo_bench.report.tables.table import Column, Table
+from apo_bench.statistics.rate_text import percent
+from apo_bench.statistics.rates import Cell, Place, Rate, place_of
+from apo_bench.statistics.settings import at, setting_of
 
 SCHEMA = "apo-bench/comparison/1"
 MOST = 2000
@@ -25,49 +24,71 @@ MOST = 2000
 
 def agreement_table(found: Comparison) -> Table:
     """Verdicts that agree, by scenario and of all."""
-    head = ("scenario", "trials", "same verdict", "95 %", "seeds", "same in all", "95 %",
-            "same stage and code", "right in the first alone", "right in the second alone",
-            "difference of success [points]")  # fmt: skip
-    return Table(head, [_agreement(a) for a in found.agreements])
+    columns = (
+        _both("scenario")._replace(words=True),
+        _both("trials", lambda a: a.same.trials),
+        _both("same verdict", lambda a: _counted(a.same)),
+        _both("95 %", lambda a: percents(a.same.interval, 2)),
+        _both("seeds", lambda a: a.same_everywhere.trials),
+        _both("same in all", lambda a: _counted(a.same_everywhere)),
+        _both("95 %", lambda a: percents(a.same_everywhere.interval, 2), "95 % 2"),
+        _both("same stage and code", lambda a: _counted(a.same_ending)),
+        _both("right in the first alone", lambda a: a.only_first),
+        _both("right in the second alone", lambda a: a.only_second),
+        _both("difference of success [points]", lambda a: points(a.difference, a.interval)),
+    )
+    return Table(found.agreements, columns)
 
 
 def difference_table(found: Comparison) -> Table:
     """What is not the same in both."""
-    rows: list[tuple[object, ...]] = [(d.what, _value(d.first), _value(d.second)) for d in found.differences]
-    return Table(("what", str(found.first.folder), str(found.second.folder)), rows, words=3)
+    columns = (
+        _both("what"),
+        _both(str(found.first.folder), lambda d: _value(d.first)),
+        _both(str(found.second.folder), lambda d: _value(d.second)),
+    )
+    return Table(found.differences, [c._replace(words=True) for c in columns], "Nothing that is said of them differs.")
 
 
 def number_table(found: Comparison) -> Table:
     """How far numbers of the same trials are apart."""
-    head = ("number", "trials", "differ", "largest difference", "in one alone")
-    rows: list[tuple[object, ...]] = [
-        (NUMBERS[a.name], a.both, a.differ, f"{a.most:.3g}" if a.both else None, a.alone) for a in found.numbers
-    ]
-    return Table(head, rows)
+    columns = (
+        _both("number", lambda a: NUMBERS[a.name])._replace(words=True),
+        _both("trials", lambda a: a.both),
+        _both("differ"),
+        _both("largest difference", lambda a: f"{a.most:.3g}" if a.both else None),
+        _both("in one alone", lambda a: a.alone),
+    )
+    return Table(found.numbers, columns)
 
 
-def cell_table(found: Comparison) -> Table:
+def pair_table(found: Comparison) -> Table:
     """Rates of both, cell by cell."""
-    head = ("scenario", "conditions", "method", "level", "first", "second", "shared", "first alone", "second alone",
-            "difference [points]")  # fmt: skip
-    return Table(head, [_cell(pair) for pair in found.cells], words=3)
+    columns = (
+        *(c._replace(words=True) for c in _where(_place_of_pair)),
+        _both("first", lambda p: _rate(p.first)),
+        _both("second", lambda p: _rate(p.second)),
+        _both("shared"),
+        _both("first alone", lambda p: p.only_first),
+        _both("second alone", lambda p: p.only_second),
+        _both("difference [points]", lambda p: points(p.difference, p.interval)),
+    )
+    return Table(found.cells, columns)
 
 
 def changed_table(found: Comparison) -> Table:
     """The trials whose verdicts differ, with both sentences and commands."""
-    head = ("scenario", "conditions", "method", "level", "seed", "first", "in words", "second", "in words",
-            "command of the first", "command of the second")  # fmt: skip
-    ran = [(scenario_files(side.run), limits_of(side.run)) for side in (found.first, found.second)]
-    rows: list[tuple[object, ...]] = []
-    for a, b in found.changed[:MOST]:
-        place = place_of(a)
-        assert place is not None
-        where = (place.scenario, ", ".join(setting_of(place).conditions()), place.method)
-        level = level_label(*level_of(place), place.noise)
-        ends = [(f"{verdict(row)} {why(row)}".strip(), row.get("sentence")) for row in (a, b)]
-        commands = [replay_command(row, *ran[i]) for i, row in enumerate((a, b))]
-        rows.append((*where, level, a["seed"], *ends[0], *ends[1], *commands))
-    return Table(head, rows, words=len(head))
+    columns = (
+        *_where(lambda pair: place_of(pair[0])),
+        _both("seed", lambda pair: pair[0]["seed"]),
+        _both("first", lambda pair: f"{verdict(pair[0])} {why(pair[0])}".strip()),
+        _both("in words", lambda pair: pair[0].get("sentence")),
+        _both("second", lambda pair: f"{verdict(pair[1])} {why(pair[1])}".strip()),
+        _both("in words", lambda pair: pair[1].get("sentence"), "in words 2"),
+        _both("command of the first", lambda pair: _command(pair[0], found.first)),
+        _both("command of the second", lambda pair: _command(pair[1], found.second)),
+    )
+    return Table(found.changed[:MOST], [c._replace(words=True) for c in columns], "No verdict differs.")
 
 
 def in_words(found: Comparison) -> str:
@@ -107,35 +128,41 @@ def share(rate: float | None) -> str:
     return "–" if rate is None else f"{100 * rate:.2f} %"
 
 
-def _agreement(a: Agreement) -> tuple[object, ...]:
-    same = (f"{a.same.successes} ({share(a.same.rate)})", _span(a.same.interval))
-    seeds = a.same_everywhere
-    every = (seeds.trials, f"{seeds.successes} ({share(seeds.rate)})", _span(seeds.interval))
-    ending = f"{a.same_ending.successes} ({share(a.same_ending.rate)})"
-    alone = (a.only_first, a.only_second, points(a.difference, a.interval))
-    return (a.scenario, a.same.trials, *same, *every, ending, *alone)
+def _both(head: str, value: Callable[[Any], object] | None = None, name: str = "") -> Column:
+    """A column that files and people read alike; `name` is its own in files, where heads are not."""
+    return Column(name or head, head, value)
 
 
-def _cell(pair: Pair) -> tuple[object, ...]:
+def _where(of: Callable[[Any], Any]) -> tuple[Column, ...]:
+    return (
+        _both("scenario", lambda x: of(x).scenario),
+        _both("conditions", lambda x: ", ".join(setting_of(of(x)).conditions())),
+        _both("method", lambda x: of(x).method),
+        _both("level", lambda x: level_text(of(x))),
+    )
+
+
+def _place_of_pair(pair: Pair) -> Place:
+    """Whatever the fidelity."""
     one = pair.first or pair.second
     assert one is not None
-    place = at(one)
-    where = (place.scenario, ", ".join(setting_of(place._replace(fidelity="full")).conditions()), place.method)
-    level = "any" if knows_truth(place.method) else level_label(place.level, place.level_deg, place.noise)
-    counts = (pair.shared, pair.only_first, pair.only_second)
-    return (*where, level, _rate(pair.first), _rate(pair.second), *counts, points(pair.difference, pair.interval))
+    return at(one)._replace(fidelity="full")
+
+
+def _counted(r: Rate) -> str:
+    return f"{r.successes} ({share(r.rate)})"
 
 
 def _rate(cell: Cell | None) -> str | None:
     return None if cell is None else f"{percent(cell.rate)}, n {cell.trials}"
 
 
-def _span(interval: Interval) -> str:
-    return f"{100 * interval.low:.2f} to {100 * interval.high:.2f} %"
-
-
 def _value(x: Any) -> str:
     return "not said" if x is None else words(x)
+
+
+def _command(row: Mapping[str, Any], side: Side) -> str:
+    return replay_command(row, scenario_files(side.run), limits_of(side.run))
 
 
 def _agreement_form(a: Agreement) -> dict[str, Any]:
@@ -162,25 +189,15 @@ def _agreement_form(a: Agreement) -> dict[str, Any]:
 
 def _changed_form(pair: tuple[Mapping[str, Any], Mapping[str, Any]], found: Comparison) -> dict[str, Any]:
     a, b = pair
-    names = (
-        "scenario",
-        "clearance_mm",
-        "seed",
-        "careless",
-        "level",
-        "level_deg",
-        "noise",
-        "relations",
-        "grasp",
-        "method",
-    )
+    names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg")
+    names += ("noise", "relations", "grasp", "method")
     said = {
         name: {
             "verdict": verdict(row),
             "stage": row["failure_stage"],
             "code": row["failure_code"],
             "sentence": row.get("sentence"),
-            "command": replay_command(row, scenario_files(side.run), limits_of(side.run)),
+            "command": _command(row, side),
         }
         for name, row, side in (("first", a, found.first), ("second", b, found.second))
     }

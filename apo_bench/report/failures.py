@@ -51,26 +51,21 @@ class Failures(NamedTuple):
 
 
 def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[Row]:
-    """Failures to be drawn: kinds of failure by turns, the most frequent first, methods and scenarios varied.
+    """Failures to be drawn: one for each way of failing, the most frequent first, methods and scenarios varied.
 
     The same rows, in any order, give the same sample. Trials that were not carried out have nothing to be seen.
 
     Args:
         trust_code: Also trials that name code of somebody's own.
     """
-    kinds: dict[tuple[str, str], list[Row]] = {}
+    ways: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         moved = row.get("sim_seconds") and row["failure_stage"] not in (*NOT_EXECUTED, "plan")
         if row["success"] is False and moved and row["level"] is not None and (trust_code or not own_code(row)):
-            kinds.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
-    queues = [
-        sorted(found, key=_order) for _, found in sorted(kinds.items(), key=lambda kind: (-len(kind[1]), kind[0]))
-    ]
+            ways.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
     chosen: list[Row] = []
-    while len(chosen) < most and any(queues):
-        for queue in queues:
-            if queue and len(chosen) < most:
-                chosen.append(queue.pop(_newest(queue, chosen)))
+    for _, found in sorted(ways.items(), key=lambda way: (-len(way[1]), way[0]))[:most]:
+        chosen.append(_newest(sorted(found, key=_order), chosen))
     return chosen
 
 
@@ -79,11 +74,11 @@ def _order(row: Row) -> tuple[Any, ...]:
     return (row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)
 
 
-def _newest(queue: Sequence[Row], chosen: Sequence[Row]) -> int:
+def _newest(found: Sequence[Row], chosen: Sequence[Row]) -> Row:
     """The first one of a method and scenario that was chosen least."""
     methods, scenarios = [row["method"] for row in chosen], [row["scenario"] for row in chosen]
     met: dict[tuple[str, str], int] = {}
-    for i, row in enumerate(queue):
+    for i, row in enumerate(found):
         met.setdefault((row["method"], row["scenario"]), i)
     best = min(met, key=lambda pair: (methods.count(pair[0]) + scenarios.count(pair[1]), met[pair]))
-    return met[best]
+    return found[met[best]]

@@ -7,53 +7,47 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from apo_bench.errors import InputError
-from apo_bench.io.csv_file import write_csv
-from apo_bench.io.parquet import parquet_beside, write_columns
+from apo_bench.io.parquet import write_columns
 from apo_bench.io.writing import check_folders, check_target, to_write
-from apo_bench.records.method import knows_truth
 from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import check_one, one_salt, read_salt
 from apo_bench.records.slim import COLUMNS as KEPT
 from apo_bench.records.slim import slim_rows
 from apo_bench.records.verdicts import by_verdict, verdict_of
+from apo_bench.report.answer import answer
 from apo_bench.report.failures import Draw, Failures
-from apo_bench.report.figures.figures import figures_of, methods_of, write_figures
-from apo_bench.report.figures.gaps import gaps, write_gaps
-from apo_bench.report.figures.levels import draw, rows_of
-from apo_bench.report.figures.recognised import draw_recognitions
-from apo_bench.report.figures.tightness import draw_tightness, varies
-from apo_bench.report.figures.times import read_timing, times, write_times
-from apo_bench.report.page.ran import scenario_files
+from apo_bench.report.figures.every import figures
 from apo_bench.report.page.report_page import Found, report_page
-from apo_bench.report.tables.confusion import write_confusions
-from apo_bench.report.tables.halves import write_areas, write_halves
-from apo_bench.report.tables.paired import write_paired
-from apo_bench.report.tables.recognised import recognitions, write_recognitions
+from apo_bench.report.run_facts import scenario_files
+from apo_bench.report.tables.calibration import calibration_table
+from apo_bench.report.tables.cells import cell_table
+from apo_bench.report.tables.confusion import confusion_table
+from apo_bench.report.tables.effort import effort_table, time_table, work_table
+from apo_bench.report.tables.gaps import gap_table
+from apo_bench.report.tables.half_levels import area_difference_table, area_table, half_table
+from apo_bench.report.tables.pairs import pair_table
+from apo_bench.report.tables.recognition import recognition_table
+from apo_bench.report.tables.table import Table
+from apo_bench.statistics.calibration import calibrations
 from apo_bench.statistics.confusion import Confusion, confusions
-from apo_bench.statistics.rate_text import failures
+from apo_bench.statistics.effort import efforts
+from apo_bench.statistics.gaps import gaps
 from apo_bench.statistics.rates import Cell
+from apo_bench.statistics.recognition import recognitions
 from apo_bench.statistics.settings import members, settings
 from apo_bench.statistics.summary import Summary, summary
+from apo_bench.statistics.times import read_timing, times, work
 
-COLUMNS = (
-    *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method"),
-    *("grasp", "fidelity", "trials", "successes", "rate", "low_95", "high_95", "executed", "executed_rate"),
-    *(
-        "executed_low_95",
-        "executed_high_95",
-        "as_demonstrated",
-        "as_demonstrated_rate",
-        "loose_successes",
-        "loose_rate",
-    ),
-    *("excluded", "failures"),
-)
 MOST_PANELS = 16
-"""Of a PNG; laying out more takes minutes."""
+"""Of a PNG; drawing more takes minutes."""
+PNG = ("success_over_level", "success_over_tightness", "recognised")
+"""Figures that are also kept as PNG."""
+FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confusion", "times")
+"""Tables that are also kept as files; those of the last two kinds, and what was recognised, if there is any."""
 OURS = (
-    *("recognised.csv", "recognised.parquet", "times.csv", "times.parquet", "recognised.png", "success_over_level.png"),
-    *("success_over_tightness.png", "success_over_level.svg", "failure_stages.svg", "gap_before_and_after.svg"),
-    *("prediction.svg", "timing.svg"),
+    *("recognised.csv", "recognised.parquet", "times.csv", "times.parquet", "recognised.png", "recognised.svg"),
+    *("success_over_level.png", "success_over_level.svg", "success_over_tightness.png", "success_over_tightness.svg"),
+    *("failure_stages.svg", "gap_before_and_after.svg", "prediction.svg", "timing.svg"),
 )
 """Files that not every report has."""
 PAGE, TABLES, FIGURES, ROWS = "report.html", "tables", "figures", "rows.parquet"
@@ -63,20 +57,13 @@ class Report(NamedTuple):
     """Where the report of a sweep was written."""
 
     page: Path
-    table: Path
-    """Cells: rates with their intervals."""
-    paired: Path
-    confusion: Path
-    figure: Path | None
-    """Success over level, as PNG; None of a sweep with more than `MOST_PANELS` panels, which has it as SVG alone."""
-    tightness: Path | None
-    """The figure over tightness; None where a sweep has one clearance per scenario."""
-    recognised: tuple[Path, Path] | None
-    """Table and figure of recognised contacts; None where a sweep was given all of them."""
-    tables: tuple[Path, ...]
-    """All, as CSV; beside each is the same as Parquet."""
+    answer: str
+    """What the sweep says, in one sentence, with methods in backquotes."""
+    tables: Mapping[str, Path]
+    """All, as CSV, by what they are of: `cells` are rates, `pairs`, `confusion`, ...; beside each is the same as
+    Parquet."""
     figures: tuple[Path, ...]
-    """All that are drawn as SVG."""
+    """All, as SVG, and as PNG where people put them into text."""
     cells: tuple[Cell, ...]
     confusions: tuple[Confusion, ...]
     pictures: int
@@ -127,73 +114,60 @@ def report(
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
-        failed = Failures(pictures if draw else 0, draw, salt, trust_code)
-        made = _written(folder, counted, verdict, found, failed)
-        _rows(rows, folder / TABLES / ROWS)
-        return made
+        _write_rows(rows, folder / TABLES / ROWS)
+        return _written(folder, counted, verdict, found, Failures(pictures if draw else 0, draw, salt, trust_code))
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(
-    folder: Path,
-    rows: Sequence[Mapping[str, Any]],
-    verdict: str,
-    found: Summary,
-    failed: Failures,
-) -> Report:
+def _written(folder: Path, rows: Sequence[Mapping[str, Any]], verdict: str, found: Summary, failed: Failures) -> Report:
     run, timing = read_run(folder), read_timing(folder)
-    files, told, wrong = scenario_files(run), recognitions(rows), confusions(rows)
-    gap, took = gaps(rows), times(timing)
+    files, took, known = scenario_files(run), times(timing), work(timing)
+    told, wrong, gap = recognitions(rows), confusions(rows), gaps(rows)
     grouped = members(settings(found.cells), found.cells)
-    figures = figures_of(found, grouped, gap, wrong, took)
-    drawn = _drawn(folder / FIGURES, found.cells, told)
-    tables = _tables(folder / TABLES, found, told)
-    write_gaps(gap, tables.setdefault("gaps", folder / TABLES / "gaps.csv"))
-    write_confusions(wrong, tables.setdefault("confusion", folder / TABLES / "confusion.csv"))
-    if took:
-        write_times(took, tables.setdefault("times", folder / TABLES / "times.csv"))
-    made = [path for table in tables.values() for path in (table, parquet_beside(table))]
-    made.append(folder / TABLES / ROWS)
-    svg = write_figures(figures, methods_of(found.cells), folder / FIGURES)
+    tables = {
+        "cells": cell_table(found.cells),
+        "pairs": pair_table(found.pairs),
+        "half_levels": half_table(found.half_levels, found.areas),
+        "areas": area_table(found.areas, found.area_differences),
+        "area_differences": area_difference_table(found.area_differences),
+        "gaps": gap_table(gap),
+        "confusion": confusion_table(wrong),
+        "recognised": recognition_table(told),
+        "calibration": calibration_table(calibrations(rows)),
+        "effort": effort_table(efforts(rows)),
+        "times": time_table(took),
+        "work": work_table(known),
+    }
+    kept = _write_tables(tables, folder / TABLES)
+    drawn = figures(found, grouped, gap, wrong, told, took)
+    paths = [drawing.write(folder / FIGURES / f"{name}.svg") for name, drawing in drawn.items()]
+    for name in PNG:
+        if name in drawn and len(drawn[name].panels) <= MOST_PANELS:
+            paths.append(drawn[name].write(folder / FIGURES / f"{name}.png"))
     taken, missed = failed.drawn(rows, folder, files)
+    beside = [path for table in kept.values() for path in (table, table.with_suffix(".parquet"))]
+    said = answer(rows, found)
     page = Found(
         name=folder.resolve().name,
+        answer=said,
         verdict=verdict,
         rows=rows,
         summary=found,
         grouped=grouped,
-        figures=figures,
-        gaps=gap,
-        confusions=wrong,
-        recognitions=told,
-        timing=timing,
+        figures=drawn,
+        tables=tables,
+        timed=len(timing),
+        work=known,
         run=run,
         files=files,
         pictures=taken,
         no_pictures=missed,
-        drawn=drawn,
-        tables=[str(path.relative_to(folder)) for path in (*made, *drawn.values(), *svg)],
+        beside=[str(path.relative_to(folder)) for path in (*beside, folder / TABLES / ROWS, *paths)],
     )
     with to_write(folder / PAGE, "w") as file:
         file.write(report_page(page))
-    recognised = (tables["recognised"], drawn["recognised"]) if told else None
-    return Report(
-        page=folder / PAGE,
-        table=tables["cells"],
-        paired=tables["pairs"],
-        confusion=tables["confusion"],
-        figure=drawn.get("success_over_level"),
-        tightness=drawn.get("success_over_tightness"),
-        recognised=recognised,
-        tables=tuple(tables.values()),
-        figures=tuple(svg),
-        cells=found.cells,
-        confusions=wrong,
-        pictures=len(taken),
-        no_pictures=tuple(missed),
-        verdict=verdict,
-    )
+    return Report(folder / PAGE, said, kept, tuple(paths), found.cells, wrong, len(taken), tuple(missed), verdict)
 
 
 def _remove_older(folder: Path) -> None:
@@ -203,50 +177,17 @@ def _remove_older(folder: Path) -> None:
             path.unlink()
 
 
-def _drawn(folder: Path, cells: Sequence[Cell], told: Sequence[Any]) -> dict[str, Path]:
-    """Figures as PNG."""
-    made: dict[str, Path] = {}
-    few = len(rows_of(cells)) * len({c.careless for c in cells if not knows_truth(c.method)}) <= MOST_PANELS
-    if few:
-        made["success_over_level"] = folder / "success_over_level.png"
-        draw(cells, made["success_over_level"])
-    if few and varies(cells):
-        made["success_over_tightness"] = folder / "success_over_tightness.png"
-        draw_tightness(cells, made["success_over_tightness"])
-    if told:
-        made["recognised"] = folder / "recognised.png"
-        draw_recognitions(told, made["recognised"])
-    return made
+def _write_tables(tables: Mapping[str, Table], folder: Path) -> dict[str, Path]:
+    wanted = [name for name in FILES if tables[name].items or name not in ("recognised", "times")]
+    for name in wanted:
+        tables[name].write(folder / f"{name}.parquet")
+    return {name: tables[name].write(folder / f"{name}.csv") for name in wanted}
 
 
-def _tables(folder: Path, found: Summary, told: Sequence[Any]) -> dict[str, Path]:
-    names = ("cells", "pairs", "half_levels", "areas", *(("recognised",) if told else ()))
-    made = {name: folder / f"{name}.csv" for name in names}
-    _write_cells(found.cells, made["cells"])
-    write_paired(found.pairs, made["pairs"])
-    write_halves(found.half_levels, made["half_levels"])
-    write_areas(found.areas, found.area_differences, made["areas"])
-    if told:
-        write_recognitions(told, made["recognised"])
-    return made
-
-
-def _write_cells(cells: Sequence[Cell], path: Path) -> None:
-    write_csv(path, COLUMNS, (_line(cell) for cell in cells))
-
-
-def _line(c: Cell) -> tuple[object, ...]:
-    where = (c.scenario, c.clearance_mm, c.noise, c.relations, c.careless, c.level, c.level_deg, c.tightness, c.method)
-    strict = (c.grasp, c.fidelity, c.trials, c.successes, c.rate, *c.interval)
-    executed = (c.executed.trials, c.executed.rate, *c.executed.interval)
-    other = (c.demonstrated, c.demonstrated_rate, c.loose_successes, c.loose_rate, c.excluded)
-    return (*where, *strict, *executed, *other, failures(c, 99))
-
-
-def _rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+def _write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """The rows themselves, what was predicted in columns of its own."""
     plain = [name for name in KEPT if name != "predicted"]
     columns = [[row.get(name) for row in rows] for name in plain]
     said = ("fails", "operation", "code")
-    foretold = [[None if (p := row.get("predicted")) is None else p[key] for row in rows] for key in said]
-    write_columns([*plain, *(f"predicted_{key}" for key in said)], [*columns, *foretold], path)
+    predicted = [[None if (p := row.get("predicted")) is None else p[key] for row in rows] for key in said]
+    write_columns([*plain, *(f"predicted_{key}" for key in said)], [*columns, *predicted], path)

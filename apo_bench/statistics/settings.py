@@ -41,10 +41,10 @@ class Setting(NamedTuple):
         """`stick_in_tower, careless human`, and whatever is not as usual."""
         return ", ".join([self.scenario, *self.conditions()])
 
-    def conditions(self) -> list[str]:
-        """All but the scenario, as a person says it."""
+    def conditions(self, clearance: bool = True) -> list[str]:
+        """All but the scenario, as a person says it; the clearance can be left out."""
         human = {0.0: "careful human", 1.0: "careless human"}.get(self.careless, f"carelessness {self.careless:g}")
-        said = [human, f"{self.clearance_mm:g} mm clearance"]
+        said = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
         if self.noise != USUAL:
             said.append("range finder" if self.noise == RANGE else f"{self.noise} noise")
         if self.relations != "given":

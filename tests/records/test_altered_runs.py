@@ -17,7 +17,7 @@ from apo_bench.records.verdicts import AS_DEMONSTRATED, verdict_of
 from apo_bench.report import report as reports
 from apo_bench.report.compare import compare
 from apo_bench.report.compare_text import comparison_form
-from apo_bench.report.figures.times import read_timing
+from apo_bench.statistics.times import read_timing
 from tests.altered import FILES, altered
 
 KEPT = Path(__file__).parents[1] / "kept" / "row5"
@@ -34,7 +34,7 @@ def read(folder: Path) -> None:
 
 
 def test_altered_folders_are_read_or_refused_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reports, "_drawn", lambda *_: {})  # figures take a second each
+    monkeypatch.setattr(reports, "figures", lambda *_: {})  # figures take a second each
     refused = reported = 0
     wrong: list[tuple[str, str]] = []
     for seed in range(CASES):

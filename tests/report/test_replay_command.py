@@ -36,7 +36,7 @@ def test_commands_of_a_page_give_identical_rows(
     trials: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     made = report(write(tmp_path / "run", trials))
-    kept = pages.behind(made.page)
+    kept = pages.trials(made.page)
     words, columns = kept["words"], kept["columns"]
     for i, seed in enumerate(columns["seed"]):
         command = shlex.split(f"{words['command'][columns['command'][i]]} --seed {seed}")
@@ -44,7 +44,7 @@ def test_commands_of_a_page_give_identical_rows(
         again = json.loads(capsys.readouterr().out)
         assert again in json.loads(json.dumps(trials))
         assert words["verdict"][columns["verdict"][i]] in ("right", "loosely right", "failed")
-        assert columns["worst_gap_mm"][i] == pytest.approx(again["worst_gap_mm"], rel=1e-3)
+        assert columns["worst_gap_mm"][i] == pytest.approx(again["worst_gap_mm"], abs=5e-4)
         assert words["sentence"][columns["sentence"][i]] == again["sentence"]
 
 
@@ -65,7 +65,7 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
     page = report(write(tmp_path / "page", other), pictures=1)
     assert page.pictures == 1
     assert 'src="data:image/jpeg;base64,' in page.page.read_text(encoding="utf-8")
-    assert list(pages.behind(page.page)["pictures"].values()) == [0]
+    assert list(pages.trials(page.page)["pictures"].values()) == [0]
 
 
 def test_a_page_without_graphics_says_so(
@@ -121,7 +121,7 @@ def test_the_sample_does_not_depend_on_the_order() -> None:
     ]
     chosen = sample(failed, 4)
     assert sample(failed[::-1], 4) == chosen
-    assert [r["failure_code"] for r in chosen] == ["force_stop", "gap", "force_stop", "gap"]
-    assert len({r["method"] for r in chosen}) == 3
-    assert len(sample(failed, 99)) == len(failed)
+    assert [r["failure_code"] for r in chosen] == ["force_stop", "gap"]  # one for each way of failing
+    assert len({r["method"] for r in chosen}) == 2
+    assert sample(failed, 1) == chosen[:1]
     assert sample([row("none", 0, False, sim_seconds=None)], 4) == []

@@ -12,7 +12,7 @@ from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.run_folder import read_rows
 from apo_bench.report.report import report
-from apo_bench.report.tables.calibration import calibration_lines
+from apo_bench.report.tables.calibration import calibration_table
 from apo_bench.statistics.calibration import calibrations
 from tests import pages
 from tests.statistics.test_rates import UNCOUNTED, UNKNOWN, row, write
@@ -50,9 +50,9 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     assert right.free_mm == 2.0
     assert (shifted.failed_tests, shifted.culprits) == ((2, 3), (1, 2))
     assert (missed.failed_tests, missed.culprits) == ((1, 1), (0, 0))
-    lines = "\n".join(calibration_lines((raw, right, missed, shifted)))
+    lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
     assert "| none | 0 | – | – | – | – | – | – |" in lines
-    assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 mm | 1.63 | 2 mm | 66.7 % of 3 | 50.0 % of 2 |" in lines
+    assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
 
 
 def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:

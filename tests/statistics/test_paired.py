@@ -16,7 +16,7 @@ from scipy.stats import binomtest, multinomial, ttest_rel
 
 from apo_bench.errors import InputError
 from apo_bench.report.report import report
-from apo_bench.report.tables.paired import COLUMNS, paired_lines, write_paired
+from apo_bench.report.tables.pairs import pair_table
 from apo_bench.statistics.adjust import adjusted
 from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.paired import paired, tango
@@ -234,10 +234,9 @@ def test_none_is_the_reference_whatever_relations_were_told() -> None:
 
 def test_the_report_holds_the_pairs(tmp_path: Path) -> None:
     made = report(write(tmp_path / "run", rows()))
-    table = list(csv.DictReader(made.paired.open()))
-    assert tuple(table[0]) == COLUMNS
+    table = list(csv.DictReader(made.tables["pairs"].open()))
     assert len(table) == len(paired(rows()))
-    assert "| contact | paper | 1 | 10 | 6 | 2 | 1 | 1 | +10.0 (" in pages.lines(made.page)
-    write_paired((), tmp_path / "empty.csv")
-    assert (tmp_path / "empty.csv").read_text().strip() == ",".join(COLUMNS)
-    assert paired_lines(()) == ["No two methods share a cell."]
+    assert "| contact | paper | 1 | 10 | 6, 2, 1, 1 | +10.0 (" in pages.lines(made.page)
+    empty = pair_table(()).write(tmp_path / "empty.csv")
+    assert empty.read_text().strip().split(",") == list(table[0])
+    assert pair_table(()).markdown() == ["No two methods share a cell."]

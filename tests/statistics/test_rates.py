@@ -15,8 +15,10 @@ from statsmodels.stats.proportion import proportion_confint
 
 from apo_bench.errors import InputError
 from apo_bench.records.settings import ROW
-from apo_bench.report.figures.levels import OTHERS, STYLES, draw, rows_of
-from apo_bench.report.report import COLUMNS, report
+from apo_bench.report.figures.levels import success_figure
+from apo_bench.report.figures.sheet import draw
+from apo_bench.report.figures.styles import OTHERS, STYLES
+from apo_bench.report.report import report
 from apo_bench.report.tables.confusion import summary
 from apo_bench.statistics.confusion import Confusion, confusions
 from apo_bench.statistics.effort import Effort, efforts
@@ -239,23 +241,25 @@ def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
         rows += [row(seed=i, success=i < 1, level=level, level_deg=level) for i in range(4)]
         rows += [row("paper", seed=i, success=None if i == 3 else True, level=level, level_deg=level) for i in range(4)]
     made = report(write(tmp_path / "run", rows))
-    table = list(csv.DictReader(made.table.open()))
-    assert tuple(table[0]) == COLUMNS
+    table = list(csv.DictReader(made.tables["cells"].open()))
+    assert list(table[0])[:9] == [
+        *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method")
+    ]
     assert [(line["method"], line["level_mm"], line["trials"], line["successes"]) for line in table] == [
         ("oracle", "0.0", "4", "4"),
         *(("none", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
         *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
     ]
     assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
-    assert made.figure is not None
-    assert made.figure.read_bytes().startswith(b"\x89PNG")
+    (figure,) = [path for path in made.figures if path.name == "success_over_level.png"]
+    assert figure.read_bytes().startswith(b"\x89PNG")
     page = pages.lines(made.page)
     assert "| method, level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
     assert "| none | 25.0 % 4.6 to 69.9 % n 4 | 25.0 % 4.6 to 69.9 % n 4 |" in page
     assert "| paper | 100.0 % 43.9 to 100.0 % n 3 | 100.0 % 43.9 to 100.0 % n 3 |" in page
     assert "| stick_in_tower | none | 12 | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
     assert "| all | all | 25 | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
-    confusion = list(csv.DictReader(made.confusion.open()))
+    confusion = list(csv.DictReader(made.tables["confusion"].open()))
     assert [line["method"] for line in confusion] == ["oracle", "none", "paper", "all"]
     assert (confusion[1]["predicted_fail_failed"], confusion[2]["excluded"]) == ("9", "3")
 
@@ -270,28 +274,24 @@ def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
         *((0.25, 0.0, None), (1.0, 0.0, None), (0.25, 0.5, 0.5), (0.25, 2.0, 0.125), (1.0, 0.5, 2.0), (1.0, 2.0, 0.5))
     }
     made = report(write(tmp_path / "run", rows))
-    assert made.tightness is not None
-    assert made.tightness.read_bytes().startswith(b"\x89PNG")
+    assert {"success_over_tightness.svg", "success_over_tightness.png"} <= {path.name for path in made.figures}
     assert "Success over tightness" in pages.words(made.page)
-    table = list(csv.DictReader(made.table.open()))
+    table = list(csv.DictReader(made.tables["cells"].open()))
     assert {line["tightness"] for line in table} == {"", "0.5", "0.125", "2.0", "0.25", "1.0"}
-    assert report(write(tmp_path / "one", [row(), row("paper")])).tightness is None
-    rows_drawn = rows_of(cells)
-    assert [(r.clearance_mm, r.relations) for r in rows_drawn] == [
-        *((0.25, "given"), (0.25, "missed"), (1.0, "given"), (1.0, "missed"))
-    ]
-    assert [sum(r.holds(c) for c in cells) for r in rows_drawn] == [6, 4, 6, 4]
+    one = report(write(tmp_path / "one", [row(), row("paper")]))
+    assert not any("tightness" in path.name for path in one.figures)
 
 
 def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) -> None:
     from imageio.v3 import improps
 
-    few = report(write(tmp_path / "few", [row(), row("oracle")]))
+    few = success_figure(tally([row(), row("oracle")]))
     more = [row(scenario=s, careless=f) for s in ("stick_in_tower", "stick_on_castles") for f in (0.0, 1.0)]
-    many = report(write(tmp_path / "many", more))
-    assert few.figure is not None
-    assert many.figure is not None
-    low, wide = improps(few.figure).shape[:2], improps(many.figure).shape[:2]
+    many = success_figure(tally(more))
+    assert [panel.title for panel in many.panels][:2] == [
+        f"stick_in_tower, {human} human, 0.25 mm clearance; n\u00a01" for human in ("careful", "careless")
+    ]
+    low, wide = (improps(draw(x).write(tmp_path / f"{len(x.panels)}.png")).shape[:2] for x in (few, many))
     assert wide[0] > low[0] + 300
     assert wide[1] > low[1] + 300
 
@@ -300,8 +300,9 @@ def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
     every = [*STYLES.values(), *OTHERS]
     assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
     methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
-    draw(tally([row(method) for method in methods]), tmp_path / "figure.png")
-    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+    drawn = draw(success_figure(tally([row(method) for method in methods])))
+    assert {one.title for one in drawn.legend} == set(methods)
+    assert len({one.svg for one in drawn.legend}) == len(methods)
 
 
 def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:

@@ -23,8 +23,8 @@ from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.replay_command import replay_command
 from apo_bench.records.run_file import read_run
 from apo_bench.records.settings import TrialSettings
-from apo_bench.report.page.ran import limits_of
 from apo_bench.report.report import report
+from apo_bench.report.run_facts import limits_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
@@ -186,7 +186,7 @@ def test_what_the_limit_of_the_corrector_ended_is_the_same_row_again(
     assert (row["failure_code"], row["sentence"]) == ("time_limit", "the corrector took longer than its limit")
     assert limits_of(read_run(tmp_path / "run")) == limits
     assert replayed(row, capsys, limits) == json.loads(json.dumps(row))
-    kept = pages.behind(report(tmp_path / "run").page)["words"]["command"]
+    kept = pages.trials(report(tmp_path / "run").page)["words"]["command"]
     said = ["--corrector-limit 1.5" in kept[0], "--trial-limit 50 " in f"{kept[0]} ", len(kept)]
     assert said == [True, workers == 1, 1]
 

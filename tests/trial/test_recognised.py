@@ -13,10 +13,12 @@ import pytest
 from apo_bench.cli import app as cli
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.settings import TrialSettings
-from apo_bench.report.figures.recognised import draw_recognitions
-from apo_bench.report.tables.recognised import ALL, NONE, recognition_lines, recognitions, write_recognitions
+from apo_bench.report.figures.levels import recognition_figure
+from apo_bench.report.figures.sheet import draw
+from apo_bench.report.tables.recognition import NONE, recognition_table
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.statistics.recognition import ALL, recognitions
 from apo_bench.trial.stages import Recording, record_demonstration
 from apo_bench.trial.trial import run_trial
 from tests import pages
@@ -82,13 +84,13 @@ def test_scenarios_are_also_counted_together() -> None:
 def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
     found = recognitions([row("recognised-fixed", contacts_right=0, contacts_missed=3)])
     assert (found[0].precision, found[0].recall) == (None, 0.0)
-    assert recognition_lines(found)[-1].endswith("| – | 0.00 % | 3 | 0 |")
-    assert recognition_lines(()) == [NONE]
-    write_recognitions(found, tmp_path / "table.csv")
+    assert recognition_table(found).markdown()[-1].endswith("| – | 0.00 % | 3 | 0 |")
+    assert recognition_table(()).markdown() == [NONE]
+    recognition_table(found).write(tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         (line,) = csv.DictReader(file)
     assert (line["missed"], line["precision"], line["recall"]) == ("3", "", "0.0")
-    draw_recognitions(found, tmp_path / "figure.png")
+    draw(recognition_figure(found)).write(tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 5000
 
 

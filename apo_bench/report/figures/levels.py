@@ -1,175 +1,185 @@
-"""Success over level: panels by scenario, clearance and noise, and by relations and carelessness; a line per method."""
+"""Figures over the noise level: success, paired differences, gaps, and contacts that were recognised."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
-from apo_bench.records.method import as_seen, knows_relations, knows_truth
+from apo_bench.records.method import knows_truth
 from apo_bench.records.settings import RANGE
-from apo_bench.statistics.rate_text import level_label
+from apo_bench.report.figures.lines import Axis, Line, Point, Rule, dodges, entries, levels_axis, line_panel
+from apo_bench.report.figures.sheet import Figure, Panel
+from apo_bench.report.figures.styles import RECOGNISED, SEEN, Style, styles
+from apo_bench.statistics.gaps import Gap, Quantiles
+from apo_bench.statistics.paired import Paired
+from apo_bench.statistics.rate_text import interval, percent
 from apo_bench.statistics.rates import Cell
+from apo_bench.statistics.recognition import ALL, Recognition
+from apo_bench.statistics.settings import Setting, at, level_of, level_unit, level_words, levels_of, members, settings
 
-CEILING = "#444444"
-DODGE = 0.07
-"""Methods stand this far from each other at one level, so that equal rates do not hide each other."""
-BESIDE = 3
-"""Panels in a line, if there is but one per scenario, clearance and noise."""
-MANY = 3
-"""With more methods than this in a panel, the numbers of trials are left to the table."""
-
-
-class Row(NamedTuple):
-    """What the panels of one scenario have in common, whatever the carelessness."""
-
-    scenario: str
-    clearance_mm: float | None
-    """None stands for every one."""
-    noise: str
-    relations: str
-
-    def holds(self, c: Cell) -> bool:
-        """Whether a cell is drawn here: the oracle meets no noise, and it and `none` are not told any relations."""
-        where = c.scenario == self.scenario and self.clearance_mm in (None, c.clearance_mm)
-        noise = knows_truth(c.method) or c.noise == self.noise
-        return where and noise and (not knows_relations(c.method) or c.relations == self.relations)
-
-    def title(self, careless: float) -> str:
-        """`stick_in_tower, careful human, 0.25 mm clearance`, and what is not as usual."""
-        human = "careful human" if careless == 0 else f"carelessness {careless:g}"
-        unusual = ["range finder" if self.noise == RANGE else f"{self.noise} noise"] * (self.noise != "isotropic")
-        unusual += [f"relations {self.relations}"] * (self.relations != "given")
-        clearance = "" if self.clearance_mm is None else f", {self.clearance_mm:g} mm clearance"
-        first = f"{self.scenario}, {human}{clearance}"
-        return "\n".join([first, ", ".join(unusual)]) if unusual else first
+Item = TypeVar("Item")
+SHARES = tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100))
+STEPS = (1, 2, 5, 10, 20, 25, 50, 100)
+FLOOR_MM = 1e-3
+"""Gaps below this are drawn here: what solvers leave of zero says nothing."""
+RECOGNITION = {"precision": "precision", "recall": "recall", "completeness": "demonstrations all right"}
 
 
-class Style(NamedTuple):
-    """How the line of a method looks; told apart without colour too."""
-
-    color: str
-    marker: str
-    dashes: Any
-
-
-STYLES = {
-    "none": Style("#D55E00", "o", "-"),
-    "search": Style("#E7298A", "8", (0, (4, 1.5))),
-    "contact": Style("#332288", "p", "-"),
-    "paper": Style("#0072B2", "s", "-"),
-    "paper-track": Style("#009E73", "D", "-"),
-    "last-only": Style("#E69F00", "v", (0, (4, 1.5))),
-    "no-history": Style("#CC79A7", "^", (0, (4, 1.5))),
-    "no-disappeared": Style("#56B4E9", "P", (0, (4, 1.5))),
-    "minimal": Style("#8C6BB1", "X", (0, (1, 1))),
-    "snap": Style("#A6761D", "*", (0, (1, 1))),
-    "least-squares": Style("#117733", "<", (0, (1, 1))),
-    "settle": Style("#882255", ">", (0, (1, 1))),
-    "penalty": Style("#88CCEE", "d", (0, (1, 1))),
-}
-OTHERS = (Style("#6B6B6B", "h", (0, (1, 1))), Style("#DDCC77", "H", (0, (1, 1))), Style("#000000", "1", (0, (1, 1))))
+def success_figure(cells: Sequence[Cell]) -> Figure:
+    """Success over level: a panel per setting that has two levels or more; if there is none, of every setting."""
+    looks = styles(methods_of(cells))
+    grouped = {s: own for s, own in members(settings(cells), cells).items() if levels_of(own)}
+    varied = {s: own for s, own in grouped.items() if len(levels_of(own)) > 1}
+    panels = [_success(setting, own, looks) for setting, own in (varied or grouped).items()]
+    return Figure("Success over level", panels, entries(looks, any(cell.method == "oracle" for cell in cells)))
 
 
-def draw(cells: Sequence[Cell], path: Path) -> None:
-    """Write the figure as PNG; no display is needed."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    swept = [cell for cell in cells if not knows_truth(cell.method)]
-    rows = rows_of(cells)
-    careless = sorted({c.careless for c in swept}) or [0.0]
-    lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
-    columns = [(relations, f) for relations in dict.fromkeys(row.relations for row in rows) for f in careless]
-    panels = [[(line._replace(relations=relations), f) for relations, f in columns] for line in lines]
-    if len(columns) == 1:
-        alone = [panel for line in panels for panel in line]
-        panels = [alone[i : i + BESIDE] for i in range(0, len(alone), BESIDE)]
-    width = max(map(len, panels))
-    figure = Figure(figsize=(0.9 + 4.3 * width, 1.0 + 3.1 * len(panels)), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(len(panels), width, squeeze=False, sharey=True)
-    for i, across in enumerate(axes):
-        for j, axis in enumerate(across):
-            row, f = panels[i][j] if j < len(panels[i]) else (None, 0.0)
-            if row not in rows:
-                axis.set_axis_off()
-                continue
-            axis.set_title(row.title(f), fontsize=10)
-            _panel(axis, [c for c in cells if row.holds(c)], f)
-        across[0].set_ylabel("success")
-    figure.supxlabel(level_axis(row.noise for row in rows), fontsize=10)
-    legend(figure, axes, width)
-    figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
+def difference_figure(pairs: Mapping[Setting, Sequence[Paired]], reference: str, looks: Mapping[str, Style]) -> Figure:
+    """Differences to a reference: a panel per setting in which methods are compared with it."""
+    shown = {m: look for m, look in looks.items() if m not in (reference, "none")}
+    here = {s: [p for p in own if p.reference == reference and p.pairs] for s, own in pairs.items()}
+    panels = [_differences(setting, own, shown) for setting, own in here.items() if own]
+    return Figure(f"Difference of success to {reference}, same seeds", panels, entries(shown))
 
 
-def legend(figure: Any, axes: Any, columns: int) -> None:
-    """One legend for all panels, above them."""
-    handles = {label: h for axis in axes.flat for h, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    many = min(4 * columns, max(1, len(handles)))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=many, frameon=False)
+def gap_figure(gaps: Mapping[Setting, Sequence[Gap]], looks: Mapping[str, Style]) -> Figure:
+    """Gaps as seen and as planned: a panel per setting in which a method corrected."""
+    shown = {m: look for m, look in looks.items() if any(g.place.method == m for own in gaps.values() for g in own)}
+    panels = [_gaps(setting, own, shown) for setting, own in gaps.items() if own]
+    return Figure("Gap of the contacts as seen and as planned", panels, entries({"as seen": SEEN, **shown}))
 
 
-def rows_of(cells: Sequence[Cell]) -> list[Row]:
-    """What panels show, in the order of the cells; the cells of methods that meet everything decide."""
-    keen = [c for c in cells if knows_relations(c.method)]
-    fewer = keen or [c for c in cells if as_seen(c.method)] or list(cells)
-    return list(dict.fromkeys(Row(c.scenario, c.clearance_mm, c.noise, c.relations) for c in fewer))
+def recognition_figure(found: Sequence[Recognition]) -> Figure:
+    """Precision, recall and demonstrations all right, over all scenarios where there are several."""
+    shown = [r for r in found if r.place.scenario == ALL] or list(found)
+    rows = sorted({(r.place.noise, r.place.eye, r.place.careless) for r in shown})
+    panels = []
+    for row in rows:
+        here = [r for r in shown if (r.place.noise, r.place.eye, r.place.careless) == row]
+        where = f"{'range finder' if row[1] == RANGE else row[0]}, carelessness {row[2]:g}"
+        panels += [_recognised(f"{name}; {where}", here, what) for what, name in RECOGNITION.items()]
+    kinds = {kind: style for kind, style in RECOGNISED.items() if any(r.place.relations == kind for r in found)}
+    return Figure("Recognised contacts over level", panels, entries(kinds))
 
 
-def _panel(axis: Any, cells: Sequence[Cell], careless: float) -> None:
-    """One panel: levels side by side at equal distances, since they span two decades and zero."""
-    here = [c for c in cells if not knows_truth(c.method) and c.careless == careless]
-    levels = sorted({(c.level, c.level_deg) for c in here})
-    place = {level: x for x, level in enumerate(levels)}
-    for ceiling in (c for c in cells if c.method == "oracle" and c.rate is not None):
-        axis.axhline(ceiling.rate, color=CEILING, linestyle="--", linewidth=1.2, label="oracle")
-    methods = list(dict.fromkeys(c.method for c in here))
-    for i, (method, style) in enumerate(styles(methods).items()):
-        line = [c for c in here if c.method == method and c.rate is not None]
-        aside = DODGE * (i - (len(methods) - 1) / 2)
-        _line(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, method)
-        if len(methods) <= MANY:
-            _counts(axis, line, [place[c.level, c.level_deg] + aside for c in line], style, i, len(methods))
-    measured = bool(here) and here[0].noise == RANGE
-    axis.set_xticks(range(len(levels)), [f"{mm:g}" if measured else level_label(mm, deg) for mm, deg in levels])
-    axis.set_xlim(-0.4, max(len(levels) - 1, 0) + 0.4)
-    axis.set_ylim(-0.04, 1.06)
-    axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
-    axis.grid(axis="y", alpha=0.3)
-    axis.spines[["top", "right"]].set_visible(False)
+def methods_of(cells: Sequence[Cell]) -> list[str]:
+    """Those that have a colour, as a reader looks for them."""
+    return [m for m in dict.fromkeys(c.method for c in cells) if not knows_truth(m)]
 
 
-def styles(methods: Sequence[str]) -> dict[str, Style]:
-    """One each; a method of one's own takes the next that is left."""
-    own = [method for method in methods if method not in STYLES]
-    return {m: STYLES[m] if m in STYLES else OTHERS[own.index(m) % len(OTHERS)] for m in methods}
+def counted(numbers: Sequence[int], what: str = "") -> str:
+    """`n 40`, or `n 38 to 160` where it differs, and of what."""
+    low, high = min(numbers, default=0), max(numbers, default=0)
+    return f"n\u00a0{low if low == high else f'{low} to {high}'}{f' {what}' if what else ''}"
 
 
-def _line(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style, method: str) -> None:
-    rates = [float(c.rate or 0.0) for c in cells]
-    below = [rate - c.interval.low for rate, c in zip(rates, cells, strict=True)]
-    above = [c.interval.high - rate for rate, c in zip(rates, cells, strict=True)]
-    bars = {"fmt": "none", "capsize": 2, "linewidth": 0.9, "alpha": 0.7}
-    axis.errorbar(x, rates, yerr=[below, above], color=style.color, **bars)
-    shape = {"color": style.color, "marker": style.marker, "linestyle": style.dashes}
-    axis.plot(x, rates, markersize=5, linewidth=1.6, label=method, clip_on=False, **shape)
+def scale(values: Sequence[float]) -> Axis:
+    """An axis in points that holds zero and all values (shares)."""
+    low, high = 100 * min(0.0, *values), 100 * max(0.0, *values)
+    step = next((s for s in STEPS if (high - low) / s <= 6), STEPS[-1])
+    first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
+    ticks = [(k * step / 100, f"{k * step:+d}" if k else "0") for k in range(first, last + 1)]
+    return Axis("difference [points]", first * step / 100, last * step / 100, ticks)
 
 
-def _counts(axis: Any, cells: Sequence[Cell], x: Sequence[float], style: Style, i: int, methods: int) -> None:
-    """`n=100` beside every point, of the first methods on the left, of the others on the right and apart in height."""
-    side, align = (-6, "right") if i < methods // 2 else (6, "left")
-    for at, cell in zip(x, cells, strict=True):
-        rate = float(cell.rate or 0.0)
-        away = (-12 - 7 * (i // 2)) if rate > 0.5 else (6 + 7 * (i // 2))
-        text = {"textcoords": "offset points", "fontsize": 6, "color": style.color, "ha": align}
-        axis.annotate(f"n={cell.trials}", (at, rate), (side, away), **text)
+def _success(setting: Setting, cells: Sequence[Cell], looks: Mapping[str, Style]) -> Panel:
+    def point(c: Cell) -> tuple[float, float, float]:
+        return c.rate or 0.0, *c.interval
+
+    def tip(c: Cell) -> str:
+        return f"{percent(c.rate)} ({interval(c)}), n {c.trials}"
+
+    known = [c for c in cells if c.rate is not None]
+    lines = _lines(setting, known, looks, point, tip)
+    best = next((c for c in known if c.method == "oracle"), None)
+    rule = None if best is None else Rule(best.rate or 0.0, True, f"oracle: {percent(best.rate)}, n {best.trials}")
+    title = f"{setting.title()}; {counted([c.trials for c in cells])}"
+    return line_panel(title, _levels(setting, cells), Axis("success", 0.0, 1.0, SHARES), lines, rule)
 
 
-def level_axis(noises: Iterable[str]) -> str:
-    """What a level is: of poses that are drawn, of rays of the range finder, or of both."""
-    found = set(noises)
-    if found == {RANGE}:
-        return "level: standard deviation of a ray of the range finder [mm]"
-    also = "; range finder: of a ray [mm]" if RANGE in found else ""
-    return f"level: standard deviation of the seen poses [mm and degrees]{also}"
+def _differences(setting: Setting, pairs: Sequence[Paired], looks: Mapping[str, Style]) -> Panel:
+    def point(p: Paired) -> tuple[float, float, float]:
+        return p.difference or 0.0, *p.interval
+
+    def tip(p: Paired) -> str:
+        d, (low, high) = p.difference or 0.0, p.interval
+        return f"{100 * d:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}), n {p.pairs} pairs"
+
+    y = scale([x for p in pairs for x in p.interval])
+    title = f"{setting.title()}; {counted([p.pairs for p in pairs], 'pairs')}"
+    return line_panel(title, _levels(setting, pairs), y, _lines(setting, pairs, looks, point, tip), Rule(0.0))
+
+
+def _gaps(setting: Setting, found: Sequence[Gap], looks: Mapping[str, Style]) -> Panel:
+    def point(q: Quantiles) -> tuple[float, float, float]:
+        return max(q.median, FLOOR_MM), max(q.low, FLOOR_MM), max(q.high, FLOOR_MM)
+
+    def tip(g: Gap) -> str:
+        return f"as planned: median {g.planned.median:.3f} mm, 95 % below {g.planned.high:.3f} mm, n {g.trials}"
+
+    planned = _lines(setting, found, looks, lambda g: point(g.planned), tip)
+    most_tried = [max((g for g in found if level_of(g) == x), key=lambda g: g.trials) for x in levels_of(found)]
+    seen = [
+        Point(float(i), *point(g.seen), f"median {g.seen.median:.3f} mm, n {g.trials}")
+        for i, g in enumerate(most_tried)  # methods were shown the same
+    ]
+    values = [x for g in found for q in (g.seen, g.planned) for x in point(q)]
+    low = math.floor(math.log10(min(values)))
+    high = max(math.ceil(math.log10(max(values))), low + 1)
+    ticks = [(10.0**k, _power(k)) for k in range(low, high + 1, max(1, (high - low) // 4))]
+    y = Axis("gap [mm]", 10.0**low, 10.0**high, ticks, logarithmic=True)
+    title = f"{setting.title()}; {counted([g.trials for g in found])}"
+    return line_panel(title, _levels(setting, found), y, [Line("as seen", SEEN, seen), *planned])
+
+
+def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
+    levels = sorted({(r.place.level, r.place.level_deg) for r in here})
+    noise = RANGE if all(r.place.eye == RANGE for r in here) else ""
+    kinds = [kind for kind in RECOGNISED if any(r.place.relations == kind for r in here)]
+    lines = []
+    for kind, dodge in zip(kinds, dodges(len(kinds)), strict=True):
+        points = []
+        for r in sorted(here, key=lambda r: r.place.level):
+            x, share = levels.index((r.place.level, r.place.level_deg)) + dodge, getattr(r, what)
+            if r.place.relations == kind and share is not None:
+                points.append(Point(x, share, share, share, percent(share)))
+        lines.append(Line(kind, RECOGNISED[kind], points))
+    least = min((p.value for line in lines for p in line.points), default=0.0)
+    low = 0.0 if least < 0.6 else 0.6 if least < 0.9 else 0.9
+    ticks = [(low + (1 - low) * k / 4, f"{100 * (low + (1 - low) * k / 4):g} %") for k in range(5)]
+    x = levels_axis([level_words(level, noise) for level in levels], level_unit(noise))
+    return line_panel(title, x, Axis("share", low, 1.0, ticks), lines)
+
+
+def _levels(setting: Setting, items: Sequence[object]) -> Axis:
+    return levels_axis([level_words(x, setting.noise) for x in levels_of(items)], level_unit(setting.noise))
+
+
+def _lines(
+    setting: Setting,
+    items: Sequence[Item],
+    looks: Mapping[str, Style],
+    point: Callable[[Item], tuple[float, float, float]],
+    tip: Callable[[Item], str],
+) -> list[Line]:
+    """A line per method, by a value with its interval and a sentence of each item."""
+    levels = levels_of(items)
+    by_method = {m: [item for item in items if at(item).method == m] for m in looks}
+    drawn = {m: own for m, own in by_method.items() if own}
+    lines = []
+    for (method, own), dodge in zip(drawn.items(), dodges(len(drawn)), strict=True):
+        points = []
+        for item in own:
+            level = level_of(item)
+            said = f"level {level_words(level, setting.noise)}: {tip(item)}"
+            points.append(Point(levels.index(level) + dodge, *point(item), said))
+        lines.append(Line(method, looks[method], points))
+    return lines
+
+
+def _power(k: int) -> str:
+    """`0.01`, or `10⁻⁴`."""
+    if -2 <= k <= 3:
+        return f"{10.0**k:g}"
+    return "10" + str(k).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

@@ -1,60 +1,226 @@
-"""Panels as a file of its own: one SVG that any viewer opens, on white."""
+"""A figure: panels with a legend, drawn once by matplotlib, for files as one sheet and for a page in pieces.
+
+One unit of a sheet is one px; a panel is 360 of them wide. In a page every panel is a picture of its own, so that
+panels find their places in windows of any width, and their colours follow the page's.
+"""
 
 from __future__ import annotations
 
+import io
+import re
 import textwrap
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
 from pathlib import Path
+from typing import Any, NamedTuple, final
+
+import matplotlib
+from markupsafe import Markup
+from matplotlib import figure as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 
 from apo_bench.io.writing import to_write
-from apo_bench.report.figures.chart import WIDTH, Entry, Panel
-from apo_bench.report.figures.paint import palette
-from apo_bench.report.page.files import page_file
-from apo_bench.report.page.markup import Html, joined, tag
+from apo_bench.report.figures.styles import INK, themed
 
-ACROSS = 3
-LETTERS = 62
-"""Of a line of a title."""
-HEAD, LINE, GAP, TITLE = 40, 20, 18, 32
-"""Heights of the title, of a line of the legend, of the space between panels and for their titles, px."""
+WIDTH, HEIGHT = 360, 230
+"""Of a panel."""
+ACROSS, LETTERS = 3, 62
+"""Panels side by side in a file; letters of a line of their titles."""
+HEAD, LINE, GAP, TITLE, SAMPLE = 40, 20, 18, 32, (26, 14)
+"""Heights of the title, of a line of the legend, of the space between panels and of their titles; size of a sample."""
+DPI = 72
+"""Of a sheet: one px each."""
+PNG_DPI = 120
+LOOKS = {
+    "svg.fonttype": "none",
+    "font.family": ["sans-serif"],
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 10.0,
+    "text.color": INK,
+    "text.parse_math": False,
+    "text.usetex": False,
+    "path.simplify": False,
+}
+PIECE = re.compile(r'^  <g id="((?:panel|sample)-\d+)">\n(.*?)^  </g>$', re.MULTILINE | re.DOTALL)
+CLIPS = re.compile(r"<clipPath .*?</clipPath>", re.DOTALL)
+SHAPE = re.compile(r"<(use|path) (?!id=)([^>]*?)/>")
+Tips = Callable[[Any, Sequence[str]], None]
+"""Says what is shown when a mark is pointed at: takes something drawn, and a sentence for each of its marks."""
 
 
-def write_sheet(title: str, panels: Sequence[Panel], methods: Sequence[str], key: Sequence[Entry], path: Path) -> None:
-    """Write panels side by side.
+class Panel(NamedTuple):
+    """One drawing with its title."""
 
-    Args:
-        key: The legend.
-    """
-    across = min(ACROSS, len(panels))
+    title: str
+    draw: Callable[[Any, Tips], None]
+    """Draws into the axes of matplotlib."""
+    height: int = HEIGHT
+    margins: tuple[int, int, int, int] = (52, 12, 10, 42)
+    """Left, right, above and below the axes."""
+
+
+class Entry(NamedTuple):
+    """One of a legend."""
+
+    name: str
+    draw: Callable[[Any], None]
+    """Draws a sample into axes of 26 by 14."""
+
+
+class Figure(NamedTuple):
+    """Panels that share a legend."""
+
+    title: str
+    panels: Sequence[Panel]
+    legend: Sequence[Entry] = ()
+
+
+class Piece(NamedTuple):
+    """A panel, or the sample of a legend, as it stands in a page."""
+
+    title: str
+    svg: Markup
+
+
+@final
+@dataclass(frozen=True)
+class Drawing:
+    """A figure that was drawn."""
+
+    title: str
+    panels: tuple[Piece, ...]
+    legend: tuple[Piece, ...]
+    shapes: Markup
+    """What pieces refer to; it stands once in the page."""
+    sheet: str
+    """All of it as an SVG file."""
+    canvas: Any
+    """Matplotlib's figure."""
+
+    def write(self, path: Path) -> Path:
+        """Write the sheet, as SVG or PNG by the ending."""
+        with to_write(path) as file:
+            if path.suffix == ".png":
+                with _looks(self.title):
+                    FigureCanvasAgg(self.canvas)
+                    self.canvas.savefig(file, format="png", dpi=PNG_DPI)
+            else:
+                file.write(self.sheet.encode())
+        return path
+
+
+def draw(figure: Figure) -> Drawing:
+    """Draw every panel and the legend."""
+    across = min(ACROSS, len(figure.panels))
     width = across * (WIDTH + GAP) + GAP
-    entries, lines = _key(key, width)
-    y, body = HEAD + LINE * lines, [tag("text", title, x=GAP, y=26, class_="title"), entries]
-    for i in range(0, len(panels), across):
-        line = panels[i : i + across]
-        for j, one in enumerate(line):
-            x = GAP + j * (WIDTH + GAP)
-            for k, words in enumerate(textwrap.wrap(one.title, LETTERS)[:2]):
-                body.append(tag("text", words, x=x, y=y + 12 + 14 * k))
-            size = {"x": x, "y": y + TITLE, "width": WIDTH, "height": one.height}
-            body.append(tag("svg", one.drawing, viewBox=f"0 0 {WIDTH} {one.height}", **size))
-        y += max(one.height for one in line) + GAP + TITLE
-    style = f":root{{{palette(methods)[0]}}}{page_file('chart.css')}"
-    ground = tag("rect", width=width, height=y, fill="#ffffff")
-    inside = (tag("style", Html(style)), ground, *body)
-    made = tag("svg", *inside, xmlns="http://www.w3.org/2000/svg", viewBox=f"0 0 {width} {y}", width=width, height=y)
-    with to_write(path, "w") as file:
-        file.write(made + "\n")
+    samples, lines = _legend_places(figure.legend, width)
+    top, places = HEAD + LINE * lines, []
+    for i in range(0, len(figure.panels), across):
+        row = figure.panels[i : i + across]
+        places += [(GAP + k * (WIDTH + GAP), top + TITLE) for k in range(len(row))]
+        top += TITLE + max(panel.height for panel in row) + GAP
+    boxes: dict[str, tuple[float, ...]] = {}
+    tips: list[Sequence[str]] = []
+
+    def tip(artist: Any, said: Sequence[str]) -> None:
+        artist.set_gid(f"tips-{len(tips)}")
+        tips.append(said)
+
+    with _looks(figure.title):
+        canvas = mpl.Figure(figsize=(width / DPI, top / DPI), dpi=DPI)
+        sheet = _Sheet(canvas, width, top)
+        sheet.text(GAP, 26, figure.title, fontsize=15)
+        for i, (entry, (x, y)) in enumerate(zip(figure.legend, samples, strict=True)):
+            boxes[f"sample-{i}"] = (x, y, *SAMPLE)
+            entry.draw(sheet.axes(f"sample-{i}", x, y, *SAMPLE))
+            sheet.text(x + SAMPLE[0] + 5, y + 11, entry.name)
+        for i, (panel, (x, y)) in enumerate(zip(figure.panels, places, strict=True)):
+            boxes[f"panel-{i}"] = (x, y, WIDTH, panel.height)
+            for k, words in enumerate(textwrap.wrap(panel.title, LETTERS)[:2]):
+                sheet.text(x, y - TITLE + 12 + 14 * k, words)
+            left, right, above, below = panel.margins
+            size = (WIDTH - left - right, panel.height - above - below)
+            panel.draw(sheet.axes(f"panel-{i}", x + left, y + above, *size), tip)
+        made = io.StringIO()
+        FigureCanvasSVG(canvas).print_svg(made, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    svg = _with_tips(made.getvalue(), tips)
+    pieces = {name: _piece(body, boxes[name]) for name, body in PIECE.findall(svg)}
+    return Drawing(
+        title=figure.title,
+        panels=tuple(Piece(p.title, pieces[f"panel-{i}"]) for i, p in enumerate(figure.panels)),
+        legend=tuple(Piece(e.name, pieces[f"sample-{i}"]) for i, e in enumerate(figure.legend)),
+        shapes=Markup("".join(map(_small, CLIPS.findall(svg)))),
+        sheet=svg[svg.index("<svg ") :],
+        canvas=canvas,
+    )
 
 
-def _key(key: Sequence[Entry], width: int) -> tuple[Html, int]:
-    """Its entries set in lines, and how many lines there are."""
-    x, line, made = GAP, 0, []
-    for entry in key:
-        need = 42 + 7 * len(entry.name)
+class _Sheet(NamedTuple):
+    """Places things by px from the upper left corner."""
+
+    canvas: Any
+    width: float
+    height: float
+
+    def text(self, x: float, y: float, words: str, **more: Any) -> None:
+        """Below all axes in the file, so that pieces are read without it."""
+        self.canvas.text(x / self.width, 1 - y / self.height, words, zorder=-1, **more)
+
+    def axes(self, name: str, x: float, y: float, width: float, height: float) -> Any:
+        place = (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height)
+        made = self.canvas.add_axes(place, gid=name)
+        made.patch.set_visible(False)
+        return made
+
+
+@contextmanager
+def _looks(salt: str) -> Iterator[None]:
+    """Matplotlib's own settings but for ours; a letter that a font lacks is nothing to warn of."""
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(LOOKS | {"svg.hashsalt": salt})
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _legend_places(entries: Sequence[Entry], width: int) -> tuple[list[tuple[int, int]], int]:
+    """Upper left corners of the samples, set in lines, and how many lines there are."""
+    x, line, places = GAP, 0, []
+    for entry in entries:
+        need = 48 + 7 * len(entry.name)
         if x + need > width and x > GAP:
             x, line = GAP, line + 1
-        y = HEAD + LINE * line - 4
-        made.append(tag("svg", entry.drawing, x=x, y=y, width=26, height=14, viewBox="0 0 26 14"))
-        made.append(tag("text", entry.name, x=x + 31, y=y + 11))
+        places.append((x, HEAD + LINE * line - 4))
         x += need
-    return joined(made), line + bool(made)
+    return places, line + bool(places)
+
+
+def _with_tips(svg: str, tips: Sequence[Sequence[str]]) -> str:
+    """With a `<title>` in every mark of which something is said."""
+    head, *rest = re.split(r'<g id="tips-(\d+)">', svg)
+    made = [head]
+    for number, segment in zip(rest[::2], rest[1::2], strict=True):
+        said = iter(tips[int(number)])
+        made += ["<g>", SHAPE.sub(lambda m: _pointed(m, next(said, None)), segment)]  # noqa: B023
+    return "".join(made)
+
+
+def _pointed(mark: re.Match[str], said: str | None) -> str:
+    if said is None:
+        return mark[0]
+    return f"<{mark[1]} {mark[2]}><title>{escape(said, quote=False)}</title></{mark[1]}>"
+
+
+def _piece(body: str, box: Sequence[float]) -> Markup:
+    return Markup(f'viewBox="{" ".join(f"{x:g}" for x in box)}">{themed(_small(body))}</svg>')
+
+
+def _small(svg: str) -> str:
+    """Without names that nothing refers to, without fonts, and without lines."""
+    svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
+    svg = re.sub(r" transform=\"rotate\(-0 [^)]*\)\"| font-family: [^;]*;", "", svg)
+    return re.sub(r"\s*\n\s*", " ", svg)

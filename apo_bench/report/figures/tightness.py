@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 from apo_bench.records.method import knows_truth
-from apo_bench.report.figures.levels import legend, rows_of, styles
+from apo_bench.report.figures.levels import SHARES, methods_of
+from apo_bench.report.figures.lines import Axis, Line, Point, entries, line_panel
+from apo_bench.report.figures.sheet import Figure, Panel
+from apo_bench.report.figures.styles import styles
+from apo_bench.statistics.rate_text import interval, level_label, percent
 from apo_bench.statistics.rates import Cell
+from apo_bench.statistics.settings import Setting, members, settings
 
 DODGE = 1.03
 """Methods stand this factor from each other at one tightness, so that equal rates do not hide each other."""
@@ -20,51 +23,40 @@ def varies(cells: Sequence[Cell]) -> bool:
     return len(swept) > len({scenario for scenario, _ in swept}) and any(c.tightness for c in cells)
 
 
-def draw_tightness(cells: Sequence[Cell], path: Path) -> None:
-    """Write the figure as PNG: panels as in the figure over level; a line per method and level."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    seen = [c for c in cells if not knows_truth(c.method) and c.tightness and c.rate is not None]
-    rows = list(dict.fromkeys(row._replace(clearance_mm=None) for row in rows_of(cells)))
-    lines = list(dict.fromkeys(row._replace(relations="given") for row in rows))
-    careless = sorted({c.careless for c in seen})
-    columns = [(relations, f) for relations in dict.fromkeys(row.relations for row in rows) for f in careless]
-    figure = Figure(figsize=(0.9 + 4.3 * len(columns), 1.0 + 3.1 * len(lines)), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(len(lines), len(columns), squeeze=False, sharey=True)
-    for i, line in enumerate(lines):
-        for j, (relations, f) in enumerate(columns):
-            row = line._replace(relations=relations)
-            if row not in rows:
-                axes[i][j].set_axis_off()
-                continue
-            axes[i][j].set_title(row.title(f), fontsize=10)
-            _panel(axes[i][j], [c for c in seen if c.careless == f and row.holds(c)])
-        axes[i][0].set_ylabel("success")
-    figure.supxlabel("tightness: clearance per side over level [mm per mm]", fontsize=10)
-    legend(figure, axes, len(columns))
-    figure.savefig(path, dpi=150, bbox_inches="tight", pad_inches=0.15)
+def tightness_figure(cells: Sequence[Cell]) -> Figure:
+    """Panels as over the level, but of all clearances together; a line per method and level."""
+    if not varies(cells):
+        return Figure("Success over tightness", ())
+    grouped: dict[Setting, dict[tuple[object, ...], Cell]] = {}
+    for setting, own in members(settings(cells), cells).items():
+        inside = grouped.setdefault(setting._replace(clearance_mm=0.0), {})
+        for c in own:
+            if not knows_truth(c.method) and c.tightness and c.rate is not None:
+                inside[c.method, c.level, c.level_deg, c.clearance_mm] = c
+    panels = [_panel(setting, list(own.values())) for setting, own in grouped.items() if own]
+    return Figure("Success over tightness", panels, entries(styles(methods_of(cells))))
 
 
-def _panel(axis: Any, cells: Sequence[Cell]) -> None:
-    methods = list(dict.fromkeys(c.method for c in cells))
-    for i, (method, style) in enumerate(styles(methods).items()):
-        aside = DODGE ** (i - (len(methods) - 1) / 2)
-        shape = {"color": style.color, "marker": style.marker, "linestyle": style.dashes, "linewidth": 1.2}
+def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
+    looks = styles(list(dict.fromkeys(c.method for c in cells)))
+    lines = []
+    for i, (method, style) in enumerate(looks.items()):
+        dodge = DODGE ** (i - (len(looks) - 1) / 2)
         for level in sorted({(c.level, c.level_deg) for c in cells if c.method == method}):
-            line = [c for c in cells if c.method == method and (c.level, c.level_deg) == level]
-            x, y = [(c.tightness or 0.0) * aside for c in line], [float(c.rate or 0.0) for c in line]
-            bars = [[r - c.interval.low for r, c in zip(y, line, strict=True)]]
-            bars += [[c.interval.high - r for r, c in zip(y, line, strict=True)]]
-            axis.errorbar(x, y, yerr=bars, color=style.color, fmt="none", capsize=2, linewidth=0.8, alpha=0.6)
-            axis.plot(x, y, markersize=5, label=method, clip_on=False, **shape)
-    if cells:
-        axis.set_xscale("log")
-        ticks = sorted({c.tightness for c in cells if c.tightness})
-        axis.set_xticks(ticks, [f"{x:g}" for x in ticks], fontsize=8)
-        axis.minorticks_off()
-    axis.set_ylim(-0.04, 1.06)
-    axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
-    axis.grid(axis="y", alpha=0.3)
-    axis.spines[["top", "right"]].set_visible(False)
+            own = [c for c in cells if c.method == method and (c.level, c.level_deg) == level]
+            points = [
+                Point(
+                    (c.tightness or 0.0) * dodge,
+                    c.rate or 0.0,
+                    *c.interval,
+                    f"level {level_label(*level, c.noise)}, clearance {c.clearance_mm:g} mm: {percent(c.rate)} "
+                    f"({interval(c)}), n {c.trials}",
+                )
+                for c in sorted(own, key=lambda c: c.clearance_mm)
+            ]
+            lines.append(Line(method, style, points))
+    found = sorted({c.tightness for c in cells if c.tightness})
+    ticks = [(t, f"{t:g}") for t in found]
+    x = Axis("clearance per side over level [mm per mm]", found[0] / 1.3, found[-1] * 1.3, ticks, logarithmic=True)
+    title = ", ".join([setting.scenario, *setting.conditions(clearance=False)])
+    return line_panel(title, x, Axis("success", 0.0, 1.0, SHARES), lines)

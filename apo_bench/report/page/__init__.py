@@ -1,1 +1,1 @@
-"""Pages that a browser opens without a network: HTML, style, script and drawings in one file."""
+"""The pages: templates, their style and their script."""

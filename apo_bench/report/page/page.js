@@ -1,12 +1,12 @@
 "use strict";
-// The trials behind a cell: unpacked when the first one is opened, shown a hundred at a time.
+// The trials of a cell: unpacked when the first one is opened, shown a hundred at a time.
 (() => {
   const STEP = 100;
   let kept = null;
 
   async function unpacked() {
     if (kept === null) {
-      const letters = atob(document.getElementById("behind").textContent.trim());
+      const letters = atob(document.getElementById("trials").textContent.trim());
       const bytes = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
       const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
       kept = JSON.parse(await new Response(stream).text());
@@ -20,10 +20,16 @@
     return Object.assign(element, more || {});
   }
 
+  // As a person writes it: 0.000 mm, and p < 0.001.
+  function written(name, x, digits) {
+    if (x === null) return "–";
+    return name === "p_value" && x < 0.001 ? "< 0.001" : x.toFixed(digits);
+  }
+
   function trial(found, i) {
     const word = (name) => found.words[name][found.columns[name][i]];
     const seed = found.columns.seed[i];
-    const numbers = found.numbers.map(([name]) => found.columns[name][i]);
+    const numbers = found.numbers.map(([name, , digits]) => written(name, found.columns[name][i], digits));
     return { seed, numbers, verdict: word("verdict"), why: word("why"), sentence: word("sentence"),
       predicted: word("predicted"), command: `${word("command")} --seed ${seed}` };
   }
@@ -73,7 +79,7 @@
     }
     row.append(again, made("td", one.verdict), made("td", one.why || "–"), made("td", one.sentence, { className: "wide" }));
     row.append(made("td", one.predicted || "–"));
-    for (const x of one.numbers) row.append(made("td", x === null ? "–" : String(x), { className: "number" }));
+    for (const x of one.numbers) row.append(made("td", x, { className: "number" }));
     row.appendChild(made("td")).append(made("code", one.command));
     return row;
   }
@@ -107,7 +113,7 @@
     table.append(head(found), body);
     const scroll = made("div", null, { className: "scroll tall", tabIndex: 0 });
     scroll.setAttribute("role", "region");
-    scroll.setAttribute("aria-label", "trials behind the cell");
+    scroll.setAttribute("aria-label", "trials of the cell");
     scroll.append(table);
     const more = made("button", null, { type: "button", className: "more" });
     const show = () => {
@@ -129,8 +135,8 @@
   function panelOf(button) {
     const box = button.closest(".scroll");
     let panel = box.nextElementSibling;
-    if (!panel || !panel.classList.contains("behind")) {
-      panel = made("section", null, { className: "behind", hidden: true });
+    if (!panel || !panel.classList.contains("trials")) {
+      panel = made("section", null, { className: "trials", hidden: true });
       panel.setAttribute("aria-live", "polite");
       box.after(panel);
     }
@@ -170,7 +176,7 @@
 
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;
-    const panel = event.target.closest(".behind");
+    const panel = event.target.closest(".trials");
     const box = panel ? panel.previousElementSibling : event.target.closest(".scroll");
     const button = box && box.querySelector("button.cell[aria-expanded='true']");
     if (button) shut(button, panelOf(button));

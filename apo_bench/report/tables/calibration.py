@@ -1,11 +1,12 @@
-"""Calibration as a table: whether corrections are as uncertain as they say."""
+"""Whether corrections are as uncertain as they say."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from apo_bench.records.method import knows_relations
-from apo_bench.report.page.markup import Table
+from apo_bench.report.tables.saying import millimetres
+from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.calibration import Calibration
 
 WORDS = (
@@ -15,27 +16,27 @@ WORDS = (
     "correction: a false alarm where the relations are as given, a catch where they are wrong. The *culprit* is how "
     "often the wrong relation, if it is one of those that were told, is in the ambiguity set of a failed test."
 )
-HEADER = (
-    *("scenario", "noise", "relations", "method", "n", "covered", "fixed error", "over clearance", "free error"),
-    *("test fails", "culprit"),
-)
 
 
 def calibration_table(found: Sequence[Calibration]) -> Table:
-    """For people."""
-    return Table(HEADER, [_line(c) for c in found], words=4)
+    """One line per scenario, noise, relations and method; for people."""
+    return Table(found, COLUMNS, "No method was tried.")
 
 
-def calibration_lines(found: Sequence[Calibration]) -> list[str]:
-    """The same in Markdown, or a sentence where there is nothing to say."""
-    return calibration_table(found).markdown("No method was tried.")
+def _ratio(c: Calibration) -> str | None:
+    return None if c.fixed_over_clearance is None else f"{c.fixed_over_clearance:.2f}"
 
 
-def _line(c: Calibration) -> tuple[object, ...]:
-    errors = (_number(c.fixed_mm, " mm"), _number(c.fixed_over_clearance, ""), _number(c.free_mm, " mm"))
-    told = c.relations if knows_relations(c.method) else "any"
-    return (c.scenario, c.noise, told, c.method, c.planned, c.covered, *errors, c.failed_tests, c.culprits)
-
-
-def _number(x: float | None, unit: str) -> str:
-    return "–" if x is None else f"{x:.3g}{unit}"
+COLUMNS = (
+    Column("scenario", "scenario", words=True),
+    Column("noise", "noise", words=True),
+    Column("relations", "relations", text=lambda c: c.relations if knows_relations(c.method) else "any", words=True),
+    Column("method", "method", words=True),
+    Column("planned", "n"),
+    Column("covered", "covered"),
+    Column("fixed_mm", "fixed error [mm]", text=lambda c: millimetres(c.fixed_mm)),
+    Column("fixed_over_clearance", "over clearance", text=_ratio),
+    Column("free_mm", "free error [mm]", text=lambda c: millimetres(c.free_mm)),
+    Column("failed_tests", "test fails"),
+    Column("culprits", "culprit"),
+)

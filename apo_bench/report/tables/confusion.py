@@ -1,22 +1,13 @@
-"""The confusion table of a sweep: for the page, for a file, and in one line."""
+"""Prediction against physics: counted by scenario and method, and in one line."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
-from apo_bench.io.csv_file import write_csv
-from apo_bench.report.page.markup import Table
+from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.confusion import Confusion
+from apo_bench.statistics.rate_text import percent
 
-COLUMNS = (
-    *("scenario", "method", "predicted_fit_fitted", "predicted_fit_failed", "predicted_fail_fitted"),
-    *("predicted_fail_failed", "agreement", "same_operation", "stopped", "not_executed", "excluded"),
-)
-HEADER = (
-    *("scenario", "method", "n", "fit: fitted", "fit: failed", "fail: fitted", "fail: failed", "agreement"),
-    *("right operation", "not executed", "excluded"),
-)
 WORDS = (
     "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides: *fitted* is made as "
     "demonstrated. An operation is right where the robot stopped at the one that was predicted. A method that gave no "
@@ -24,23 +15,9 @@ WORDS = (
 )
 
 
-def write_confusions(found: Sequence[Confusion], path: Path) -> None:
-    """One line per scenario and method, and one of them all."""
-    lines = []
-    for c in found:
-        counts = (c.fit_fitted, c.fit_failed, c.fail_fitted, c.fail_failed, c.agreement)
-        lines.append((c.scenario, c.method, *counts, c.same_operation, c.stopped, c.not_executed, c.excluded))
-    write_csv(path, COLUMNS, lines)
-
-
 def confusion_table(found: Sequence[Confusion]) -> Table:
-    """For people."""
-    return Table(HEADER, [_line(c) for c in found], words=2)
-
-
-def confusion_lines(found: Sequence[Confusion]) -> list[str]:
-    """The same in Markdown."""
-    return confusion_table(found).markdown()
+    """One line per scenario and method, and one of them all."""
+    return Table(found, COLUMNS)
 
 
 def summary(c: Confusion) -> str:
@@ -54,8 +31,21 @@ def summary(c: Confusion) -> str:
     )
 
 
-def _line(c: Confusion) -> tuple[object, ...]:
-    agreement = "–" if c.agreement is None else f"{100 * c.agreement:.1f} %"
-    operation = f"{c.same_operation} of {c.stopped}" if c.stopped else "–"
-    counts = (c.fit_fitted, c.fit_failed, c.fail_fitted, c.fail_failed)
-    return (c.scenario, c.method, c.executed, *counts, agreement, operation, c.not_executed, c.excluded)
+def _operation(c: Confusion) -> str | None:
+    return f"{c.same_operation} of {c.stopped}" if c.stopped else None
+
+
+COLUMNS = (
+    Column("scenario", "scenario", words=True),
+    Column("method", "method", words=True),
+    Column("", "n", text=lambda c: c.executed),
+    Column("predicted_fit_fitted", "fit: fitted", lambda c: c.fit_fitted),
+    Column("predicted_fit_failed", "fit: failed", lambda c: c.fit_failed),
+    Column("predicted_fail_fitted", "fail: fitted", lambda c: c.fail_fitted),
+    Column("predicted_fail_failed", "fail: failed", lambda c: c.fail_failed),
+    Column("agreement", "agreement", text=lambda c: percent(c.agreement)),
+    Column("same_operation", "right operation", text=_operation),
+    Column("stopped"),
+    Column("not_executed", "not executed"),
+    Column("excluded", "excluded"),
+)

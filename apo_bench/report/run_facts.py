@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from apo_bench.records.limits import USUAL_LIMITS, Limits
-from apo_bench.report.page.markup import Html, Table, joined, tag
+from apo_bench.report.tables.table import Column, Table
 
 LONG = 400
 """Longer values are cut; they stand in the file."""
+MANY = 20
+"""A table of more lines is folded."""
+
+
+class Facts(NamedTuple):
+    """A table of what is said about a run."""
+
+    name: str
+    table: Table
+    folded: bool
 
 
 def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
@@ -26,48 +36,40 @@ def limits_of(run: Mapping[str, Any]) -> Limits:
     return Limits(None if trial_s is None else float(trial_s), float(corrector_s))
 
 
-def ran(run: Mapping[str, Any], rows: Mapping[str, Any]) -> Html:
+def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[Facts]:
     """Tables of the specification and the versions.
 
     Args:
         rows: What the rows themselves say, by what it is called.
     """
-    made = [_table("rows", rows)]
-    if not run:
-        made.append(
-            tag("p", "There is no run.json beside the rows, so versions and command are not known.", class_="none")
-        )
-        return joined(made)
-    if run.get("command"):
-        made.append(tag("p", tag("code", run["command"])))
     plain = {k: v for k, v in run.items() if not isinstance(v, (dict, list)) and k != "command"}
-    if plain:
-        made.append(_table("run", plain))
-    for name, values in run.items():
+    made = [Facts("", _table("rows", rows), False), *([Facts("", _table("run", plain), False)] if plain else [])]
+    for key, values in run.items():
+        name = key.replace("_", " ")
         if isinstance(values, dict) and values:
-            made.append(_folded(name, _table(name, values), len(values)))
+            made.append(Facts(name, _table(name, values), len(values) > MANY))
         elif isinstance(values, list) and values:
-            made.append(_folded(name, _beside(name, values), 1))
-    return joined(made)
+            made.append(Facts(name, _side_by_side(name, values), False))
+    return made
 
 
-def _folded(name: str, table: Html, entries: int) -> Html:
-    is_open = {"open": ""} if entries <= 20 else {}
-    return tag("details", tag("summary", name.replace("_", " ")), table, **is_open)
+def _table(name: str, values: Mapping[str, Any]) -> Table:
+    columns = (
+        Column("", name, text=lambda item: item[0], words=True),
+        Column("", "value", text=lambda item: words(item[1]), words=True),
+    )
+    return Table(list(values.items()), columns)
 
 
-def _beside(name: str, values: list[Any]) -> Html:
-    """Entries side by side, one line per key."""
+def _side_by_side(name: str, values: Sequence[Any]) -> Table:
+    """One line per key."""
     given = [value if isinstance(value, dict) else {"": value} for value in values]
-    keys = dict.fromkeys(key for value in given for key in value)
-    rows: list[tuple[object, ...]] = [(key, *(words(v[key]) if key in v else None for v in given)) for key in keys]
-    head = (name.replace("_", " "), *(str(i) for i in range(1, len(given) + 1)))
-    return Table(head, rows, words=len(head)).html()
-
-
-def _table(name: str, values: Mapping[str, Any]) -> Html:
-    rows: list[tuple[object, ...]] = [(key, tag("span", words(value))) for key, value in values.items()]
-    return Table((name.replace("_", " "), "value"), rows, words=2).html()
+    columns = [Column("", name, text=lambda key: key, words=True)]
+    for i, one in enumerate(given, start=1):
+        columns.append(
+            Column("", str(i), text=lambda key, one=one: words(one[key]) if key in one else None, words=True)
+        )
+    return Table(list(dict.fromkeys(key for one in given for key in one)), columns)
 
 
 def words(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""The rows behind the cells of a page: columns, packed, to be unpacked by the script when a cell is opened."""
+"""The trials of every cell of a page: columns, packed, to be unpacked by the script when a cell is opened."""
 
 from __future__ import annotations
 
@@ -8,30 +8,26 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from markupsafe import Markup
+
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.replay_command import Files, without_seed
 from apo_bench.records.slim import NUMBERS
-from apo_bench.report.page.markup import Html
 from apo_bench.statistics.rates import Cell, by_place
 from apo_bench.statistics.settings import at
 
 FAILED, RIGHT, LOOSE, EXCLUDED = "failed", "right", "loosely right", "excluded"
 OTHERWISE = "right, not as demonstrated"
-DIGITS = 4
-"""Significant digits of the numbers behind a cell."""
+DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_seconds": 1}
+"""Of numbers; of those in mm and degrees, and of others, three."""
+ASKED = (
+    *("scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp", "arm", "relations"),
+    *("method", "timestep_s", "fidelity"),
+)
+"""What commands of trials differ in, but for seeds and for what was lost."""
 
 
-class Words:
-    """Texts that are said often: kept once, and by number."""
-
-    def __init__(self) -> None:
-        self.numbers: dict[str, int] = {}
-
-    def number(self, text: str) -> int:
-        return self.numbers.setdefault(text, len(self.numbers))
-
-
-def behind(
+def trials(
     rows: Iterable[Mapping[str, Any]],
     cells: Sequence[Cell],
     files: Files | None = None,
@@ -44,39 +40,45 @@ def behind(
         pictured: Number of the cell and seed -> number of the picture of that trial.
     """
     groups = by_place(rows)
-    words = {name: Words() for name in ("verdict", "why", "sentence", "predicted", "command")}
+    words: dict[str, dict[str, int]] = {
+        name: {} for name in ("verdict", "why", "sentence", "predicted", "command")
+    }  # texts that are said often: kept once, and by number
     columns: dict[str, list[Any]] = {name: [] for name in ("seed", *words, *NUMBERS)}
     ends = []
-    commands: dict[tuple[Any, ...], int] = {}
+    commands: dict[tuple[Any, ...], str] = {}
     for cell in cells:
         seeds = groups[at(cell)]
         for seed in sorted(seeds):
             row = seeds[seed]
-            columns["seed"].append(seed)
-            columns["verdict"].append(words["verdict"].number(verdict(row)))
-            columns["why"].append(words["why"].number(why(row)))
-            columns["sentence"].append(words["sentence"].number(row.get("sentence") or ""))
-            columns["predicted"].append(words["predicted"].number(foretold(row.get("predicted"))))
-            asked = _asked(row)
+            asked = (*(row.get(name) for name in ASKED), row.get("failure_stage") == "worker")
             if asked not in commands:
-                commands[asked] = words["command"].number(without_seed(row, files, limits))
-            columns["command"].append(commands[asked])
+                commands[asked] = without_seed(row, files, limits)
+            said = {
+                "verdict": verdict(row),
+                "why": why(row),
+                "sentence": row.get("sentence") or "",
+                "predicted": predicted(row.get("predicted")),
+                "command": commands[asked],
+            }
+            columns["seed"].append(seed)
+            for name, text in said.items():
+                columns[name].append(words[name].setdefault(text, len(words[name])))
             for name in NUMBERS:
-                columns[name].append(rounded(row.get(name)))
+                columns[name].append(rounded(row.get(name), DECIMALS.get(name, 3)))
         ends.append(len(columns["seed"]))
     return {
         "ends": ends,
-        "words": {name: list(kept.numbers) for name, kept in words.items()},
-        "numbers": [[name, label] for name, label in NUMBERS.items()],
+        "words": {name: list(kept) for name, kept in words.items()},
+        "numbers": [[name, label, DECIMALS.get(name, 3)] for name, label in NUMBERS.items()],
         "columns": columns,
         "pictures": {f"{cell}:{seed}": k for (cell, seed), k in (pictured or {}).items()},
     }
 
 
-def packed(values: Mapping[str, Any]) -> Html:
+def packed(values: Mapping[str, Any]) -> Markup:
     """As base64 of gzip of JSON: letters that mean nothing in HTML; the same bytes for the same values."""
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
-    return Html(base64.b64encode(gzip.compress(text, compresslevel=6, mtime=0)).decode())
+    return Markup(base64.b64encode(gzip.compress(text, compresslevel=6, mtime=0)).decode())
 
 
 def verdict(row: Mapping[str, Any]) -> str:
@@ -96,22 +98,16 @@ def why(row: Mapping[str, Any]) -> str:
     return f"{row['failure_stage']}: {row['failure_code']}{where}"
 
 
-def foretold(said: Mapping[str, Any] | None) -> str:
+def predicted(said: Mapping[str, Any] | None) -> str:
     """What the plan said beforehand."""
     if said is None:
         return ""
     return f"operation {said['operation']} fails: {said['code']}" if said["fails"] else "fits"
 
 
-def rounded(x: Any) -> float | int | None:
-    """To so many digits as are shown."""
+def rounded(x: Any, decimals: int) -> float | int | None:
+    """As it is shown; the script writes the zeros at the end."""
     if x is None or isinstance(x, int):
         return x
-    near = float(f"{x:.{DIGITS}g}")
+    near = round(float(x), decimals)
     return int(near) if near == int(near) else near
-
-
-def _asked(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    names = ("scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp", "arm", "relations")
-    lost = row.get("failure_stage") == "worker"
-    return (*(row.get(name) for name in names), row["method"], row.get("timestep_s"), row.get("fidelity"), lost)

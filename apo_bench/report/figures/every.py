@@ -1,0 +1,51 @@
+"""Every figure of a sweep that has something to show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from apo_bench.report.figures.levels import (
+    difference_figure,
+    gap_figure,
+    methods_of,
+    recognition_figure,
+    success_figure,
+)
+from apo_bench.report.figures.outcome_bars import outcome_figure
+from apo_bench.report.figures.prediction import prediction_figure
+from apo_bench.report.figures.sheet import Drawing, draw
+from apo_bench.report.figures.styles import styles
+from apo_bench.report.figures.tightness import tightness_figure
+from apo_bench.report.figures.times import time_figure
+from apo_bench.statistics.confusion import Confusion
+from apo_bench.statistics.gaps import Gap
+from apo_bench.statistics.rates import Cell
+from apo_bench.statistics.recognition import Recognition
+from apo_bench.statistics.settings import Setting, members
+from apo_bench.statistics.summary import Summary
+from apo_bench.statistics.times import Times
+
+
+def figures(
+    found: Summary,
+    grouped: Mapping[Setting, Sequence[Cell]],
+    gaps: Sequence[Gap],
+    confusions: Sequence[Confusion],
+    recognitions: Sequence[Recognition],
+    times: Sequence[Times],
+) -> dict[str, Drawing]:
+    """By the name of their file."""
+    where, looks = list(grouped), styles(methods_of(found.cells))
+    pairs = members(where, found.pairs)
+    made = {
+        "success_over_level": success_figure(found.cells),
+        "success_over_tightness": tightness_figure(found.cells),
+        "failure_stages": outcome_figure(grouped),
+        "gap_before_and_after": gap_figure(members(where, gaps), looks),
+        "prediction": prediction_figure(confusions),
+        "recognised": recognition_figure(recognitions),
+        "timing": time_figure(times),
+    }
+    for reference in dict.fromkeys(p.reference for p in found.pairs):
+        made[f"difference_to_{reference}"] = difference_figure(pairs, reference, looks)
+    return {name: draw(figure) for name, figure in made.items() if figure.panels}

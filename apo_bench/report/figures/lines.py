@@ -1,0 +1,130 @@
+"""A panel of lines with bands: methods over levels, or whatever else is over whatever else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from apo_bench.report.figures.sheet import SAMPLE, Entry, Panel, Tips
+from apo_bench.report.figures.styles import INK, RULE, SOFT, Style
+
+DODGE, SPREAD = 0.05, 0.32
+"""Methods stand this far from each other at one level, so that equal values do not hide each other; and all of them
+within this part of the way to the next level."""
+
+
+class Point(NamedTuple):
+    """A value with its interval, and what is said of it when it is pointed at."""
+
+    x: float
+    value: float
+    low: float
+    high: float
+    tip: str
+
+
+class Line(NamedTuple):
+    """The points of a method, from left to right."""
+
+    name: str
+    style: Style
+    points: Sequence[Point]
+
+
+class Axis(NamedTuple):
+    """From where to where, with ticks and their labels."""
+
+    label: str
+    low: float
+    high: float
+    ticks: Sequence[tuple[float, str]]
+    logarithmic: bool = False
+
+
+class Rule(NamedTuple):
+    """A line across a panel."""
+
+    at: float
+    dashed: bool = False
+    tip: str = ""
+
+
+def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[Line], rule: Rule | None = None) -> Panel:
+    """Lines with bands; a line of one point has a bar instead."""
+
+    def draw(axis: Any, tip: Tips) -> None:
+        _scaffold(axis, x, y)
+        if rule is not None:
+            look = {"color": SOFT, "linestyle": (0, (4, 3))} if rule.dashed else {"color": INK}
+            drawn = axis.axhline(rule.at, linewidth=1.2, **look)
+            if rule.tip:
+                tip(drawn, [rule.tip])
+        for line in lines:
+            _band(axis, line)
+        for line in lines:
+            tip(_marks(axis, line), [f"{line.name}, {point.tip}" for point in line.points])
+
+    return Panel(title, draw)
+
+
+def levels_axis(labels: Sequence[str], what: str) -> Axis:
+    """Levels side by side at equal distances, since they span decades and zero."""
+    return Axis(what, -0.5, len(labels) - 0.5, list(enumerate(labels)))
+
+
+def dodges(number: int) -> list[float]:
+    """How far each of so many methods stands from its level."""
+    step = min(DODGE, SPREAD / number) if number else 0.0
+    return [step * (i - (number - 1) / 2) for i in range(number)]
+
+
+def entries(looks: dict[str, Style], ceiling: bool = False) -> list[Entry]:
+    """A legend: one per method, and one for the oracle."""
+    oracle = Style(SOFT, "", (0, (4, 3)))
+    made = [Entry(method, _sample(style)) for method, style in looks.items()]
+    return made + [Entry("oracle", _sample(oracle))] * ceiling
+
+
+def _sample(style: Style) -> Callable[[Any], None]:
+    def draw(axis: Any) -> None:
+        axis.set_axis_off()
+        axis.set(xlim=(0, SAMPLE[0]), ylim=(0, SAMPLE[1]))
+        axis.plot([1, 25], [7, 7], color=style.color, linestyle=style.dashes, linewidth=1.7)
+        axis.plot([13], [7], color=style.color, marker=style.marker, markersize=7)
+
+    return draw
+
+
+def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
+    axis.spines[:].set_visible(False)
+    if x.logarithmic:
+        axis.set_xscale("log")
+    if y.logarithmic:
+        axis.set_yscale("log")
+    axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
+    crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
+    for side, ticks, size in ((axis.xaxis, x.ticks, 8 if crowded else 10), (axis.yaxis, y.ticks, 10)):
+        side.set_ticks([at for at, _ in ticks], [label for _, label in ticks], fontsize=size, color=INK)
+        side.set_ticks([], minor=True)
+    axis.tick_params(length=0)
+    axis.hlines([at for at, _ in y.ticks], x.low, x.high, color=RULE, linewidth=1, zorder=0)
+    axis.set_xlabel(x.label, color=INK)
+    axis.set_ylabel(y.label, color=INK)
+
+
+def _band(axis: Any, line: Line) -> None:
+    if len(line.points) == 1:
+        (p,) = line.points
+        axis.vlines(p.x, p.low, p.high, color=line.style.color, linewidth=1.4, alpha=0.6)
+    elif line.points:
+        at, low, high = ([getattr(p, name) for p in line.points] for name in ("x", "low", "high"))
+        axis.fill_between(at, low, high, color=line.style.color, alpha=0.13, linewidth=0)
+
+
+def _marks(axis: Any, line: Line) -> Any:
+    at, values = [p.x for p in line.points], [p.value for p in line.points]
+    color, marker, dashes = line.style
+    axis.plot(at, values, color=color, linestyle=dashes, linewidth=1.7, clip_on=False)
+    (made,) = axis.plot(at, values, color=color, marker=marker, linestyle="", markersize=6.5, clip_on=False)
+    made.set(markeredgecolor="#ffffff" if marker != "1" else color, markeredgewidth=0.6)
+    return made

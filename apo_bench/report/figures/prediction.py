@@ -1,0 +1,58 @@
+"""Predicted against real failure, as squares whose shade is a share: one panel for each method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from apo_bench.report.figures.outcome_bars import boxes, canvas
+from apo_bench.report.figures.sheet import Figure, Panel, Tips
+from apo_bench.report.figures.styles import SOFT
+from apo_bench.statistics.confusion import ALL, Confusion
+
+SIDE, TOP, LEFT = 74, 34, 108
+"""Of a square; where the first begins, px."""
+HEIGHT = TOP + 2 * SIDE + 6
+RIGHT_COLOR, WRONG_COLOR = "#0072b2", "#d55e00"
+Counts = tuple[tuple[int, int], tuple[int, int]]
+"""Predicted to fit, predicted to fail: each fitted, failed."""
+
+
+def prediction_figure(found: Sequence[Confusion]) -> Figure:
+    """A panel per method of which something was predicted, over all scenarios, and one of all methods."""
+    groups: dict[str, list[Confusion]] = {}
+    for one in found:
+        groups.setdefault("all methods" if one.method == ALL else one.method, []).append(one)
+    summed = {method: _sum(own) for method, own in groups.items()}
+    panels = [_panel(method, counts) for method, counts in summed.items() if sum(map(sum, counts))]
+    return Figure("Predicted against real failure", panels)
+
+
+def _sum(own: Sequence[Confusion]) -> Counts:
+    fits = sum(c.fit_fitted for c in own), sum(c.fit_failed for c in own)
+    fails = sum(c.fail_fitted for c in own), sum(c.fail_failed for c in own)
+    return fits, fails
+
+
+def _panel(method: str, counts: Counts) -> Panel:
+    n = sum(map(sum, counts))
+
+    def draw(axis: Any, tip: Tips) -> None:
+        canvas(axis, HEIGHT)
+        small = {"fontsize": 9, "color": SOFT}
+        for i, words in enumerate(("predicted to fit", "predicted to fail")):
+            axis.text(LEFT - 8, TOP + SIDE * (i + 0.5) + 4, words, ha="right")
+            for j, word in enumerate(("fitted", "failed")):
+                x, y, count = LEFT + SIDE * j, TOP + SIDE * i, counts[i][j]
+                color = RIGHT_COLOR if i == j else WRONG_COLOR
+                square = boxes(axis, [(x, y, SIDE - 2, SIDE - 2)], [color])
+                square.set_alpha(0.08 + 0.55 * count / n)
+                tip(square, [f"{words}, {word}: {count} of {n}"])
+                axis.text(x + SIDE / 2 - 1, y + SIDE / 2, f"{count:,}", ha="center")
+                axis.text(x + SIDE / 2 - 1, y + SIDE / 2 + 14, f"{100 * count / n:.1f} %", ha="center", **small)
+        for j, word in enumerate(("fitted", "failed")):
+            axis.text(LEFT + SIDE * (j + 0.5), TOP - 8, word, ha="center")
+        agreed = (counts[0][0] + counts[1][1]) / n
+        axis.text(LEFT + 2 * SIDE + 8, TOP + SIDE, f"{100 * agreed:.1f} % right", **small)
+
+    return Panel(f"{method}; n {n:,}", draw, HEIGHT, (0, 0, 0, 0))

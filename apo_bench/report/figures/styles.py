@@ -1,0 +1,98 @@
+"""Colours, markers and dashes: told apart without colour too, on a light and on a dark page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+INK, SOFT, RULE = "#1d2430", "#5b6575", "#d9dde4"
+"""Of text and lines, of what matters less, and of the grid."""
+SUCCESS = "#cfe3dc"
+SOLID: Any = "-"
+DASHED, DOTTED = (0, (4, 1.5)), (0, (1, 1))
+
+
+class Style(NamedTuple):
+    """How the line of a method looks; told apart without colour too."""
+
+    color: str
+    marker: str
+    dashes: Any
+
+
+STYLES = {
+    "none": Style("#d55e00", "o", SOLID),
+    "search": Style("#e7298a", "8", DASHED),
+    "contact": Style("#332288", "p", SOLID),
+    "paper": Style("#0072b2", "s", SOLID),
+    "paper-track": Style("#009e73", "D", SOLID),
+    "last-only": Style("#e69f00", "v", DASHED),
+    "no-history": Style("#cc79a7", "^", DASHED),
+    "no-disappeared": Style("#56b4e9", "P", DASHED),
+    "minimal": Style("#8c6bb1", "X", DOTTED),
+    "snap": Style("#a6761d", "*", DOTTED),
+    "least-squares": Style("#117733", "<", DOTTED),
+    "settle": Style("#882255", ">", DOTTED),
+    "penalty": Style("#88ccee", "d", DOTTED),
+}
+OTHERS = (Style("#6b6b6b", "h", DOTTED), Style("#ddcc77", "H", DOTTED), Style("#000000", "1", DOTTED))
+RECOGNISED = {
+    "recognised": Style("#009e73", "o", SOLID),
+    "recognised-fixed": Style("#d55e00", "s", DASHED),
+    "recognised-twice": Style("#0072b2", "^", DOTTED),
+}
+SEEN = Style(SOFT, "o", SOLID)
+"""What was observed, before any method."""
+STAGES = {
+    "observe": "#999999",
+    "correct": "#aa4499",
+    "plan": "#ddaa33",
+    "pick": "#88ccee",
+    "lift": "#44aa99",
+    "carry": "#117733",
+    "attach": "#d55e00",
+    "release": "#999933",
+    "depart": "#882255",
+    "judge": "#0072b2",
+    "worker": "#222222",
+}
+"""Stage at which a trial failed -> its colour."""
+DARK = {
+    INK: "#e6e9ee",
+    SOFT: "#a5aebb",
+    RULE: "#333b47",
+    SUCCESS: "#2f4a42",
+    "#d55e00": "#ff9048",
+    "#332288": "#a79bff",
+    "#0072b2": "#55b7f3",
+    "#009e73": "#35cfa0",
+    "#a6761d": "#d3a452",
+    "#8c6bb1": "#bda2dc",
+    "#117733": "#57c47c",
+    "#882255": "#e070a6",
+    "#6b6b6b": "#ababab",
+    "#000000": "#f2f2f2",
+    "#222222": "#eeeeee",
+    "#aa4499": "#d27cc3",
+    "#999933": "#b9b95a",
+    "#44aa99": "#5cc4b2",
+    "#ffffff": "#14181e",
+}
+"""Colours that would drown on a dark page, and what stands for them there."""
+
+
+def styles(methods: Sequence[str]) -> dict[str, Style]:
+    """One each; a method of one's own takes the next that is left."""
+    own = [method for method in methods if method not in STYLES]
+    return {m: STYLES[m] if m in STYLES else OTHERS[own.index(m) % len(OTHERS)] for m in methods}
+
+
+def themed(svg: str) -> str:
+    """Colours as custom properties, which a dark page sets to others."""
+    return re.sub(r"(?<=(?:l|e): )#[0-9a-f]{6}", lambda m: f"var(--c{m[0][1:]},{m[0]})" if m[0] in DARK else m[0], svg)
+
+
+def dark_properties() -> str:
+    """The custom properties of a dark page."""
+    return "".join(f"--c{light[1:]}:{dark};" for light, dark in DARK.items())
