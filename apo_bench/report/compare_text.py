@@ -189,8 +189,10 @@ def _agreement_form(a: Agreement) -> dict[str, Any]:
 
 def _changed_form(pair: tuple[Mapping[str, Any], Mapping[str, Any]], found: Comparison) -> dict[str, Any]:
     a, b = pair
-    names = ("scenario", "clearance_mm", "seed", "careless", "level", "level_deg")
-    names += ("noise", "relations", "grasp", "method")
+    names = (
+        *("scenario", "clearance_mm", "seed", "careless", "level", "level_deg"),
+        *("noise", "relations", "grasp", "method"),
+    )
     said = {
         name: {
             "verdict": verdict(row),

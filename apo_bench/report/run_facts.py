@@ -64,11 +64,12 @@ def _table(name: str, values: Mapping[str, Any]) -> Table:
 def _side_by_side(name: str, values: Sequence[Any]) -> Table:
     """One line per key."""
     given = [value if isinstance(value, dict) else {"": value} for value in values]
+
+    def entry(one: Mapping[str, Any], number: int) -> Column:
+        return Column("", str(number), text=lambda key: words(one[key]) if key in one else None, words=True)
+
     columns = [Column("", name, text=lambda key: key, words=True)]
-    for i, one in enumerate(given, start=1):
-        columns.append(
-            Column("", str(i), text=lambda key, one=one: words(one[key]) if key in one else None, words=True)
-        )
+    columns += [entry(one, i) for i, one in enumerate(given, start=1)]
     return Table(list(dict.fromkeys(key for one in given for key in one)), columns)
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.solid import extent
@@ -30,6 +31,8 @@ from apo_bench.report.failures import FailurePicture, Row
 
 _WIDTH, _HEIGHT, _QUALITY = 640, 480, 82
 _NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
+_ARROW_M, _TIP_M, _ARROW = 0.11, 0.012, (0.85, 0.1, 0.1)
+"""How far from a contact its arrow begins and ends, and its colour."""
 _SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
 """A trial that was run again is the same if these are."""
 
@@ -85,15 +88,17 @@ def _made(
     if spec_hash(spec, content) == row.get("spec_hash"):
         image = _again(row, spec, scene, content)
         if image is not None:
-            return FailurePicture(row, _jpeg(image), "how the replay ended, run again for this picture")
+            how = "how the replay ended, run again for this picture"
+            return FailurePicture(row, _jpeg(image), f"{how}{_pointed_at(row, scene)}")
     whole = _whole_row(folder, row)
     poses = _poses(whole.get("reached"))
     if not poses:
         raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
-    image = picture(scene, poses, _WIDTH, _HEIGHT, _camera(scene, row, poses))
+    image = picture(scene, poses, _WIDTH, _HEIGHT, _camera(scene, row, poses), _mark(row, scene, poses))
     secret = row.get("salt") is not None and salt is None
     why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
-    return FailurePicture(row, _jpeg(image), f"where the parts ended, as the row says; {why}, so it was not run again")
+    how = f"where the parts ended, as the row says; {why}, so it was not run again"
+    return FailurePicture(row, _jpeg(image), f"{how}{_pointed_at(row, scene)}")
 
 
 def _whole_row(folder: Path, row: Row) -> Mapping[str, Any]:
@@ -124,7 +129,33 @@ def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
     poses = _poses(done["reached"]) or {}
     camera = _camera(scene, row, poses)
     fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
-    return picture_with_arm(scene, fixed, last[0], _WIDTH, _HEIGHT, camera)
+    return picture_with_arm(scene, fixed, last[0], _WIDTH, _HEIGHT, camera, _mark(row, scene, poses))
+
+
+def _failed_contact(row: Row, scene: Any) -> Contact | None:
+    """The contact that the sentence of a failure names; else the first one of the operation that failed."""
+    operations, k = scene.scenario.assembly.operations, row.get("failure_operation")
+    every = [contact for operation in operations for contact in operation.contacts]
+    named = [contact for contact in every if f"{contact} " in f"{row.get('sentence') or ''} "]
+    return next(iter(named or (operations[k - 1].contacts if k else ())), None)
+
+
+def _pointed_at(row: Row, scene: Any) -> str:
+    contact = _failed_contact(row, scene)
+    return "" if contact is None else f"; the arrow points at {contact}"
+
+
+def _mark(row: Row, scene: Any, poses: Poses) -> Any:
+    """An arrow from above to the middle of the face that the contact is made with, where the part is now."""
+    from apo_bench.simulation.scene.marks import Marks, ShiftArrows
+
+    contact = _failed_contact(row, scene)
+    if contact is None or contact.environment.part not in poses:
+        return None
+    part, face = contact.environment
+    corners = scene.scenario.assembly.solids[part].faces[face].outline
+    middle = poses[part][:3, :3] @ corners.mean(axis=0) + poses[part][:3, 3]
+    return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW)])
 
 
 def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:

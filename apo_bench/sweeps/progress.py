@@ -1,8 +1,9 @@
-"""How far a sweep is: a bar with an estimate and live rates on a terminal, nothing anywhere else."""
+"""How far a sweep is: a bar with an estimate and live rates on a terminal, a line a minute anywhere else."""
 
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, final
@@ -16,6 +17,8 @@ BESIDE = ("scenario", "clearance_mm", "grasp", "noise", "relations", "careless",
 FRAME = 6
 """Lines of the terminal that are not cells: the bar, the head, a line for what does not fit."""
 PER_SECOND = 2.0
+EVERY_S = 60.0
+"""Between two lines where there is no terminal."""
 
 
 @contextmanager
@@ -25,7 +28,7 @@ def progress(total: int) -> Iterator[Count]:
     The cells that fit the terminal are those that had a trial last.
     """
     if not sys.stderr.isatty() or total == 0:
-        yield lambda row: None
+        yield _lines(total)
         return
     from rich.console import Console, Group
     from rich.live import Live
@@ -65,6 +68,25 @@ def progress(total: int) -> Iterator[Count]:
 
     with Live(Picture(), console=console, refresh_per_second=PER_SECOND, transient=True):
         yield count
+
+
+def _lines(total: int) -> Count:
+    """Says every minute how many trials have ended, and when the rest will have at this pace."""
+    began = said = time.monotonic()
+    ended = 0
+
+    def count(row: Mapping[str, Any]) -> None:
+        nonlocal said, ended
+        ended += 1
+        now = time.monotonic()
+        if now - said >= EVERY_S:
+            said = now
+            gone_min = (now - began) / 60
+            left_min = gone_min * (total - ended) / ended
+            sys.stderr.write(f"{ended} of {total} trials in {gone_min:.0f} min, about {left_min:.0f} min to go\n")
+            sys.stderr.flush()
+
+    return count
 
 
 @final

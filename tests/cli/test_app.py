@@ -212,8 +212,9 @@ def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp
 
 def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "replay.gif"
-    code, _, err = run(capsys, *TRIAL, *HOPELESS, "--video", str(path))
+    code, out, err = run(capsys, *TRIAL, *HOPELESS, "--video", str(path))
     assert (code, err) == (0, "")
+    assert out.endswith(f"Film: {path}\n")
     assert path.read_bytes().startswith(b"GIF8")
 
 

@@ -55,10 +55,16 @@ def test_the_cells_of_the_last_trials_are_shown() -> None:
     ]
 
 
-def test_nothing_is_shown_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress(2) as count:
-        count(row("none", 1.0, True))
-    assert capsys.readouterr() == ("", "")
+def test_without_a_terminal_a_line_a_minute_is_said(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr("apo_bench.sweeps.progress.time.monotonic", lambda: now[0])
+    with progress(10) as count:
+        for now[0] in (10.0, 59.0, 60.0, 100.0, 120.0):
+            count(row("none", 1.0, True))
+    lines = ("3 of 10 trials in 1 min, about 2 min to go\n", "5 of 10 trials in 2 min, about 2 min to go\n")
+    assert capsys.readouterr() == ("", "".join(lines))
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a terminal")

@@ -141,9 +141,10 @@ def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
     for kind, dodge in zip(kinds, dodges(len(kinds)), strict=True):
         points = []
         for r in sorted(here, key=lambda r: r.place.level):
-            x, share = levels.index((r.place.level, r.place.level_deg)) + dodge, getattr(r, what)
+            share: float | None = getattr(r, what)
+            where = levels.index((r.place.level, r.place.level_deg)) + dodge
             if r.place.relations == kind and share is not None:
-                points.append(Point(x, share, share, share, percent(share)))
+                points.append(Point(where, share, share, share, percent(share)))
         lines.append(Line(kind, RECOGNISED[kind], points))
     least = min((p.value for line in lines for p in line.points), default=0.0)
     low = 0.0 if least < 0.6 else 0.6 if least < 0.9 else 0.9

@@ -35,7 +35,7 @@ HEAD, LINE, GAP, TITLE, SAMPLE = 40, 20, 18, 32, (26, 14)
 DPI = 72
 """Of a sheet: one px each."""
 PNG_DPI = 120
-LOOKS = {
+LOOKS: Any = {
     "svg.fonttype": "none",
     "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
@@ -146,7 +146,8 @@ def draw(figure: Figure) -> Drawing:
             size = (WIDTH - left - right, panel.height - above - below)
             panel.draw(sheet.axes(f"panel-{i}", x + left, y + above, *size), tip)
         made = io.StringIO()
-        FigureCanvasSVG(canvas).print_svg(made, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+        FigureCanvasSVG(canvas)
+        canvas.savefig(made, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     svg = _with_tips(made.getvalue(), tips)
     pieces = {name: _piece(body, boxes[name]) for name, body in PIECE.findall(svg)}
     return Drawing(

@@ -48,11 +48,13 @@ def picture_with_arm(
     width: int = 640,
     height: int = 480,
     camera: Camera = "overview",
+    more: Callable[[Any], None] | None = None,
 ) -> _Image:
     """The parts where `poses` says, with the arm at home and its fingers open, (height, width, 3).
 
     Args:
         state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.
+        more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     data = _at(scene.work, scene, poses)
     for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
@@ -62,7 +64,7 @@ def picture_with_arm(
     if state is not None:
         data.qpos[:] = state
     mujoco.mj_forward(scene.work.model, data)
-    return _drawn(scene.work, data, width, height, camera)
+    return _drawn(scene.work, data, width, height, camera, more)
 
 
 def view(look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0) -> Camera:
