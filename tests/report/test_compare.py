@@ -129,7 +129,7 @@ def test_the_command_writes_a_page_and_exits_with_0(
     assert "versions: mujoco, rows: fidelity" in said
     (line, _) = csv.DictReader((out / "changed.csv").open(encoding="utf-8"))
     assert line["command of the first"] == "apo-bench replay stick_in_tower --clearance 0.25 --method contact --seed 0"
-    assert line["command of the second"].endswith("--fidelity contact --method contact --seed 0")
+    assert line["command of the second"].endswith("--method contact --fidelity contact --seed 0")
     page = pages.lines(out / "compare.html")
     assert "| stick_in_tower | 39 | 37 (94.87 %) | 83.11 to 98.58 % |" in page
     assert "| versions: mujoco | 3.17.0 | 3.18.0 |" in page

@@ -62,7 +62,7 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
     older, _ = failure_pictures(sample(other, 1), write(tmp_path / "older", other))
     assert "as the row says" in older[0].words
     assert older[0].jpeg != made[0].jpeg
-    page = report(write(tmp_path / "page", other), pictures=1)
+    page = report(write(tmp_path / "page", other), pictures=1, draw=failure_pictures)
     assert page.pictures == 1
     assert 'src="data:image/jpeg;base64,' in page.page.read_text(encoding="utf-8")
     assert list(pages.trials(page.page)["pictures"].values()) == [0]
@@ -78,7 +78,7 @@ def test_a_page_without_graphics_says_so(
         raise InputError("no picture can be drawn here (no EGL); install libegl1.")
 
     monkeypatch.setattr(render, "picture", refuse)
-    made = report(write(tmp_path / "run", trials), pictures=2)
+    made = report(write(tmp_path / "run", trials), pictures=2, draw=failure_pictures)
     assert made.pictures == 0
     assert "No picture: no picture can be drawn here" in pages.words(made.page)
 
