@@ -133,11 +133,12 @@ def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
 
 
 def _failed_contact(row: Row, scene: Any) -> Contact | None:
-    """The contact that the sentence of a failure names; else the first one of the operation that failed."""
+    """The contact that the sentence of a failure names; else the first one of an operation that was stopped."""
     operations, k = scene.scenario.assembly.operations, row.get("failure_operation")
     every = [contact for operation in operations for contact in operation.contacts]
     named = [contact for contact in every if f"{contact} " in f"{row.get('sentence') or ''} "]
-    return next(iter(named or (operations[k - 1].contacts if k else ())), None)
+    stopped = operations[k - 1].contacts if k and row["failure_code"] == "force_stop" else ()
+    return next(iter(named or stopped), None)
 
 
 def _pointed_at(row: Row, scene: Any) -> str:
@@ -146,14 +147,17 @@ def _pointed_at(row: Row, scene: Any) -> str:
 
 
 def _mark(row: Row, scene: Any, poses: Poses) -> Any:
-    """An arrow from above to the middle of the face that the contact is made with, where the part is now."""
+    """An arrow from above to the middle of the face that the contact is made with; where that is the ground, to the
+    face that should lie on it."""
     from apo_bench.simulation.scene.marks import Marks, ShiftArrows
 
-    contact = _failed_contact(row, scene)
-    if contact is None or contact.environment.part not in poses:
+    contact, assembly = _failed_contact(row, scene), scene.scenario.assembly
+    if contact is None:
         return None
-    part, face = contact.environment
-    corners = scene.scenario.assembly.solids[part].faces[face].outline
+    part, face = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment
+    if part not in poses:
+        return None
+    corners = assembly.solids[part].faces[face].outline
     middle = poses[part][:3, :3] @ corners.mean(axis=0) + poses[part][:3, 3]
     return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW)])
 
