@@ -7,8 +7,7 @@ Part files have a table of what is allowed, arms are a dataclass.
 
 from __future__ import annotations
 
-import ast
-import inspect
+import dataclasses
 import re
 import sys
 import tempfile
@@ -17,17 +16,39 @@ from contextlib import contextmanager
 from pathlib import Path
 from unittest.mock import patch
 
+from fields import sentences
+
+from apo_bench.cli.setting_options import shown_default
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.observation.noise_file import presets, read_noise
 from apo_bench.parts.allowed import ELEMENT_RULES
+from apo_bench.records.setting_info import SettingInfo
+from apo_bench.records.settings import SETTINGS
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.arm import Arm
+from apo_bench.sweeps.grid import AXES, SHARED
 from apo_bench.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "guide" / "scenario.md", ROOT / "docs" / "guide" / "sweeps.md"
 POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; else `[0, 0, 0]`"}
 SHIFT = "axis of the part: `x`, `+y`, `-z`, ... or three numbers"
+
+
+def sweep_meanings() -> dict[str, str]:
+    """Key of a sweep file -> what it means, of the settings of a trial."""
+    axes = {info.axis: (info, "a list") for info in AXES if info.axis != "scenarios"}
+    shared = {SETTINGS[name].keyword: (SETTINGS[name], "one for the whole sweep") for name in SHARED}
+    return {key: f"{info.help}: {how}; else {default_of(info)}" for key, (info, how) in {**axes, **shared}.items()}
+
+
+def default_of(info: SettingInfo) -> str:
+    """What a sweep has where nothing is said."""
+    return ", ".join(f"`{value:g}`" if isinstance(value, float) else f"`{value}`" for value in info.swept) or (
+        info.usual or f"`{shown_default(info)}`"
+    )
+
+
 MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     "Scenario files": {
         "": {
@@ -127,19 +148,9 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     "Sweep files": {
         "": {
             "scenarios": "names, or scenario files",
-            "levels": "numbers, or pairs of mm and degrees",
-            "careless": "numbers from 0; else `[1]`",
-            "methods": "names, or `module:name`",
-            "noises": "noise models; else `['isotropic']`",
-            "relations": "what correctors are told of the contacts; else `['given']`",
-            "eyes": "`noise` or `range`; else `['noise']`",
-            "grasps": "`friction` or `weld`; else `['friction']`",
-            "clearances_mm": "clearances; else that of each scenario",
-            "trials": "seeds per cell, 1 to 1000000",
+            **sweep_meanings(),
+            "trials": "seeds per cell, 1 to 1000000; else 100",
             "seed": "the first seed; else 0",
-            "arm": "one for the whole sweep; else `six_axis`",
-            "timestep_ms": "one for the whole sweep; else 1",
-            "fidelity": "`full` (else) or `contact`, one for the whole sweep",
             "also": "further grids, one table each: `[[also]]`. What a grid does not state is as above",
         },
     },
@@ -261,12 +272,8 @@ def arm_lines() -> list[str]:
     lines[-1] += " `apo_bench.simulation.scene.arm.Arm` or a function that returns one. The site `tip` lies between the"
     lines[-1] += " fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example."
     lines += ["", "| field | meaning |", "|---|---|"]
-    body = ast.parse(inspect.getsource(Arm)).body[0]
-    assert isinstance(body, ast.ClassDef)
-    for field, below in zip(body.body, [*body.body[1:], None], strict=True):
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-            text = below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else ""
-            lines.append(f"| `{field.target.id}` | {' '.join(str(text).split()) or OBVIOUS[field.target.id]} |")
+    said = OBVIOUS | sentences(Arm)
+    lines += [f"| `{field.name}` | {said[field.name]} |" for field in dataclasses.fields(Arm)]
     return lines
 
 

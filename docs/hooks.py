@@ -1,7 +1,8 @@
-"""What `mkdocs build` does beside HTML: it writes two pages of the reference, and refuses to load from a network.
+"""What `mkdocs build` does beside HTML: it writes four pages of the reference, and refuses to load from a network.
 
-The command line and the keys of files are read from the package while the site is built, so these two pages are never
-older than the code. A page that would load anything from a network is an error: the site opens offline.
+The command line, the keys of files, the settings of a trial and the columns of a row are read from the package while
+the site is built, so these pages are never older than the code. A page that would load anything from a network is an
+error: the site opens offline.
 """
 
 from __future__ import annotations
@@ -17,9 +18,15 @@ from mkdocs.structure.files import File, Files
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
 import command_line
+import fields
 import file_keys
 
-GENERATED = {"reference/command-line.md": command_line.page, "reference/files.md": file_keys.page}
+GENERATED = {
+    "reference/command-line.md": command_line.page,
+    "reference/files.md": file_keys.page,
+    "reference/settings.md": fields.settings_page,
+    "reference/row.md": fields.row_page,
+}
 LOADED = re.compile(
     r"<(?:(?:script|img|iframe|source|video)\b[^>]*\bsrc|link\b[^>]*\bhref)=[\"']?(?:https?:)?//[^>]*>", re.IGNORECASE
 )

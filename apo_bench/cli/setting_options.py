@@ -58,15 +58,20 @@ def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
     return (words if info.is_text else numbers)(text, f"--{axis_option(info)}")
 
 
+def shown_default(info: SettingInfo) -> str:
+    """The default of a setting, in the unit of its option."""
+    return info.usual or _shown(info, info.default)
+
+
 def _of_trial(info: SettingInfo) -> Parameter:
-    said = f"{info.help}; default: {info.usual or _shown(info, info.default)}."
+    said = f"{info.help}; default: {shown_default(info)}."
     if info.name == "salt":
         return _option(info.keyword, Path, said, parser=path_given, metavar="<path>")
     return _option(info.keyword, info.kind.__origin__ if hasattr(info.kind, "__origin__") else info.kind, said)
 
 
 def _axis(info: SettingInfo) -> Parameter:
-    usual = ",".join(_shown(info, value) for value in info.swept) or info.usual or _shown(info, info.default)
+    usual = ",".join(_shown(info, value) for value in info.swept) or shown_default(info)
     return _option(axis_option(info), str, f"{info.help}; several with commas; default: {usual}.")
 
 

@@ -14,8 +14,8 @@ import typer
 from apo_bench.cli.arguments import cores, path_given
 from apo_bench.cli.setting_options import CorrectorLimit, axis_option, read_axis, sweep_options, takes
 from apo_bench.errors import InputError
+from apo_bench.records.asked import in_python
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
-from apo_bench.records.settings import in_python
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.grid import SweepSpec

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from operator import itemgetter
 from typing import Any
 
-from apo_bench.records.settings import SETTINGS, TrialSettings, asked
+from apo_bench.records.asked import asked
+from apo_bench.records.settings import SETTINGS, TrialSettings
 
 Key = tuple[Any, ...]
 """The columns `KEY` of a row."""

@@ -65,15 +65,15 @@ class Row(TypedDict, total=False):
     """16 digits over the code, the files and all settings but method and seed: rows with the same may be counted
     together."""
     scenario: Name
-    """Its name."""
+    """Name of the scenario."""
     level: NoiseLevel | None
-    """Standard deviation of the poses seen, per axis [mm]; with the eye `range`, of one ray. Null if measured."""
+    """Standard deviation of the positions seen, per axis [mm]; with the eye `range`, of one ray. Null if measured."""
     level_deg: NoiseLevel | None
-    """The same of angles [deg]; zero with the eye `range`. Null if measured."""
+    """Standard deviation of the angles seen, per axis [deg]; zero with the eye `range`. Null if measured."""
     careless: Carelessness | None
     """How far the human deviates: 0 is a careful one, 1 the scenario's. Null if measured."""
     clearance_mm: ClearanceMm
-    """Per side, of parts that fit into one another."""
+    """Room per side between parts that fit into one another [mm]."""
     eye: Eye | None
     """`noise`: poses with noise that is drawn; `range`: measured in depth images."""
     noise: Name
@@ -106,15 +106,15 @@ class Row(TypedDict, total=False):
     loose_success: bool | None
     """Success with the loose thresholds, 5 mm and 5 degrees."""
     failure_stage: str | None
-    """Where a trial failed that was no success."""
+    """Stage at which a trial failed that was no success."""
     failure_code: str | None
-    """Why it failed."""
+    """Code of why a trial failed that was no success."""
     failure_operation: Operation | None
-    """The operation in which it failed, if it is known."""
+    """Operation in which a trial failed, if it is known."""
     sentence: str | None
-    """How it ended, for a person."""
+    """How the trial ended, for a person."""
     as_demonstrated_code: str | None
-    """Why it is not as demonstrated."""
+    """Code of why a trial is not as demonstrated."""
     conditions: dict[str, bool] | None
     """The conditions of success, each by itself."""
     worst_gap_mm: Number | None
@@ -142,11 +142,11 @@ class Row(TypedDict, total=False):
     chi_square: Annotated[float, Meta(ge=0.0, le=1e300)] | None
     """Statistic of the test whether contacts and poses seen are consistent."""
     chi_square_freedom: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
-    """Its degrees of freedom."""
+    """Degrees of freedom of `chi_square`."""
     p_value: Share | None
-    """Its p-value."""
+    """p-value of `chi_square`."""
     test_passes: bool | None
-    """Whether they are consistent."""
+    """Whether contacts and poses seen are consistent by that test."""
     suspects: list[Name] | None
     """Contacts that the test suspects."""
     dropped: list[Name] | None
@@ -158,19 +158,19 @@ class Row(TypedDict, total=False):
     planned_error_fixed_mm: Size | None
     """Root mean square distance of the plan from the truth, along directions that contacts fix [mm]."""
     planned_error_free_mm: Size | None
-    """The same, along directions that contacts leave free [mm]."""
+    """Root mean square distance of the plan from the truth, along directions that contacts leave free [mm]."""
     contacts_right: Count | None
     """Contacts that the corrector was told and that are right."""
     contacts_missed: Count | None
-    """Contacts that it was not told."""
+    """Contacts that are there and that the corrector was not told."""
     contacts_false: Count | None
-    """Contacts that it was told and that are not there."""
+    """Contacts that the corrector was told and that are not there."""
     reached: dict[str, Pose] | None
     """Part -> where it ended: x, y, z [mm], qw, qx, qy, qz, world frame."""
     pose_error_fixed_mm: Size | None
-    """As `planned_error_fixed_mm`, of where the parts ended [mm]."""
+    """Root mean square distance of where the parts ended from the truth, along directions that contacts fix [mm]."""
     pose_error_free_mm: Size | None
-    """As `planned_error_free_mm`, of where the parts ended [mm]."""
+    """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
     peak_force_n: Size | None
     """Largest contact force that the gripper met [N]."""
     sim_seconds: Size | None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Annotated, Any, Literal, Never, final, get_args, get_type_hints
+from typing import Annotated, Literal, Never, final, get_args, get_type_hints
 
 import numpy as np
 from msgspec import Meta
@@ -75,12 +75,12 @@ class TrialSettings:
             key=True,
         ),
     )
-    """Standard deviation of the poses seen, per axis; with the eye `range`, of one ray."""
+    """Standard deviation of the positions seen, per axis [mm]; with the eye `range`, of one ray."""
     level_deg: NoiseLevel = field(
         default=1.0,
         metadata=about("Only the degrees", called="level in degrees", meaning=_PER_AXIS, usual="the level", key=True),
     )
-    """The same of angles; zero with the eye `range`."""
+    """Standard deviation of the angles seen, per axis [deg]; zero with the eye `range`."""
     careless: Carelessness = field(
         default=1.0,
         metadata=about(
@@ -106,7 +106,7 @@ class TrialSettings:
             scene=True,
         ),
     )
-    """Per side, of parts that fit into one another; what a part can have is the scene's to say."""
+    """Room per side between parts that fit into one another [mm]."""
     eye: str = field(
         default="noise",
         metadata=about(
@@ -186,7 +186,7 @@ class TrialSettings:
             scene=True,
         ),
     )
-    """Time step of the physics."""
+    """Time step of the physics [s]."""
     fidelity: str = field(
         default="full",
         metadata=about(
@@ -221,38 +221,7 @@ def _settings() -> Iterable[SettingInfo]:
 
 SETTINGS: Mapping[str, SettingInfo] = {info.name: info for info in _settings()}
 """Name -> what is to be known of it, in the order of a row."""
-COLUMNS = tuple(info.column for info in SETTINGS.values())
 _CHECKED = tuple(info for info in SETTINGS.values() if info.called or info.spelled)
-
-
-def asked(settings: TrialSettings, scenario: str) -> dict[str, Any]:
-    """The settings as they stand in a row.
-
-    Args:
-        scenario: Its name.
-    """
-    said = {info.column: getattr(settings, name) for name, info in SETTINGS.items()}
-    return said | {"scenario": scenario, "salt": None if settings.salt is None else settings.salt.hash}
-
-
-def settings_of(row: Mapping[str, Any], scenario: str) -> TrialSettings:
-    """The settings of the trial that a row is of, without its salt, which no row tells.
-
-    Args:
-        scenario: A name, or the path of a scenario file.
-    """
-    said = {name: row.get(info.column, info.default) for name, info in SETTINGS.items()}
-    return TrialSettings(**(said | {"scenario": scenario, "salt": None}))
-
-
-def in_python(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their names, in the units of Python, out of those by their options; other names stay."""
-    values = dict(said)
-    for name, info in SETTINGS.items():
-        if info.keyword != name and info.keyword in values:
-            value = values.pop(info.keyword)
-            values[name] = value if info.scale == 1.0 else value * info.scale
-    return values
 
 
 def check(name: str, value: object, eye: str = "noise", called: str = "") -> None:

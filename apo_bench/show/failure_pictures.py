@@ -21,12 +21,13 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.solid import extent
 from apo_bench.io.reading import each_line
+from apo_bench.records.asked import settings_of
 from apo_bench.records.checked import row_of
 from apo_bench.records.key import row_key
 from apo_bench.records.own_code import left_out, own_code
 from apo_bench.records.replay_command import Files
 from apo_bench.records.salt import Salt
-from apo_bench.records.settings import TrialSettings, settings_of
+from apo_bench.records.settings import TrialSettings
 from apo_bench.report.failures import FailurePicture, Row
 
 _WIDTH, _HEIGHT, _QUALITY = 640, 480, 82

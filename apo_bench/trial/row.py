@@ -8,8 +8,9 @@ from typing import cast
 
 from apo_bench.assembly.reached import Outcome
 from apo_bench.io.plain_text import clean
+from apo_bench.records.asked import asked
 from apo_bench.records.row import LONGEST_SENTENCE, ROW_FIELDS, Row
-from apo_bench.records.settings import ENV_ID, ROW, TrialSettings, asked
+from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
 from apo_bench.scenario.scenario import Scenario
 
 FOUND = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))

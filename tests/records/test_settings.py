@@ -1,0 +1,109 @@
+"""The settings of a trial are stated once: what else lists them is made from that."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import get_type_hints
+
+import pytest
+
+from apo_bench.cli import app as cli
+from apo_bench.cli.setting_options import sweep_options, trial_options
+from apo_bench.errors import InputError
+from apo_bench.records.asked import asked, settings_of
+from apo_bench.records.key import KEY
+from apo_bench.records.row import REQUIRED, ROW_FIELDS
+from apo_bench.records.run_folder import read_rows
+from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
+from apo_bench.report.compare import compare
+from apo_bench.sweeps.grid import SweepSpec
+from apo_bench.sweeps.sweep_file import KEYS
+from apo_bench.trial.trial import run_trial
+
+ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "tests" / "kept" / "row6"
+"""As the version wrote it in which settings were stated many times: 1 scenario, 2 levels, 3 methods, 2 seeds."""
+
+
+def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() -> None:
+    columns = [info.column for info in SETTINGS.values()]
+    assert [column for column in ROW_FIELDS if column in columns] == columns
+    for name, kind in get_type_hints(TrialSettings, include_extras=True).items():
+        column = ROW_FIELDS[SETTINGS[name].column]
+        if not SETTINGS[name].choices and name != "salt":
+            assert column in (kind, kind | None)
+    assert set(KEY) < set(REQUIRED)
+
+
+def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
+    here = {field.name for field in fields(SweepSpec)}
+    for name, info in SETTINGS.items():
+        level, alone = name.startswith("level_"), name in ("seed", "salt")
+        assert bool(info.axis) + info.shared + level + alone == 1
+        assert (LEVEL.axis if level else info.axis or name) in here | {"salt"}
+        assert not info.axis or info.axis in KEYS
+
+
+def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
+    options = {option.name for option in trial_options()}
+    assert options == {info.keyword for info in SETTINGS.values() if info.name != "scenario"} | {"level"}
+    assert {"levels", "methods", "clearance", "timestep_ms", "fidelity"} < {option.name for option in sweep_options()}
+
+
+def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
+    made = TrialSettings("block_on_block", 2.0, 0.5, 0.0, 0.5, method="none", seed=3, timestep_s=0.0005)
+    assert settings_of(asked(made, "block_on_block"), "block_on_block") == made
+    assert settings_of({"level": 2.0}, "block_on_block") == TrialSettings("block_on_block", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
+        ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
+        ({"careless": "much"}, "a carelessness of 'much' was given; a number from 0 to 10 is allowed"),
+        (
+            {"clearance_mm": float("inf")},
+            "a clearance of inf was given; a number from 0 to 5 is allowed, in mm per side",
+        ),
+    ],
+)
+def test_a_setting_that_cannot_be_is_one_sentence(wrong: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        TrialSettings(**{"scenario": "block_on_block", **wrong})  # type: ignore[arg-type]
+    assert str(refused.value).startswith(said)
+
+
+def test_a_trial_is_written_as_before() -> None:
+    """Bytes are promised on one machine; everywhere the columns, their order, the settings and the ending are."""
+    for line in (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()[:3]:
+        before = json.loads(line)
+        again = run_trial(settings_of(before, before["scenario"]))
+        assert list(again) == list(before)
+        for column in (*asdict(TrialSettings("")), "level", "success", "failure_stage", "failure_code", "freed"):
+            assert again.get(column) == before.get(column)
+
+
+def test_a_folder_of_before_is_reported_and_compared(tmp_path: Path) -> None:
+    rows = read_rows(KEPT)
+    assert (len(rows), {row["schema"] for row in rows}) == (12, {"apo-bench/row/6"})
+    assert [json.dumps(row) for row in rows] == (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()
+    folder = shutil.copytree(KEPT, tmp_path / "kept")
+    assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
+    found = compare(KEPT, folder)
+    assert (found.shared, len(found.changed), found.identical) == (12, 0, 12)
+
+
+def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    import fields as pages
+
+    monkeypatch.delitem(sys.modules, "fields")
+    for name in SETTINGS:
+        assert f"| `{name}` | " in pages.settings_page()
+    for column in ROW_FIELDS:
+        assert f"| `{column}` | " in pages.row_page()
