@@ -29,7 +29,7 @@ from apo_bench.trial.stages import observe_recording, record_demonstration, repl
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 5
-SIZE = (420, 360)
+SIZE, COLUMNS = (420, 360), 4
 
 
 class Moment(NamedTuple):
@@ -53,7 +53,7 @@ class Strip(NamedTuple):
 
 EXAMPLES = {
     "stick_in_tower": Strip(
-        "Example 5.1: {3} fails, {3, 2} holds",
+        "Example 5.1: goals {3} fail, {3, 2} hold",
         "paper-track",
         "Fig. 10: as seen",
         (
@@ -63,7 +63,7 @@ EXAMPLES = {
         ),
     ),
     "carried_bridge": Strip(
-        "Example 5.2: {5}, {5, 4}, {5, 4, 3} fail, {5, 4, 3, 2} holds",
+        "Example 5.2: goals {5}, {5, 4}, {5, 4, 3} fail, {5, 4, 3, 2} hold",
         "paper-track",
         "Fig. 13: as seen",
         (
@@ -77,7 +77,7 @@ EXAMPLES = {
         ),
     ),
     "vanished_fixture": Strip(
-        "Example 5.3: {5}, {5, 3} fail, {5, 3, 2} holds",
+        "Example 5.3: goals {5}, {5, 3} fail, {5, 3, 2} hold",
         "paper-track",
         "Fig. 16: as seen",
         (
@@ -121,13 +121,14 @@ def _draw(name: str, strip: Strip) -> None:
     assert corrected is not None, f"{strip.method} corrects {name}"
     failed, right = (_watched(scene, each, shown.layout.goals) for each in (raw, corrected))
     pictures = [(strip.failure, failed[1][-1][1]), *((m.caption, _state(right, m)) for m in strip.moments)]
-    figure, axes = plt.subplots(1, len(pictures), figsize=(2.35 * len(pictures), 2.5), layout="constrained")
+    rows = -(-len(pictures) // COLUMNS)
+    figure, axes = plt.subplots(rows, COLUMNS, figsize=(3.0 * COLUMNS, 2.9 * rows + 0.4), layout="constrained")
     camera = _camera(shown.layout.goals)
-    for axis, (caption, state) in zip(axes, pictures, strict=True):
+    for axis, (caption, state) in zip(axes.flat, pictures, strict=True):
         axis.imshow(picture_with_arm(scene, shown.layout.start, state, *SIZE, camera))
-        axis.set_title(caption, fontsize=9.5)
+        axis.set_title(caption, fontsize=12)
         axis.axis("off")
-    figure.suptitle(strip.title, fontsize=11)
+    figure.suptitle(strip.title, fontsize=14)
     figure.savefig(HERE / f"example_{name}.png", dpi=80)
     plt.close(figure)
 
