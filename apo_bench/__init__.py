@@ -41,6 +41,7 @@ _EXPORTS = MappingProxyType(
         "TrialSettings": "apo_bench.records.settings",
         "Verdict": "apo_bench.judging.verdict",
         "build_scene": "apo_bench.simulation.scene.scene",
+        "camera_view": "apo_bench.simulation.scene.render",
         "correct": "apo_bench.correction.correctors",
         "correct_many": "apo_bench.correction.many",
         "demonstrate": "apo_bench.simulation.human.demonstration",

@@ -26,6 +26,7 @@ from apo_bench.scenario.scenario import Scenario as Scenario
 from apo_bench.simulation.execution.controller import replay as replay
 from apo_bench.simulation.human.demonstration import demonstrate as demonstrate
 from apo_bench.simulation.scene.render import Film as Film
+from apo_bench.simulation.scene.render import camera_view as camera_view
 from apo_bench.simulation.scene.render import picture as picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene

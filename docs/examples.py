@@ -22,7 +22,7 @@ from apo_bench.assembly.reached import ReplayResult
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.render import Camera, picture_with_arm, view
+from apo_bench.simulation.scene.render import Camera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import plan
 from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
@@ -155,7 +155,7 @@ def _camera(goals: Array) -> Camera:
     low, high = goals[:, :3, 3].min(axis=0), goals[:, :3, 3].max(axis=0)
     turn = float(np.degrees(np.arctan2(goals[0][1, 0], goals[0][0, 0])))
     far = 0.42 + 0.7 * float(np.linalg.norm(high - low))
-    return view(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
+    return camera_view(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)
 
 
 if __name__ == "__main__":

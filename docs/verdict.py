@@ -16,7 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.render import Camera, picture, view
+from apo_bench.simulation.scene.render import Camera, camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
 from tests import audited_states as audited
 from tests.end_states import reached, verdict
@@ -125,7 +125,9 @@ def camera(poses: Mapping[str, Array], away: Collection[str]) -> Camera:
     """One that sees all but the table and what was put away."""
     at = np.array([T[:3, 3] for part, T in poses.items() if part not in ("table", *away)])
     low, high = at.min(axis=0), at.max(axis=0)
-    return view((low + high) / 2, NEAREST_M + 0.9 * float(np.linalg.norm(high - low)), AZIMUTH_DEG, ELEVATION_DEG)
+    return camera_view(
+        (low + high) / 2, NEAREST_M + 0.9 * float(np.linalg.norm(high - low)), AZIMUTH_DEG, ELEVATION_DEG
+    )
 
 
 if __name__ == "__main__":

@@ -120,7 +120,7 @@ def _below(one: BeliefPanel) -> list[str]:
 
 def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
     """One that sees what the last operation was about, obliquely to the assembly."""
-    from apo_bench.simulation.scene.render import view
+    from apo_bench.simulation.scene.render import camera_view
 
     boxes = {part: scenario.assembly.solids[part].boxes for part in parts}
     ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
@@ -128,4 +128,6 @@ def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
     low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
     first = poses[scenario.assembly.operations[0].main]
     azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
-    return view((low + high) / 2, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
+    return camera_view(
+        (low + high) / 2, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG
+    )

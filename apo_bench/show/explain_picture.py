@@ -44,14 +44,14 @@ def draw_explanation(scenario: Scenario, observation: Observation, found: Explan
         InputError: There is nothing to draw with, or the file cannot be written.
     """
     from apo_bench.simulation.scene.marks import Marks, pixels
-    from apo_bench.simulation.scene.render import picture, view
+    from apo_bench.simulation.scene.render import camera_view, picture
     from apo_bench.simulation.scene.scene import build_scene
 
     drawn, scene = _parts(scenario, found), build_scene(scenario)
     low, high = _bounds(drawn)
     azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + _AZIMUTH_DEG
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
-    camera = view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
+    camera = camera_view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
     marks = [mark for one in drawn for mark in _marks(one, -_looking(azimuth))]
     poses = {**observation.start, **{part.part: part.pose for part in found.parts}}
     image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks(marks))

@@ -172,7 +172,7 @@ def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:
 
 def _camera(scene: Any, row: Row, poses: Poses) -> Any:
     """One that sees what failed: the parts of the operation, else all that were assembled."""
-    from apo_bench.simulation.scene.render import view
+    from apo_bench.simulation.scene.render import camera_view
 
     assembly = scene.scenario.assembly
     k = row.get("failure_operation")
@@ -180,13 +180,13 @@ def _camera(scene: Any, row: Row, poses: Poses) -> Any:
     near = {part for o in asked for part in (*o.moves, *(c.environment.part for c in o.contacts))}
     parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
     if not parts:
-        return view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)
+        return camera_view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)
     boxes = {part: assembly.solids[part].boxes for part in parts}
     ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
     at = np.array([poses[part][:3, 3] for part in parts])
     low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
     far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
-    return view((low + high) / 2, min(far, 1.2), _AZIMUTH_DEG, _ELEVATION_DEG)
+    return camera_view((low + high) / 2, min(far, 1.2), _AZIMUTH_DEG, _ELEVATION_DEG)
 
 
 def _jpeg(image: Any) -> bytes:

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.scene.render import Film, picture, save_film, view
+from apo_bench.simulation.scene.render import Film, camera_view, picture, save_film
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state
 
@@ -27,9 +27,9 @@ def test_a_picture_shows_where_the_parts_are(tower: Scene) -> None:
 
 def test_the_end_of_one_film_does_not_spoil_the_next(tower: Scene) -> None:
     data = initial_state(tower.work, draw_layout(tower.scenario, np.random.default_rng(0)).start)
-    first = Film(tower, width=SIZE[0], height=SIZE[1], camera=view(np.zeros(3), 1.0))
+    first = Film(tower, width=SIZE[0], height=SIZE[1], camera=camera_view(np.zeros(3), 1.0))
     first(data)
-    second = Film(tower, width=SIZE[0], height=SIZE[1], camera=view(np.zeros(3), 1.0))
+    second = Film(tower, width=SIZE[0], height=SIZE[1], camera=camera_view(np.zeros(3), 1.0))
     first.close()
     second(data)
     assert np.array_equal(first.frames[0], second.frames[0])

@@ -35,7 +35,7 @@ def picture(
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
 
     Args:
-        camera: `overview`, `close`, `top`, or a `view`.
+        camera: `overview`, `close`, `top`, or a `camera_view`.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     return _drawn(scene.shown, _at(scene.shown, scene, poses), width, height, camera, more)
@@ -67,7 +67,9 @@ def picture_with_arm(
     return _drawn(scene.work, data, width, height, camera, more)
 
 
-def view(look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0) -> Camera:
+def camera_view(
+    look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0
+) -> Camera:
     """A camera that looks at a point of the world, (3,), [m]."""
     camera = mujoco.MjvCamera()
     camera.lookat[:], camera.distance = look_at, distance_m
@@ -95,7 +97,7 @@ class Film:
             shadows: Nicer, and some times slower to draw without a graphics card.
         """
         middle = np.array([*scene.scenario.site.center_m, 0.08])
-        self.fps, self.camera = fps, camera or view(middle, 0.85, 128.0, -24.0)
+        self.fps, self.camera = fps, camera or camera_view(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
