@@ -1,11 +1,12 @@
 """What README and documentation tell a person to type works: all commands are parsed, quick ones and all Python run.
 
-Each page is a session in an empty folder, from top to bottom. A block with a title is a file of that name. What stands
-on several pages runs on the first of them.
+Each page is a session in an empty folder, from top to bottom. A block with a title is a file of that name. A `text`
+block right behind a Python block is what that one prints. What stands on several pages runs on the first of them.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import shutil
@@ -24,8 +25,11 @@ ROOT = Path(__file__).parents[2]
 SWEEP = ROOT / "tests" / "kept" / "row5"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(
-    r"^```(?P<language>\w+)(?: title=\"(?P<title>[^\"]+)\")?\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+    r"^```(?P<language>\w+)(?: title=\"(?P<title>[^\"]+)\")?\n(?P<text>.*?)^```$"
+    r"(?:\n\n^```text\n(?P<output>.*?)^```$)?",
+    re.MULTILINE | re.DOTALL,
 )
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 PARSED_ONLY: Mapping[str, str] = {
     r"sweep ": "minutes: many trials; tests/cli and tests/sweeps run small ones",
     r"report runs/mine$": "draws pictures of failures, which replays them; the one with --pictures 0 runs",
@@ -47,6 +51,8 @@ class Block(NamedTuple):
     language: str
     title: str | None
     text: str
+    output: str | None
+    """What it prints, where the page shows it."""
 
 
 class Line(NamedTuple):
@@ -112,6 +118,38 @@ def sessions() -> Iterator[tuple[Path, list[Block | Line]]]:
 SESSIONS = dict(sessions())
 
 
+def same_output(printed: str, shown: str, within: float = 0.02) -> bool:
+    """Whether the words are the same, and the numbers to rounding; spaces do not count.
+
+    Args:
+        within: Relative and absolute; other processors may round the last digit otherwise.
+    """
+    words = ["".join(NUMBER.sub("0", text).split()) for text in (printed, shown)]
+    pairs = zip(NUMBER.findall(printed), NUMBER.findall(shown), strict=words[0] == words[1])
+    return words[0] == words[1] and all(
+        math.isclose(float(a), float(b), rel_tol=within, abs_tol=within) for a, b in pairs
+    )
+
+
+@pytest.mark.parametrize(
+    ("printed", "shown", "same"),
+    [
+        ("gap 5.77 mm", "gap 5.78  mm", True),
+        ("gap 0.31 mm", "gap 0.36 mm", False),
+        ("gap 0.3 mm", "gap 0.3 cm", False),
+        ("True", "False", False),
+        ("1 2", "1 2 3", False),
+    ],
+)
+def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str, shown: str, same: bool) -> None:
+    assert same_output(printed, shown) is same
+
+
+def test_the_trial_by_hand_has_ten_lines() -> None:
+    first = blocks(ROOT / "docs" / "guide" / "first-trial.md")[0]
+    assert sum(bool(line) and not line.startswith("import ") for line in first.text.splitlines()) <= 10
+
+
 @pytest.mark.parametrize("page", SESSIONS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_says_works_from_top_to_bottom(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -128,7 +166,10 @@ def test_what_a_page_says_works_from_top_to_bottom(
         if isinstance(each, Line):
             assert main(list(each.words)) == 0, f"{each}: {capsys.readouterr().err}"
         elif each.title is None:
+            capsys.readouterr()
             exec(compile(each.text, str(page), "exec"), names)
+            printed = capsys.readouterr().out
+            assert each.output is None or same_output(printed, each.output), f"{each.text}\nprints\n{printed}"
         else:
             Path(each.title).write_text(each.text, encoding="utf-8")
             assert not each.title.endswith(".xml") or load_part(Path(each.title)).faces
