@@ -6,6 +6,7 @@ block right behind a Python block is what that one prints. What stands on severa
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import shlex
@@ -143,6 +144,22 @@ def same_output(printed: str, shown: str, within: float = 0.02) -> bool:
 )
 def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str, shown: str, same: bool) -> None:
     assert same_output(printed, shown) is same
+
+
+def test_pages_and_notebooks_use_what_the_package_exports() -> None:
+    """But for how the noise of two estimators was made of their quantiles."""
+    code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
+    for path in (ROOT / "notebooks").glob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        code[path] = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    inner = {
+        found for texts in code.values() for text in texts for found in re.findall(r"apo_bench\.\w+\.[\w.]+", text)
+    }
+    inner |= {
+        found for texts in code.values() for text in texts for found in re.findall(r"from (apo_bench\.\S+)", text)
+    }
+    assert sum(map(len, code.values())) > 10
+    assert inner == {"apo_bench.observation.fitting.quantiles"}
 
 
 def test_the_trial_by_hand_has_ten_lines() -> None:
