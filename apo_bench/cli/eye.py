@@ -28,19 +28,18 @@ def eye(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
-    from apo_bench.show.eye_one import checked_view, run_sensor
-    from apo_bench.show.eye_text import eye_form, eye_lines
+    from apo_bench.show.sensor_run import checked_view, run_sensor, sensor_form, sensor_lines
 
     if out is not None:
         check_writable(out, "--out", (".png",))
     shows = checked_view(view)
     seen = run_sensor(scenario, level, seed, careless)
-    form = eye_form(seen, level, seed, careless)
-    typer.echo(json.dumps(form, allow_nan=False) if as_json else "\n".join(eye_lines(form)))
+    form = sensor_form(seen, level, seed, careless)
+    typer.echo(json.dumps(form, allow_nan=False) if as_json else "\n".join(sensor_lines(form)))
     if out is not None:
-        from apo_bench.show.eye_picture import draw_eye
+        from apo_bench.show.sensor_picture import draw_sensor
 
-        draw_eye(seen, out, shows)
+        draw_sensor(seen, out, shows)
         if not as_json:
             typer.echo(f"\nWrote {out}")
     if not all(operation["found"] for operation in form["operations"]):

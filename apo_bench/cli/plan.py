@@ -35,8 +35,7 @@ def plan(
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.plan_lines import plan_lines
-    from apo_bench.show.plan_text import plan_lines_form, plan_text
+    from apo_bench.show.plan_text import plan_lines, plan_lines_form, plan_text
 
     if observation is None:
         if method is not None:

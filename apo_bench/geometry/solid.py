@@ -92,3 +92,9 @@ class Solid:
         low = np.min([box.center - box.half for box in self.boxes], axis=0)
         high = np.max([box.center + box.half for box in self.boxes], axis=0)
         return np.array([low, high])
+
+
+def world_bounds(posed: Iterable[tuple[Solid, Array]]) -> tuple[Array, Array]:
+    """The lowest and the highest corner, (3,) each, of the box around posed solids, world frame, [m]."""
+    ends = np.array([[np.add(extent(solid.boxes, T[i, :3]), T[i, 3]) for i in range(3)] for solid, T in posed])
+    return ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)

@@ -13,12 +13,12 @@ from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.graph import arc_residuals, relation_graph
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import extent
+from apo_bench.geometry.solid import world_bounds
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.explain_text import listed_words
+from apo_bench.show.save import save_figure
+from apo_bench.show.words import listed_words
 
 _WIDTH, _HEIGHT, _LINE_PX = 620, 480, 20
 _NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
@@ -102,10 +102,7 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
             figure.text(
                 (i + 0.03) / len(beliefs), (below - _LINE_PX * (j + 0.8)) / height, line, va="center", fontsize=9.5
             )
-    try:
-        figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{out} cannot be written ({error.strerror}); choose another place.") from error
+    save_figure(figure, out)
 
 
 def _below(one: BeliefPanel) -> list[str]:
@@ -122,10 +119,7 @@ def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
     """One that sees what the last operation was about, obliquely to the assembly."""
     from apo_bench.simulation.scene.render import camera_view
 
-    boxes = {part: scenario.assembly.solids[part].boxes for part in parts}
-    ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
-    at = np.array([poses[part][:3, 3] for part in parts])
-    low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+    low, high = world_bounds((scenario.assembly.solids[part], poses[part]) for part in parts)
     first = poses[scenario.assembly.operations[0].main]
     azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
     return camera_view(

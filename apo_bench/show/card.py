@@ -14,6 +14,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario
+from apo_bench.show.words import listed_words
 
 _OPPOSITE = 0.99
 """Normals whose cosine is below minus this look at each other; a face whose normal is as upright is level."""
@@ -62,7 +63,7 @@ def _operations(scenario: Scenario, graph: Graph) -> Iterator[str]:
     for k, operation in enumerate(scenario.assembly.operations):
         made = [arc for arc in graph.arcs if arc.made == k]
         lost = [arc.name for arc in graph.arcs if arc.lost == k]
-        carrying = f", carrying {_and(operation.carries)}," if operation.carries else ""
+        carrying = f", carrying {listed_words(operation.carries)}," if operation.carries else ""
         where = _where(scenario, made)
         relations = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in made) or "no contact"
         loses = f"; loses {', '.join(lost)}" if lost else ""
@@ -73,7 +74,7 @@ def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
     """`onto table and against cube`."""
     ends = dict.fromkeys((_way(scenario, arc), arc.environment.part) for arc in made)
     ways = groupby(ends, key=lambda end: end[0])
-    return _and([f"{way} {_and([part for _, part in found])}" for way, found in ways])
+    return listed_words([f"{way} {listed_words([part for _, part in found])}" for way, found in ways])
 
 
 def _way(scenario: Scenario, arc: Arc) -> str:
@@ -106,7 +107,7 @@ def _followers(scenario: Scenario, how: Carelessness) -> str:
     offsets = spread_error(scenario, Layout(scenario.goals, scenario.start), how.axis).offsets
     led = [k for k in np.flatnonzero(np.linalg.norm(offsets, axis=1) > NOTHING_M) if k != how.operation]
     words = [f"{scenario.assembly.operations[k].main} (operation {k + 1})" for k in led]
-    return f"; {_and(words)} {'follow' if len(words) > 1 else 'follows'}" if words else ""
+    return f"; {listed_words(words)} {'follow' if len(words) > 1 else 'follows'}" if words else ""
 
 
 def _varies(scenario: Scenario) -> Iterator[str]:
@@ -133,7 +134,7 @@ def _success(scenario: Scenario) -> Iterator[str]:
     )
     away = sorted(fixtures(scenario.assembly))
     if away:
-        yield f"Where {_and(away)} ends is free: it is a fixture, used and put away."
+        yield f"Where {listed_words(away)} ends is free: it is a fixture, used and put away."
     yield (
         "As demonstrated: the same, and every contact also when it was made, where it was shown; no part in place "
         "pushed on the way." + (" Here only that is a success." if scenario.success_means != "assembled" else "")
@@ -152,8 +153,3 @@ def _axis(axis: Array) -> str:
     if abs(axis[i]) > 1 - 1e-9:
         return f"its {'-' if axis[i] < 0 else ''}{'xyz'[i]} axis"
     return f"its direction ({', '.join(f'{a:.3g}' for a in axis)})"
-
-
-def _and(words: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

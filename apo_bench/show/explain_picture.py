@@ -10,11 +10,12 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
-from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid, extent
+from apo_bench.geometry.solid import Solid, extent, world_bounds
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.explain_text import listed_words, size, with_article
+from apo_bench.show.explain_text import size
+from apo_bench.show.save import save_figure
+from apo_bench.show.words import listed_words, with_article
 
 _WIDTH, _HEIGHT = 900, 540
 _LINE_PX = 21
@@ -48,7 +49,7 @@ def draw_explanation(scenario: Scenario, observation: Observation, found: Explan
     from apo_bench.simulation.scene.scene import build_scene
 
     drawn, scene = _parts(scenario, found), build_scene(scenario)
-    low, high = _bounds(drawn)
+    low, high = world_bounds((one.solid, one.pose) for one in drawn)
     azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + _AZIMUTH_DEG
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
     camera = camera_view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
@@ -61,10 +62,7 @@ def draw_explanation(scenario: Scenario, observation: Observation, found: Explan
     for mark, tips in names:
         x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
         _name(figure, mark.name, x, y, mark.color)
-    try:
-        figure.savefig(out, dpi=100, format="png", metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{out} cannot be written ({error.strerror}); choose another place.") from error
+    save_figure(figure, out)
 
 
 def _parts(scenario: Scenario, found: Explanation) -> list[_Drawn]:
@@ -74,13 +72,6 @@ def _parts(scenario: Scenario, found: Explanation) -> list[_Drawn]:
         for part in found.parts
         if part.part in own
     ]
-
-
-def _bounds(drawn: list[_Drawn]) -> tuple[Array, Array]:
-    """Lowest and highest corner of all, world frame, [m]."""
-    ends = np.array([[extent(one.solid.boxes, one.pose[i, :3]) for i in range(3)] for one in drawn])
-    at = np.array([one.pose[:3, 3] for one in drawn])
-    return (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
 
 
 def _looking(azimuth_deg: float) -> Array:

@@ -13,6 +13,7 @@ from apo_bench.correction.explanation import Explanation, FreeDirection, Operati
 from apo_bench.correction.holding import Hold
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.show.words import listed_words, with_article
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -63,17 +64,6 @@ def explanation_form(scenario: str, found: Explanation) -> dict[str, Any]:
         "redundant": found.redundant,
         "spectral_gap": found.spectral_gap if np.isfinite(found.spectral_gap) else None,
     }
-
-
-def with_article(part: str) -> str:
-    """`the stick`, but `castle2` and `A`."""
-    return part if part[-1].isdigit() or part[0].isupper() else f"the {part}"
-
-
-def listed_words(words: Iterable[str]) -> str:
-    """`x`, `x and y`, `x, y and yaw`."""
-    *most, last = words
-    return f"{', '.join(most)} and {last}" if most else last
 
 
 def size(free: FreeDirection) -> str:

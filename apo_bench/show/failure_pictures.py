@@ -19,7 +19,7 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.geometry.solid import extent
+from apo_bench.geometry.solid import world_bounds
 from apo_bench.io.reading import each_line
 from apo_bench.records.asked import settings_of
 from apo_bench.records.checked import row_of
@@ -181,10 +181,7 @@ def _camera(scene: Any, row: Row, poses: Poses) -> Any:
     parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
     if not parts:
         return camera_view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)
-    boxes = {part: assembly.solids[part].boxes for part in parts}
-    ends = np.array([[extent(boxes[part], poses[part][i, :3]) for i in range(3)] for part in parts])
-    at = np.array([poses[part][:3, 3] for part in parts])
-    low, high = (ends[..., 0] + at).min(axis=0), (ends[..., 1] + at).max(axis=0)
+    low, high = world_bounds((assembly.solids[part], poses[part]) for part in parts)
     far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
     return camera_view((low + high) / 2, min(far, 1.2), _AZIMUTH_DEG, _ELEVATION_DEG)
 

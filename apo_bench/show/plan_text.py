@@ -1,4 +1,4 @@
-"""A plan in macros: one line per operation, and one JSON object.
+"""A plan in macros, step by step: one line per operation, and one JSON object.
 
 Directions are those of the frame of the assembly at the nominal goals; what is measured stands in the last column
 alone, so that another motion parameter changes the line of its operation and no other.
@@ -7,30 +7,90 @@ alone, so that another motion parameter changes the line of its operation and no
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from apo_bench.assembly.goals import Plan
 from apo_bench.assembly.placement import placements
+from apo_bench.assembly.topology import spelled
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
-from apo_bench.scenario.nominal import nominal_start
-from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.plan_lines import PlanLine
+from apo_bench.insertion.operations import OperationMacros
+from apo_bench.scenario.nominal import nominal_operations, nominal_start
+from apo_bench.scenario.scenario import Grasp, Scenario
+from apo_bench.show.words import columns
 
 _MACROS = "apo-bench/macros/1"
 _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
 
 
+class PlanLine(NamedTuple):
+    """One step of the schedule."""
+
+    operation: int
+    """Counted from 0."""
+    undo: bool
+    what: OperationMacros
+    leaves: Arrival
+    comes: Arrival
+    came_from: str
+    """The ODL of where the main part is taken from, or `start`."""
+    relations: tuple[str, ...]
+    """What is made: R1, R2, .."""
+    grasp: Grasp
+    goal: Array | None
+    """(4, 4), world, [m]; None of what is undone: it goes back to where it was."""
+    back_to: str
+    """The ODL of that place; empty otherwise."""
+
+    @property
+    def macros(self) -> tuple[Macro, ...]:
+        return (*self.leaves.departs, *self.comes.macros)
+
+    @property
+    def trouble(self) -> str:
+        """What the plan knows to be wrong with the way in; empty if nothing is."""
+        if self.comes.chain.locked:
+            return "locked: no straight way leads there"
+        return "" if self.comes.free else "no free way in was found"
+
+
+def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
+    """What the robot is asked to do, step by step."""
+    everything, odls, arcs = nominal_operations(scenario), plan.assembly.odls(), plan.assembly.arcs()
+    made_by = [plan.assembly.relations()[arc[0]].made for arc in arcs]
+    lost_at = [plan.assembly.relations()[arc[0]].lost for arc in arcs]
+    lines = []
+    for (k, undo), T in zip(plan.schedule, plan.targets, strict=True):
+        what = everything[k]
+        before = spelled(odls[k - 1][what.main]) if k and what.main in odls[k - 1] else "start"
+        leaves, comes = (what.after, what.before) if undo else (what.before, what.after)
+        mine = [i for i in range(len(arcs)) if (lost_at[i] if undo else made_by[i]) == k]
+        lines.append(
+            PlanLine(
+                operation=k,
+                undo=undo,
+                what=what,
+                leaves=leaves,
+                comes=comes,
+                came_from=f"T{k + 1}" if undo else before,
+                relations=tuple(f"R{i + 1}" for i in mine),
+                grasp=scenario.grasps[k],
+                goal=None if undo else T,
+                back_to=before if undo else "",
+            )
+        )
+    return tuple(lines)
+
+
 def plan_text(lines: Sequence[PlanLine]) -> list[str]:
     """A table of text, then what is wrong with single operations."""
     table = [_HEADS, *(_cells(line) for line in lines)]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    rows = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
     wrong = [f"operation {line.operation + 1} ({line.what.main}): {line.trouble}" for line in lines if line.trouble]
-    return [*rows, *([""] if wrong else []), *wrong]
+    return [*columns(table), *([""] if wrong else []), *wrong]
 
 
 def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequence[str] = ()) -> dict[str, Any]:

@@ -20,8 +20,7 @@ from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.nominal import nominal_operations, nominal_start
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.plan_lines import plan_lines
-from apo_bench.show.plan_text import direction, plan_lines_form, plan_text
+from apo_bench.show.plan_text import direction, plan_lines, plan_lines_form, plan_text
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.scene.scene import build_scene
 from tests import scenes

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
 from apo_bench.assembly.topology import spelled
+from apo_bench.show.words import columns
 
 _GRAPH = "apo-bench/graph/1"
 
@@ -22,7 +22,7 @@ def graph_lines(scenario: str, graph: Graph, residuals: ArcResiduals | None = No
     arcs: list[tuple[str, ...]] = [(str(arc), _times(arc), f"[{' '.join(arc.pairs)}]") for arc in graph.arcs]
     if residuals is not None:
         arcs = [(*words, _size(r, gap_m)) for words, r in zip(arcs, residuals, strict=True)]
-    return [graph_title(scenario, graph), "", *_columns(nodes), "", *_columns(arcs)]
+    return [graph_title(scenario, graph), "", *columns(nodes), "", *columns(arcs)]
 
 
 def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals | None = None) -> dict[str, Any]:
@@ -47,12 +47,6 @@ def _size(residual: float | None, gap_m: float) -> str:
         return "not seen"
     above = f", above {gap_m * 1e3:g}" if residual > gap_m else ""
     return f"{residual * 1e3:.3f} mm{above}"
-
-
-def _columns(table: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length, their entries below each other."""
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in table]
 
 
 def _node_form(node: Node) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What the eye sees, stage by stage, one row per operation: picture, range, difference, regions, fitted model."""
+"""What the range finder sees, one row per operation: picture, range, difference, regions, fitted model."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.view import View
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.show.eye_one import SensorRun
+from apo_bench.show.save import save_figure
+from apo_bench.show.sensor_run import SensorRun
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 _TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
@@ -25,7 +25,7 @@ _AROUND = 20
 _LARGEST_MM, _RESIDUAL_MM = 60.0, 5.0
 
 
-def draw_eye(run: SensorRun, out: Path, view: int = 0) -> None:
+def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     """Draw every operation that was noticed, in one view of the range finder."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -44,10 +44,7 @@ def draw_eye(run: SensorRun, out: Path, view: int = 0) -> None:
         _draw_row(row, run.watched, run.images, event, view)
     for axes in rows[:, 1:].ravel():
         _crop(axes, events, view)
-    try:
-        figure.savefig(out, dpi=72)
-    except OSError as error:
-        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+    save_figure(figure, out, dpi=72, given="--out ")
 
 
 def _label(assembly: Assembly, event: Event) -> str:
@@ -79,9 +76,9 @@ def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], e
     row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
     if event.found is not None and event.shape is not None:
         expected = _expected(watched.finder.views[view], event)
-        run = regions.appeared & (np.abs(after - expected) < 0.02)
+        agreeing = regions.appeared & (np.abs(after - expected) < 0.02)
         drawn = row[4].imshow(
-            np.where(run, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-_RESIDUAL_MM, vmax=_RESIDUAL_MM
+            np.where(agreeing, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-_RESIDUAL_MM, vmax=_RESIDUAL_MM
         )
         row[4].contour(np.isfinite(expected), levels=[0.5], colors=_OUTLINE, linewidths=1.2)
         bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)

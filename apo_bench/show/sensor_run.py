@@ -1,0 +1,131 @@
+"""One demonstration through the range finder, and all that it made of that: as a record, a form, and lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from apo_bench.depth_camera.follow import Event
+from apo_bench.depth_camera.range_finder import RangeFinder
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.records.settings import RANGE, check
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.sensor.watch import DemonstrationImages
+from apo_bench.trial.stages import (
+    OBSERVATION,
+    Recording,
+    demonstration_failure,
+    range_sensor,
+    record_demonstration,
+    stream,
+)
+
+_FORM = "apo-bench/eye/1"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SensorRun:
+    """A demonstration, what was measured of it, and what was made of that."""
+
+    name: str
+    """The name of the scenario."""
+    shown: Recording
+    watched: DemonstrationImages
+    images: tuple[Array, ...]
+    """Measured range images, (views, height, width) each, [m]."""
+    events: tuple[Event, ...]
+
+
+def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> SensorRun:
+    """Let the human demonstrate, and watch: the same images and poses as in a trial with these settings.
+
+    Raises:
+        InputError: A setting that is not allowed.
+        RuntimeError: The demonstration itself failed.
+    """
+    check("level_mm", level_mm, RANGE)
+    check("careless", careless)
+    check("seed", seed)
+    scene = build_scene(load_scenario(scenario))
+    shown = record_demonstration(scene, careless, seed, RANGE)
+    if shown.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(shown.demonstration).sentence}; try another seed")
+    assert shown.watched is not None
+    eye = range_sensor(scene, shown, level_mm)
+    images = tuple(eye.sensed(stream(seed, OBSERVATION)))
+    return SensorRun(scene.scenario.name, shown, shown.watched, images, eye.events(shown.demonstration, images))
+
+
+def checked_view(view: int) -> int:
+    """The number of a view, from 0, of one given from 1.
+
+    Raises:
+        InputError: The range finder has no such view.
+    """
+    views = len(RangeFinder().views)
+    if not 1 <= view <= views:
+        raise InputError(f"--view {view} was given; the range finder has views 1 to {views}.")
+    return view - 1
+
+
+def sensor_form(run: SensorRun, level_mm: float, seed: int, careless: float) -> dict[str, Any]:
+    """Everything that `apo-bench eye` says, operations from 1; the error is that of the sensor, not the human's."""
+    of = {event.operation: event for event in run.events if event.operation is not None}
+    return {
+        "schema": _FORM,
+        "scenario": run.name,
+        "level_mm": level_mm,
+        "seed": seed,
+        "careless": careless,
+        "firings_s": [round(t, 3) for t in run.watched.times_s],
+        "operations": [
+            {"operation": k + 1, "moves": list(operation.moves)} | _one(of.get(k), run, k)
+            for k, operation in enumerate(run.shown.demonstration.assembly.operations)
+        ],
+    }
+
+
+def _one(event: Event | None, run: SensorRun, k: int) -> dict[str, Any]:
+    if event is None or event.found is None:
+        return {"found": False}
+    deviation = np.sqrt(np.diag(event.found.covariance))
+    error = pose.log(pose.inverse(event.found.T) @ run.shown.demonstration.goals[k])
+    packed = pose.pack(event.found.T)
+    return {
+        "found": True,
+        "time_s": round(run.watched.times_s[event.last], 3),
+        "explained": {name: round(share, 3) for name, share in event.explained.items()},
+        "pose": [*(1e3 * packed[:3]).tolist(), *packed[3:].tolist()],
+        "deviation_mm": (1e3 * deviation[:3]).tolist(),
+        "deviation_deg": np.degrees(deviation[3:]).tolist(),
+        "error_mm": float(1e3 * np.linalg.norm(error[:3])),
+        "error_deg": float(np.degrees(np.linalg.norm(error[3:]))),
+    }
+
+
+def sensor_lines(form: dict[str, Any]) -> list[str]:
+    """A form of `sensor_form` as lines to be read."""
+    lines = [
+        f"{form['scenario']}: seed {form['seed']}, careless {form['careless']:g}, "
+        f"{form['level_mm']:g} mm per ray, {len(form['firings_s'])} range images",
+        "",
+    ]
+    for operation in form["operations"]:
+        head = f"{operation['operation']} {' + '.join(operation['moves'])}: "
+        if not operation["found"]:
+            lines.append(head + "not recognised")
+            continue
+        mm = ", ".join(f"{x:.2f}" for x in operation["deviation_mm"])
+        deg = ", ".join(f"{x:.2f}" for x in operation["deviation_deg"])
+        models = ", ".join(f"{name} {100 * share:.0f} %" for name, share in operation["explained"].items())
+        lines.append(
+            f"{head}at {operation['time_s']:.2f} s; off by {operation['error_mm']:.2f} mm, "
+            f"{operation['error_deg']:.2f} deg; known to {mm} mm, {deg} deg; explained by {models}"
+        )
+    return lines
