@@ -22,7 +22,7 @@ from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.geometry.arrays import Array
 
-LEVEL = 0.01
+TEST_LEVEL = 0.01
 """False alarms that are accepted."""
 MOST_SUSPECTS = 64
 """Relations that are left out in turn; of more, those that pull hardest."""

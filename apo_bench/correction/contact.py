@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
 from apo_bench.assembly.goals import Observation
-from apo_bench.correction.consistency import LEVEL
+from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.ending import refused_correction, status_sentence
 from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
 from apo_bench.correction.problem import Problem, Solver, problem
@@ -35,7 +35,7 @@ class ContactCorrector:
     """`apply` says nothing, `warn` names the suspects and goes on, `refuse` does not go on (status `doubtful`), and
     `drop` leaves the most suspect relation out, or one contact of it if that is enough, up to three in turn, until the
     test passes."""
-    level: float = LEVEL
+    level: float = TEST_LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
     solver: Solver = nearest_goals
     """What finds the nearest goals; `compiled.nearest_goals_compiled` is the same, compiled."""

@@ -13,8 +13,8 @@ from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.equations import Equations, equations, largest
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.consistency import (
-    LEVEL,
     SOFT_M,
+    TEST_LEVEL,
     contact_suspects,
     correction_length,
     fit_deviation,
@@ -74,7 +74,7 @@ class Problem:
             touched = active_rank(found.Jt, inequalities, held)
             chi_square += float(held.z @ held.z - found.z @ found.z)
             found, freedom = held, freedom + touched
-        return found, Consistency(chi_square, freedom, p_value(chi_square, freedom), LEVEL)
+        return found, Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL)
 
     def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
         """Relations whose contacts are `kept`, the most suspect first."""

@@ -19,7 +19,7 @@ from apo_bench.io.strict_json import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
-from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_pose, read_span, refuse, refuse_name
+from apo_bench.scenario.keys import LARGEST_MM, read_pose, read_span, read_unit_axis, refuse, refuse_name
 from apo_bench.scenario.scenario import Grasp, Shift
 
 _MOST_PARTS, _MOST_OPERATIONS, _MOST_CONTACTS, _MOST_SHIFTS = 50, 100, 50, 20
@@ -175,7 +175,7 @@ def _movable(node: JsonNode, parts: Mapping[str, PartEntry]) -> str:
 def _attach(node: JsonNode) -> Preference:
     """What is stated of the line to the goal."""
     keys = node.fields((), ("along", "travel_mm"))
-    direction = read_axis(keys["along"]) if "along" in keys else None
+    direction = read_unit_axis(keys["along"]) if "along" in keys else None
     travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else None
     if travel_m is not None and travel_m > 1e-3 * LARGEST_MM:
         keys["travel_mm"].fail(f"a length of at most {LARGEST_MM:g} mm is needed")
@@ -191,7 +191,7 @@ def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) 
         span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
         keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
     if "across" in keys:
-        across = read_axis(keys["across"])
+        across = read_unit_axis(keys["across"])
         if abs((before[:3, :3] @ across)[2]) > _LEVEL:
             keys["across"].fail(
                 "an axis that is level where the part is picked is needed", "the gripper comes from above"
@@ -217,5 +217,5 @@ def _shifts(node: JsonNode, operation: int) -> tuple[Shift, ...]:
     for each in many:
         keys = each.fields(("along", "mm"))
         low, high = read_span(keys["mm"], -LARGEST_MM, LARGEST_MM)
-        shifts.append(Shift(operation, read_axis(keys["along"]), 1e-3 * low, 1e-3 * high))
+        shifts.append(Shift(operation, read_unit_axis(keys["along"]), 1e-3 * low, 1e-3 * high))
     return tuple(shifts)

@@ -21,7 +21,7 @@ from apo_bench.resources import folder
 from apo_bench.scenario.attach import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.keys import LARGEST_MM, read_axis, read_span, refuse
+from apo_bench.scenario.keys import LARGEST_MM, read_span, read_unit_axis, refuse
 from apo_bench.scenario.scenario import Carelessness, Scenario, Site
 
 _SCHEMA = 1
@@ -132,7 +132,7 @@ def _careless(node: JsonNode, entries: tuple[OperationEntry, ...]) -> Carelessne
     number = keys["operation"].integer()
     if not 1 <= number <= len(entries):
         keys["operation"].fail(f"an operation from 1 to {len(entries)} is needed")
-    axis = read_axis(keys["along"])
+    axis = read_unit_axis(keys["along"])
     if abs((entries[number - 1].goal[:3, :3] @ axis)[2]) > 1e-6:
         keys["along"].fail("a direction that is level at the goal is needed", "what lies below decides the height")
     low, high = read_span(keys["size_mm"], 0.0, 100.0)

@@ -38,7 +38,7 @@ def read_pose(node: JsonNode) -> Array:
     return pose.at(1e-3 * at, turn)
 
 
-def read_axis(node: JsonNode) -> Array:
+def read_unit_axis(node: JsonNode) -> Array:
     """`"x"`, `"+x"`, `"-x"` ... or three numbers, as a unit vector (3,)."""
     if isinstance(node.value, str):
         if node.value not in _AXES:

@@ -12,7 +12,7 @@ from apo_bench.correction.solvers.newton import LENGTH_M
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-RANK_CUT_OFF = 1e-7
+_RANK_CUT_OFF = 1e-7
 """At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
 
 
@@ -62,4 +62,4 @@ def _row_space(J: Array) -> Array:
     if not J.size:
         return np.zeros((0, J.shape[1]))
     _, w, Vt = np.linalg.svd(J, full_matrices=False)
-    return Vt[w > RANK_CUT_OFF * w[0]]
+    return Vt[w > _RANK_CUT_OFF * w[0]]

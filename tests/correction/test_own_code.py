@@ -30,7 +30,7 @@ from apo_bench.correction.own_code.forms import (
     parse_correction,
     parse_observation,
 )
-from apo_bench.correction.own_code.message import HEADER, GarbledMessage, receive, send
+from apo_bench.correction.own_code.message import FRAME_HEADER, GarbledMessage, receive, send
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -477,14 +477,14 @@ def test_what_is_no_correction_is_garbled(key: str, value: Any) -> None:
     [
         b"",
         b"\x00",
-        HEADER.pack(1 << 31, 0),
-        HEADER.pack(2, 1 << 31),
-        HEADER.pack(2, 0) + b"[]",
-        HEADER.pack(2, 0) + b"{}",
-        HEADER.pack(4, 0) + b"\xff\xfe{}",
-        HEADER.pack(100_000, 0) + b"[" * 100_000,
+        FRAME_HEADER.pack(1 << 31, 0),
+        FRAME_HEADER.pack(2, 1 << 31),
+        FRAME_HEADER.pack(2, 0) + b"[]",
+        FRAME_HEADER.pack(2, 0) + b"{}",
+        FRAME_HEADER.pack(4, 0) + b"\xff\xfe{}",
+        FRAME_HEADER.pack(100_000, 0) + b"[" * 100_000,
         *(
-            HEADER.pack(len(text), 8) + text + bytes(8)
+            FRAME_HEADER.pack(len(text), 8) + text + bytes(8)
             for text in (
                 b'{"arrays": {"x": ["object", [1]]}}',
                 b'{"arrays": {"x": ["float64", [-1]]}}',

@@ -20,13 +20,12 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import Equations, equations
 from apo_bench.assembly.goals import Observation
+from apo_bench.correction.baselines.least_squares import CONTACT_M
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-CONTACT_M = 1e-6
-"""Stated standard deviation of a contact, as tuned for `least-squares`, which has the same cost."""
 _TOLERANCE, TURNS = 1e-12, 100
 _TURN_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """(x, y, z, rx, ry, rz) -> GTSAM's order; its own inverse."""

@@ -4,11 +4,11 @@ This is how refiners of object poses make an estimate physically plausible: Phys
 (arXiv 1909.05730) pull objects to their supports and out of each other, SporeAgent (arXiv 2201.00239) scores both. The
 loss, in units of stated standard deviations, is
 
-    sum (e / CONTACT_M)^2 + sum (depth / CONTACT_M)^2 + sum |z_k|^2
+    sum (e / PENALTY_CONTACT_M)^2 + sum (depth / PENALTY_CONTACT_M)^2 + sum |z_k|^2
 
 with e of every contact ever made, the depth of every two boxes of parts in contact, at the time the contact was made,
-and z_k = L_k^-1 xi_k. Adam (Kingma and Ba, arXiv 1412.6980) takes `STEPS` steps in z, whose length falls from `LENGTH`
-to nothing along a quarter of a cosine. It ends there, at rest or not.
+and z_k = L_k^-1 xi_k. Adam (Kingma and Ba, arXiv 1412.6980) takes `ADAM_STEPS` steps in z, whose length falls from
+`LENGTH` to nothing along a quarter of a cosine. It ends there, at rest or not.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import Whitened, whitened
 from apo_bench.geometry.arrays import Array
 
-CONTACT_M = 1e-4
+PENALTY_CONTACT_M = 1e-4
 """Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`."""
-STEPS = 600
+ADAM_STEPS = 600
 LENGTH = 0.2
 """Step of Adam at the beginning, in standard deviations, tuned likewise."""
 _MEAN, _SQUARE, _TINY = 0.9, 0.999, 1e-8
 """Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
 
 
-def penalty(observation: Observation, *, contact_m: float = CONTACT_M, length: float = LENGTH) -> Correction:
+def penalty(observation: Observation, *, contact_m: float = PENALTY_CONTACT_M, length: float = LENGTH) -> Correction:
     """The goals at which the descent ends.
 
     Args:
@@ -51,7 +51,7 @@ def penalty(observation: Observation, *, contact_m: float = CONTACT_M, length: f
     return as_it_ends(
         observation,
         lambda observation: _descended(observation, contact_m, length),
-        f"the descent ended after {STEPS} steps",
+        f"the descent ended after {ADAM_STEPS} steps",
     )
 
 
@@ -76,7 +76,7 @@ class Loss:
         return value, gradient
 
 
-def loss(observation: Observation, contact_m: float = CONTACT_M) -> Loss:
+def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss:
     """The loss of an observation."""
     system = equations(observation.assembly, observation.start, observation.goals)
     return Loss(whitened(observation), system, meeting(observation.assembly, system), contact_m)
@@ -86,9 +86,9 @@ def _descended(observation: Observation, contact_m: float, length: float) -> Arr
     down = loss(observation, contact_m)
     z = np.zeros(6 * len(observation.goals))
     m, v = np.zeros_like(z), np.zeros_like(z)
-    for t in range(1, STEPS + 1):
+    for t in range(1, ADAM_STEPS + 1):
         _, g = down(z)
         m, v = _MEAN * m + (1 - _MEAN) * g, _SQUARE * v + (1 - _SQUARE) * g**2
-        step = length * np.cos(0.5 * np.pi * t / STEPS)
+        step = length * np.cos(0.5 * np.pi * t / ADAM_STEPS)
         z = z - step * (m / (1 - _MEAN**t)) / (np.sqrt(v / (1 - _SQUARE**t)) + _TINY)
     return down.space.goals(z)

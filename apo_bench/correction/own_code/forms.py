@@ -10,11 +10,11 @@ import numpy as np
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect, Try
 from apo_bench.assembly.goals import Observation, Step
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
-from apo_bench.correction.own_code.message import Arrays, GarbledMessage, Message, MessageForm
+from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
 from apo_bench.geometry.solid import Box, Face, Solid
 
 
-def observation_message(observation: Observation) -> Message:
+def observation_message(observation: Observation) -> CorrectorMessage:
     """All that a corrector may use."""
     assembly, parts = observation.assembly, list(observation.start)
     form = {
@@ -53,7 +53,7 @@ def parse_observation(form: MessageForm, arrays: Arrays) -> Observation:
     return Observation(assembly, start, **kept, gap_m=form["gap_m"], play_m=form["play_m"])
 
 
-def correction_message(correction: Correction) -> Message:
+def correction_message(correction: Correction) -> CorrectorMessage:
     """What a corrector returned.
 
     Raises:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-HEADER = struct.Struct("!II")
+FRAME_HEADER = struct.Struct("!II")
 _TYPES = ("float64", "bool")
 _LARGEST_JSON, _LARGEST_NUMBERS = 1 << 24, 1 << 26
 """Bytes; beyond, nothing is read."""
@@ -26,7 +26,7 @@ _CHUNK = 1 << 20
 
 MessageForm = dict[str, Any]
 Arrays = Mapping[str, NDArray]
-Message = tuple[MessageForm, Arrays]
+CorrectorMessage = tuple[MessageForm, Arrays]
 _Wait = Callable[[], None]
 """Returns when there is something to read; raises if there never will be."""
 
@@ -48,13 +48,13 @@ def send(to: socket.socket, form: MessageForm, arrays: Arrays, deadline: float =
     stated = {name: [str(array.dtype), list(array.shape)] for name, array in arrays.items()}
     text = json.dumps({**form, "arrays": stated}).encode()
     numbers = b"".join(array.tobytes() for array in arrays.values())
-    left = memoryview(HEADER.pack(len(text), len(numbers)) + text + numbers)
+    left = memoryview(FRAME_HEADER.pack(len(text), len(numbers)) + text + numbers)
     while left:
         to.settimeout(_remaining(deadline))
         left = left[to.send(left) :]
 
 
-def receive(of: socket.socket, wait: _Wait = lambda: None) -> Message:
+def receive(of: socket.socket, wait: _Wait = lambda: None) -> CorrectorMessage:
     """Read one message.
 
     Args:
@@ -65,7 +65,7 @@ def receive(of: socket.socket, wait: _Wait = lambda: None) -> Message:
         EOFError: It ends in the middle, or does not begin.
     """
     of.settimeout(None)
-    size, length = HEADER.unpack(_read(of, HEADER.size, wait))
+    size, length = FRAME_HEADER.unpack(_read(of, FRAME_HEADER.size, wait))
     if size > _LARGEST_JSON or length > _LARGEST_NUMBERS:
         raise GarbledMessage("the message is too large")
     text, numbers = _read(of, size, wait), _read(of, length, wait)

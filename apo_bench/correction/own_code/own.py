@@ -13,7 +13,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
 from apo_bench.correction.own_code.forms import observation_message, parse_correction
-from apo_bench.correction.own_code.message import Arrays, GarbledMessage, Message, MessageForm
+from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
 from apo_bench.correction.own_code.process import Server
 from apo_bench.errors import InputError
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -149,7 +149,7 @@ class _OwnCorrector:
         files = said.get("files")
         return [path for path in files if isinstance(path, str)] if isinstance(files, list) else []
 
-    def _asked(self, what: str, form: MessageForm, arrays: Arrays, limit_s: float) -> Message:
+    def _asked(self, what: str, form: MessageForm, arrays: Arrays, limit_s: float) -> CorrectorMessage:
         name = f"the corrector '{self.__name__}'"
         try:
             return self._server.ask({**form, "asked": what, "name": self.__name__}, arrays, limit_s)

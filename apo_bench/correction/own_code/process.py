@@ -13,7 +13,7 @@ from contextlib import suppress
 from multiprocessing import connection
 from typing import final
 
-from apo_bench.correction.own_code.message import Arrays, Message, MessageForm, receive, send
+from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
 from apo_bench.correction.own_code.server import NOTICE
 from apo_bench.errors import InputError
 from apo_bench.io.processes import descendants, end_descendants
@@ -22,7 +22,7 @@ _NOTICE_S = 2.0
 """How long a fork may be gone before that is said."""
 _START = (
     "import sys; fd, module, fork, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
-    "from apo_bench.correction.own_code.server import main; main(int(fd), module, fork == 'True')"
+    "from apo_bench.correction.own_code.server import serve; serve(int(fd), module, fork == 'True')"
 )
 
 
@@ -44,7 +44,7 @@ class Server:
         self._helpers: Iterable[int] = ()
         """Processes that importing the module has started."""
 
-    def ask(self, form: MessageForm, arrays: Arrays, limit_s: float) -> Message:
+    def ask(self, form: MessageForm, arrays: Arrays, limit_s: float) -> CorrectorMessage:
         """What a fork of it answers.
 
         Raises:

@@ -20,7 +20,7 @@ from importlib import import_module
 
 from apo_bench.correction.correctors import checked_corrector, correct
 from apo_bench.correction.own_code.forms import correction_message, parse_observation
-from apo_bench.correction.own_code.message import Arrays, Message, MessageForm, receive, send
+from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
 from apo_bench.errors import InputError
 from apo_bench.io.processes import end_descendants, flush
 
@@ -39,7 +39,7 @@ _IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
 """For the process that asks, which ends this one."""
 
 
-def main(control: int, module: str, fork: bool) -> None:
+def serve(control: int, module: str, fork: bool) -> None:
     """The life of the process.
 
     Args:
@@ -111,7 +111,7 @@ def _do(given: int) -> None:
     os._exit(1)
 
 
-def _said(form: MessageForm, arrays: Arrays) -> Message:
+def _said(form: MessageForm, arrays: Arrays) -> CorrectorMessage:
     """What was asked for, or why there is none."""
     name = form["name"]
     try:

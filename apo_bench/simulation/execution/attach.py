@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import change
 from apo_bench.simulation.execution.search import after_search, press_in
-from apo_bench.simulation.execution.transfer import ASIDE_M, UP, Grip, Transfer, first_contact_pose
+from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
 from apo_bench.simulation.robot.paths import shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.attach import ARRIVED_M, attach, leave, pull_out
 from apo_bench.simulation.execution.fingers import centre, check_hold, depart, grasp, release
-from apo_bench.simulation.execution.transfer import UP, Grip, Transfer, first_contact_pose
+from apo_bench.simulation.execution.transfer import Grip, Transfer, first_contact_pose
 from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 

@@ -12,7 +12,6 @@ from apo_bench.insertion.macros import MacroName
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot.paths import at_height, shifted
 
-UP = np.array([0.0, 0.0, 1.0])
 SAFE_M = 0.15
 """Least height of the tip at which parts are carried over the others."""
 _HOVER_M = 0.11

@@ -6,11 +6,11 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.insertion.macros import UP
 from apo_bench.simulation.human.acts import Act
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot.paths import Trajectory, at_height, minimum_jerk, shifted, smooth
 
-_UP = np.array([0.0, 0.0, 1.0])
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
 _STROKE = 0.15
@@ -55,7 +55,7 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
 
 def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
     """Move level off or out of something, raised off the floor of a hole that would be dragged along."""
-    raised = shifted(T, _UP, clearance_m)
+    raised = shifted(T, UP, clearance_m)
     hands.move((0, smooth(T, raised, _NUDGE)))
     hands.move((0, smooth(raised, shifted(raised, out, 1.0), _STROKE)))
     return shifted(raised, out, 1.0)
@@ -65,7 +65,7 @@ def _ends(hands: Hands, act: Act, T: Array) -> tuple[Array, Array, Array]:
     """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go."""
     goal = act.target
     if act.from_above:
-        goal = shifted(act.target, _UP, _DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
+        goal = shifted(act.target, UP, _DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
     beside = shifted(goal, act.aside, 1.0) if act.aside.any() else goal
     return shifted(shifted(act.target, act.way, -act.travel), act.aside, 1.0), beside, goal
 
@@ -109,9 +109,9 @@ def _adjust(
     if held:
         hands.let_go(0, part)
     there = at_height(true, here[2, 3])
-    hands.move((1, smooth(here, shifted(here, _UP, lift), _NUDGE)))
-    hands.move((1, smooth(shifted(here, _UP, lift), shifted(there, _UP, lift), _SHIFT)), *meanwhile)
-    hands.move((1, smooth(shifted(there, _UP, lift), there, _NUDGE)))
+    hands.move((1, smooth(here, shifted(here, UP, lift), _NUDGE)))
+    hands.move((1, smooth(shifted(here, UP, lift), shifted(there, UP, lift), _SHIFT)), *meanwhile)
+    hands.move((1, smooth(shifted(there, UP, lift), there, _NUDGE)))
 
 
 def _first(stroke: Trajectory, fraction: float) -> Trajectory:
