@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.statistics.rates import rank
+from apo_bench.statistics.rates import by_method
 
 ALL = "all"
 """Stands for every scenario, or every method."""
@@ -52,12 +52,9 @@ class Confusion:
 
 def confusions(rows: Iterable[Mapping[str, Any]]) -> tuple[Confusion, ...]:
     """One per scenario and method, sorted as `tally` sorts, and one of them all at the end."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault((row["scenario"], row["method"]), []).append(row)
-    order = sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))
-    everything = [row for key in order for row in groups[key]]
-    return (*(_counted(*key, groups[key]) for key in order), _counted(ALL, ALL, everything))
+    groups = by_method(rows)
+    everything = [row for own in groups.values() for row in own]
+    return (*(_counted(*key, own) for key, own in groups.items()), _counted(ALL, ALL, everything))
 
 
 def _counted(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Confusion:

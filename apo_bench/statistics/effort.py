@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from statistics import fmean, median
 from typing import Any, final
 
-from apo_bench.statistics.rates import rank
+from apo_bench.statistics.rates import by_method
 
 
 @final
@@ -28,12 +28,8 @@ class Effort:
 
 def efforts(rows: Iterable[Mapping[str, Any]]) -> tuple[Effort, ...]:
     """One per scenario and method that had a success, sorted as `tally` sorts."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        if row["success"]:
-            groups.setdefault((row["scenario"], row["method"]), []).append(row)
-    order = sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))
-    return tuple(_effort(*key, groups[key]) for key in order)
+    groups = by_method(row for row in rows if row["success"])
+    return tuple(_effort(*key, own) for key, own in groups.items())
 
 
 def _effort(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Effort:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.method import knows_relations, knows_truth
-from apo_bench.statistics.adjust import DEFAULT, adjusted
 from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
 
+K = TypeVar("K", bound=Hashable)
 Counts = Array | int
 
 REFERENCES = ("paper", "none")
@@ -75,19 +75,14 @@ class Paired:
         return Rate(self.only_reference, self.only_reference + self.both)
 
 
-def paired(
-    rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES, adjust: str = DEFAULT
-) -> tuple[Paired, ...]:
+def paired(rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
     """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
 
     `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
     The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
 
-    Args:
-        adjust: One of `ADJUSTMENTS`.
-
     Raises:
-        InputError: A trial is there twice, or there is no such adjustment.
+        InputError: A trial is there twice.
     """
     counted = {place: _counted(seeds) for place, seeds in by_place(rows).items()}
     cells = {place: counted[place] for place in sorted(counted, key=order) if counted[place]}
@@ -98,8 +93,19 @@ def paired(
         if place.method != reference and not knows_truth(place.method) and place_of_reference(place, reference) in cells
     ]
     p = {_comparison(pair): pair.p for pair in found if pair.p is not None}
-    raised = adjusted(p, adjust)
+    raised = holm(p)
     return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in found)
+
+
+def holm(p: Mapping[K, float]) -> dict[K, float]:
+    """The p-values of a family of tests, raised so that the chance of one false alarm or more is bounded.
+
+    After S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979),
+    65-70.
+    """
+    from statsmodels.stats.multitest import multipletests
+
+    return dict(zip(p, map(float, multipletests(list(p.values()), method="holm")[1]), strict=True)) if p else {}
 
 
 def place_of_reference(place: Place, reference: str) -> Place:

@@ -173,6 +173,14 @@ def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping
     return cells
 
 
+def by_method(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
+    """Scenario and method -> rows, sorted as `tally` sorts."""
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((str(row["scenario"]), str(row["method"])), []).append(row)
+    return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}
+
+
 def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
     """Count rows into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
 

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.statistics.adjust import DEFAULT
 from apo_bench.statistics.area import Area, AreaDifference, area_differences, areas
 from apo_bench.statistics.curve import curves
 from apo_bench.statistics.half_level import HalfLevel, half_levels
@@ -26,23 +25,20 @@ class Summary:
     area_differences: tuple[AreaDifference, ...]
 
 
-def summary(
-    rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES, adjust: str = DEFAULT
-) -> Summary:
+def summary(rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES) -> Summary:
     """Rates, pairs, half levels and areas of rows.
 
     Args:
         references: The methods that every other one is compared with.
-        adjust: How p-values are adjusted for many comparisons: one of `ADJUSTMENTS`.
 
     Raises:
-        InputError: A trial is there twice, or there is no such adjustment.
+        InputError: A trial is there twice.
     """
     given = list(rows)
     found = curves(given)
     return Summary(
         cells=tally(given),
-        pairs=paired(given, references, adjust),
+        pairs=paired(given, references),
         half_levels=half_levels(found),
         areas=areas(found),
         area_differences=area_differences(found, references),

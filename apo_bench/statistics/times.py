@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.io.reading import each_line
 from apo_bench.records.checked import timing_of
-from apo_bench.statistics.rates import rank
+from apo_bench.statistics.rates import by_method
 
 PARTS = ("compile_s", "demonstrate_s", "trial_s")
 
@@ -62,11 +62,8 @@ def read_timing(folder: Path) -> list[dict[str, Any]]:
 
 def times(lines: Iterable[Mapping[str, Any]]) -> tuple[Times, ...]:
     """One per scenario and method, sorted as `tally` sorts."""
-    groups: dict[tuple[str, str], list[float]] = {}
-    for line in lines:
-        groups.setdefault((str(line["scenario"]), str(line["method"])), []).append(float(line["trial_s"]))
-    order = sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))
-    return tuple(_times(*key, groups[key]) for key in order)
+    groups = by_method(lines)
+    return tuple(_times(*key, [float(line["trial_s"]) for line in own]) for key, own in groups.items())
 
 
 def work(lines: Iterable[Mapping[str, Any]]) -> tuple[Work, ...]:

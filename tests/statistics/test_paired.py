@@ -14,12 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest, multinomial, ttest_rel
 
-from apo_bench.errors import InputError
 from apo_bench.report.report import report
 from apo_bench.report.tables.pairs import pair_table
-from apo_bench.statistics.adjust import adjusted
 from apo_bench.statistics.mcnemar import mcnemar
-from apo_bench.statistics.paired import paired, tango
+from apo_bench.statistics.paired import holm, paired, tango
 from apo_bench.statistics.rates import wilson
 from tests import pages
 from tests.statistics.test_rates import row, write
@@ -116,26 +114,21 @@ def test_mcnemar_is_the_two_sided_sign_test(b: int, c: int) -> None:
 
 def test_holm_worked_example() -> None:
     """By hand: 4 x 0.005, 3 x 0.01, 2 x 0.03, and 0.04, which may not be below the one before."""
-    found = adjusted({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
+    found = holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
     assert found == pytest.approx({"a": 0.03, "b": 0.06, "c": 0.06, "d": 0.02})
 
 
-def test_benjamini_and_hochberg_published_example() -> None:
-    """The 15 comparisons of their paper (thrombolysis, Section 4): at 0.05 they reject four, Holm three."""
-    p = dict(
-        enumerate([0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.324, 0.4262, 0.5719])
-    ) | {12: 0.6528, 13: 0.759, 14: 1.0}
-    assert sum(x <= 0.05 for x in adjusted(p, "bh").values()) == 4
-    assert sum(x <= 0.05 for x in adjusted(p, "holm").values()) == 3
-    assert (adjusted(p, "none"), adjusted({})) == (p, {})
-    with pytest.raises(InputError, match="holm"):
-        adjusted(p, "holmes")
+def test_holm_published_example() -> None:
+    """The 15 comparisons of Benjamini and Hochberg (thrombolysis, Section 4): at 0.05 Holm rejects three."""
+    p = [0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.324, 0.4262, 0.5719, 0.6528, 0.759]
+    assert sum(x <= 0.05 for x in holm(dict(enumerate([*p, 1.0]))).values()) == 3
+    assert holm({}) == {}
 
 
 @settings(max_examples=50, deadline=None)
-@given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20), how=st.sampled_from(["holm", "bh"]))
-def test_adjustment_only_raises_and_keeps_the_order(p: list[float], how: str) -> None:
-    found = list(adjusted(dict(enumerate(p)), how).values())
+@given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
+def test_adjustment_only_raises_and_keeps_the_order(p: list[float]) -> None:
+    found = list(holm(dict(enumerate(p))).values())
     assert all(a - 1e-12 <= b <= 1.0 for a, b in zip(p, found, strict=True))
     ranked = sorted(zip(p, found, strict=True))
     assert all(a[1] <= b[1] + 1e-12 for a, b in pairwise(ranked))
@@ -146,11 +139,10 @@ def test_a_comparison_and_its_mirror_image_are_adjusted_as_one() -> None:
     found = {(p.place.method, p.reference): p for p in paired(rows())}
     assert found["none", "paper"].p == found["paper", "none"].p == mcnemar(7, 0)
     assert found["none", "paper"].p_adjusted == found["paper", "none"].p_adjusted
-    raised = adjusted({0: mcnemar(2, 1), 1: mcnemar(8, 0), 2: mcnemar(7, 0)})
+    raised = holm({0: mcnemar(2, 1), 1: mcnemar(8, 0), 2: mcnemar(7, 0)})
     assert [found[k].p_adjusted for k in (("contact", "paper"), ("contact", "none"), ("paper", "none"))] == [
         *raised.values()
     ]
-    assert {p.p_adjusted == p.p for p in paired(rows(), adjust="none")} == {True}
 
 
 def test_what_is_mended_and_what_is_spoilt() -> None:

@@ -50,11 +50,9 @@ def test_the_order_of_rows_does_not_matter(order: Any) -> None:
     assert summary(shuffled) == summary(rows())
 
 
-def test_other_references_and_adjustments() -> None:
-    found = summary(rows(), references=("contact",), adjust="bh")
+def test_other_references() -> None:
+    found = summary(rows(), references=("contact",))
     assert {p.reference for p in found.pairs} == {"contact"}
-    with pytest.raises(InputError, match="adjustment"):
-        summary(rows(), adjust="hope")
     with pytest.raises(InputError, match="twice"):
         summary([*rows(), rows()[0]])
 

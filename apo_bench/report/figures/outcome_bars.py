@@ -19,8 +19,8 @@ from apo_bench.statistics.settings import Setting, level_of, level_words
 
 LEFT, RIGHT, HIGH, STEP, APART = 138, 46, 11, 14, 5
 """Where bars begin and end, their height, from one to the next, and between methods, px."""
-LETTER, SMALL = 6.6, 5.8
-"""How wide letters of names and of levels are, px."""
+LETTER, SMALL, MOST = 6.6, 5.8, 48
+"""How wide letters of names and of levels are, px; letters of a name that is shown whole."""
 Box = tuple[float, float, float, float]
 
 
@@ -67,19 +67,17 @@ def _patch(color: str) -> Callable[[Any], None]:
 
 
 def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
-    """Where a method's name and its level do not fit beside each other, names stand above their bars."""
-    above = any(LETTER * len(_short(c.method)) + SMALL * len(_level(c, setting)) > LEFT - 12 for c in cells)
+    """A method's name stands at the first of its bars, and above them where it is too long to stand beside."""
     names: list[tuple[float, str]] = []
     bars: list[tuple[float, Cell]] = []
-    y, before = 6.0, ""
-    for cell in cells:
-        if cell.method != before:
-            y += APART
-            names.append((y, _short(cell.method, 48 if above else 16)))
-            y += STEP if above else 0.0
-            before = cell.method
-        bars.append((y, cell))
-        y += STEP
+    y = 6.0
+    for method in dict.fromkeys(cell.method for cell in cells):
+        own = [cell for cell in cells if cell.method == method]
+        beside = LETTER * len(method) + SMALL * len(_level(own[0], setting)) <= LEFT - 12
+        names.append((y + APART, method if len(method) <= MOST else f"{method[: MOST - 1]}…"))
+        y += APART if beside else APART + STEP
+        bars += [(y + STEP * i, cell) for i, cell in enumerate(own)]
+        y += STEP * len(own)
     height = int(y + 32)
 
     def draw(axis: Any, tip: Tips) -> None:
@@ -123,8 +121,3 @@ def _level(cell: Cell, setting: Setting) -> str:
 
 def _x(share: float) -> float:
     return LEFT + (WIDTH - LEFT - RIGHT) * share
-
-
-def _short(name: str, letters: int = 16) -> str:
-    """A name that fits beside its bars."""
-    return name if len(name) <= letters else name[: letters - 1] + "…"
