@@ -121,9 +121,9 @@ def shows(
     as_json: AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
-    from apo_bench.statistics.power import shown
+    from apo_bench.statistics.power import evidence
 
-    s = shown(trials, power, comparisons)
+    s = evidence(trials, power, comparisons)
     if s.discordant is None or s.least_win is None:
         test = f"McNemar's exact test{_held(comparisons)} can reject nothing with so few."
     else:

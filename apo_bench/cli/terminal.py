@@ -67,7 +67,7 @@ def print_cells(cells: Sequence[Cell]) -> None:
 
 
 def print_report(made: Report) -> None:
-    """The answer, how often plans foretold what happened, and where everything was written."""
+    """The answer, how often plans predicted what happened, and where everything was written."""
     console = _console()
 
     def say(text: str) -> None:
@@ -99,7 +99,7 @@ def print_comparison(found: Comparison) -> None:
 
 
 def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:
-    """In one line, how often plans foretold what happened."""
+    """In one line, how often plans predicted what happened."""
     _console().print(summary(confusions(rows)[-1]))
 
 

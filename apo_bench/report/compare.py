@@ -10,11 +10,11 @@ from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.key import Key, row_key
+from apo_bench.records.report_rows import NUMBERS, report_rows
 from apo_bench.records.row import Row
 from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import one_salt, with_salt
 from apo_bench.records.settings import ROW
-from apo_bench.records.slim import NUMBERS, slim_rows
 from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
@@ -221,7 +221,7 @@ def numbers(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
 
 
 def _side(folder: Path) -> Side:
-    rows = slim_rows(folder)
+    rows = report_rows(folder)
     verdict = verdict_of(rows, folder)
     return Side(folder, read_run(folder), by_verdict(rows, verdict), verdict)
 
@@ -268,7 +268,7 @@ def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
 
 
 def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[Pair, ...]:
-    """Cells by place, fidelity aside; sorted as `tally` sorts."""
+    """Cells by place, whatever the fidelity; sorted as `tally` sorts."""
     ours, theirs = ({_anywhere(at(cell)): cell for cell in tally(side.rows)} for side in (first, second))
     verdicts: dict[Place, list[tuple[Any, Any]]] = {}
     for a, b in pairs:

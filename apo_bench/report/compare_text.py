@@ -7,7 +7,7 @@ from typing import Any
 
 from apo_bench.records import verdicts
 from apo_bench.records.replay_command import replay_command
-from apo_bench.records.slim import NUMBERS
+from apo_bench.records.report_rows import NUMBERS
 from apo_bench.report.compare import Agreement, Comparison, Pair, Side
 from apo_bench.report.page.trials import verdict, why
 from apo_bench.report.run_facts import limits_of, scenario_files, words

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 from apo_bench.errors import InputError
 from apo_bench.io.parquet import write_columns
 from apo_bench.io.writing import check_folders, check_target, to_write
+from apo_bench.records.report_rows import COLUMNS as KEPT
+from apo_bench.records.report_rows import report_rows
 from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import check_one, one_salt, read_salt
-from apo_bench.records.slim import COLUMNS as KEPT
-from apo_bench.records.slim import slim_rows
 from apo_bench.records.verdicts import by_verdict, verdict_of
 from apo_bench.report.answer import answer
 from apo_bench.report.failures import Draw, Failures
@@ -95,7 +95,7 @@ def report(
         InputError: No rows there, another salt, or the folder cannot be written.
     """
     folder = Path(folder)
-    rows = slim_rows(folder)
+    rows = report_rows(folder)
     if not rows:
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     salt = None if salt_file is None else read_salt(salt_file)
@@ -123,7 +123,7 @@ def report(
 def _written(folder: Path, rows: Sequence[Mapping[str, Any]], verdict: str, found: Summary, failed: Failures) -> Report:
     run, timing = read_run(folder), read_timing(folder)
     files, took, known = scenario_files(run), times(timing), work(timing)
-    told, wrong, gap = recognitions(rows), confusions(rows), gaps(rows)
+    recognised, confused, gap = recognitions(rows), confusions(rows), gaps(rows)
     grouped = members(settings(found.cells), found.cells)
     tables = {
         "cells": cell_table(found.cells),
@@ -132,15 +132,15 @@ def _written(folder: Path, rows: Sequence[Mapping[str, Any]], verdict: str, foun
         "areas": area_table(found.areas, found.area_differences),
         "area_differences": area_difference_table(found.area_differences),
         "gaps": gap_table(gap),
-        "confusion": confusion_table(wrong),
-        "recognised": recognition_table(told),
+        "confusion": confusion_table(confused),
+        "recognised": recognition_table(recognised),
         "calibration": calibration_table(calibrations(rows)),
         "effort": effort_table(efforts(rows)),
         "times": time_table(took),
         "work": work_table(known),
     }
     kept = _write_tables(tables, folder / TABLES)
-    drawn = figures(found, grouped, gap, wrong, told, took)
+    drawn = figures(found, grouped, gap, confused, recognised, took)
     paths = [drawing.write(folder / FIGURES / f"{name}.svg") for name, drawing in drawn.items()]
     for name in PNG:
         if name in drawn and len(drawn[name].panels) <= MOST_PANELS:
@@ -167,7 +167,7 @@ def _written(folder: Path, rows: Sequence[Mapping[str, Any]], verdict: str, foun
     )
     with to_write(folder / PAGE, "w") as file:
         file.write(report_page(page))
-    return Report(folder / PAGE, said, kept, tuple(paths), found.cells, wrong, len(taken), tuple(missed), verdict)
+    return Report(folder / PAGE, said, kept, tuple(paths), found.cells, confused, len(taken), tuple(missed), verdict)
 
 
 def _remove_older(folder: Path) -> None:

@@ -17,7 +17,7 @@ ALL = "all"
 class Confusion:
     """Counts over every clearance, carelessness and level of a sweep.
 
-    Fitted means a success that was made as demonstrated: that is what a plan foretells.
+    Fitted means a success that was made as demonstrated: that is what a plan predicts.
     """
 
     scenario: str

@@ -29,7 +29,7 @@ SPREAD = 9.0
 
 @final
 @dataclass(frozen=True)
-class Shown:
+class Evidence:
     """What so many trials of each method, at the same seeds, can show."""
 
     trials: int
@@ -140,18 +140,18 @@ def margin_power(pairs: int, margin: float, win: float = 0.0, lose: float = 0.0)
     fits = b + c <= pairs
     rest = np.where(fits, pairs - b, 0)
     weight = binom.pmf(b, pairs, win) * binom.pmf(c, rest, min(1.0, lose / (1 - win)) if win < 1 else 0.0)
-    shown = score(b, np.where(fits, c, 0), pairs, -margin) > _z()
-    return float(np.sum(np.where(fits & shown, weight, 0.0)))
+    rejects = score(b, np.where(fits, c, 0), pairs, -margin) > _z()
+    return float(np.sum(np.where(fits & rejects, weight, 0.0)))
 
 
-def shown(trials: int, power: float = POWER, comparisons: int = 1) -> Shown:
-    """What so many trials can show; see `Shown`."""
+def evidence(trials: int, power: float = POWER, comparisons: int = 1) -> Evidence:
+    """What so many trials can show; see `Evidence`."""
     if not 1 <= trials <= MOST:
         raise InputError(f"{trials} trials were given; a whole number from 1 to {MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error, z2 = _error(comparisons), _z() ** 2
     discordant = int(np.ceil(1 - np.log2(error) - 1e-9))
-    return Shown(
+    return Evidence(
         trials=trials,
         half_width_50=wilson_half_width(0.5, trials),
         half_width_90=wilson_half_width(0.9, trials),

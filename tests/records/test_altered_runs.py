@@ -11,8 +11,8 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import clean
+from apo_bench.records.report_rows import report_rows
 from apo_bench.records.run_file import read_run
-from apo_bench.records.slim import slim_rows
 from apo_bench.records.verdicts import AS_DEMONSTRATED, verdict_of
 from apo_bench.report import report as reports
 from apo_bench.report.compare import compare
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
 
 def read(folder: Path) -> None:
     """All that `compare` does without writing, and the files that only `report` reads."""
-    rows, _, _ = slim_rows(folder), read_run(folder), read_timing(folder)
+    rows, _, _ = report_rows(folder), read_run(folder), read_timing(folder)
     if verdict_of(rows, folder) == AS_DEMONSTRATED:
         json.dumps(comparison_form(compare(folder, KEPT)), allow_nan=False)
 
@@ -151,5 +151,5 @@ def test_a_key_that_nobody_knows_is_left_out(tmp_path: Path) -> None:
     line = (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()[0]
     noted = json.dumps(json.loads(line) | {"note": {"a": [1]}})
     (folder / "trials.jsonl").write_text(f"{noted}\n", encoding="utf-8")
-    (row,) = slim_rows(folder)
+    (row,) = report_rows(folder)
     assert "note" not in row

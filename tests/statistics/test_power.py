@@ -15,13 +15,13 @@ from apo_bench.errors import InputError
 from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.power import (
+    evidence,
     margin_power,
     margin_trials,
     paired_power,
     paired_trials,
     rate_trials,
     shares,
-    shown,
     wilson_half_width,
 )
 from apo_bench.statistics.rates import wilson
@@ -85,16 +85,16 @@ def test_power_for_a_margin_is_the_sum_over_every_table(pairs: int, margin: floa
 
 
 def test_what_a_hundred_show() -> None:
-    found = shown(100)
+    found = evidence(100)
     assert (found.discordant, found.all_right) == (6, wilson(100, 100))
     assert mcnemar(6, 0) <= 0.05 < mcnemar(5, 0)
     assert found.margin == pytest.approx(-tango(0, 0, 100).low, abs=1e-6)
     assert found.least_win is not None
     assert paired_power(100, found.least_win, 0.0) == pytest.approx(0.8, abs=1e-6)
-    strict = shown(100, comparisons=32)
+    strict = evidence(100, comparisons=32)
     assert strict.discordant is not None
     assert mcnemar(strict.discordant, 0) <= 0.05 / 32 < mcnemar(strict.discordant - 1, 0)
-    assert (shown(5).discordant, shown(5).least_win) == (None, None)
+    assert (evidence(5).discordant, evidence(5).least_win) == (None, None)
 
 
 @settings(max_examples=50, deadline=None)

@@ -136,11 +136,11 @@ def _scope(rows: Sequence[Row]) -> str:
     def many(name: str, called: str) -> str:
         return _many(len({row[name] for row in rows}), called)
 
-    excluded, shown = demonstrations([row for row in rows if row["success"] is None]), demonstrations(rows)
+    excluded, tried = demonstrations([row for row in rows if row["success"] is None]), demonstrations(rows)
     fidelity = ", ".join(sorted({str(row.get("fidelity", "full")) for row in rows}))
     return (
         f"{len(rows):,} trials of {many('scenario', 'scenario')}, {many('method', 'method')} and "
-        f"{many('seed', 'seed')}, fidelity {fidelity}. {excluded:,} of {shown:,} demonstrations were not right "
+        f"{many('seed', 'seed')}, fidelity {fidelity}. {excluded:,} of {tried:,} demonstrations were not right "
         "themselves and are left out."
     )
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.replay_command import Files, without_seed
-from apo_bench.records.slim import NUMBERS
+from apo_bench.records.report_rows import NUMBERS
 from apo_bench.statistics.rates import Cell, by_place
 from apo_bench.statistics.settings import at
 

@@ -21,13 +21,13 @@ def confusion_table(found: Sequence[Confusion]) -> Table:
 
 
 def summary(c: Confusion) -> str:
-    """`Predicted: 96.3 % of 134 executed trials ended as foretold (counted by as_demonstrated); failures ...`"""
+    """`Predicted: 96.3 % of 134 executed trials ended as predicted (counted by as_demonstrated); failures ...`"""
     if c.agreement is None:
         return "Predicted: nothing, since no trial was executed."
     trials = "1 executed trial" if c.executed == 1 else f"{c.executed} executed trials"
     return (
-        f"Predicted: {100 * c.agreement:.1f} % of {trials} ended as foretold (counted by as_demonstrated); "
-        f"failures that were not foretold: {c.fit_failed}, warnings that were wrong: {c.fail_fitted}."
+        f"Predicted: {100 * c.agreement:.1f} % of {trials} ended as predicted (counted by as_demonstrated); "
+        f"failures that were not predicted: {c.fit_failed}, warnings that were wrong: {c.fail_fitted}."
     )
 
 

@@ -34,17 +34,17 @@ COLUMNS = tuple(column for column in ROW_FIELDS if column not in LEFT_OUT)
 """What is kept of a row."""
 
 
-def slim_rows(folder: str | Path) -> list[Row]:
+def report_rows(folder: str | Path) -> list[Row]:
     """The rows of a sweep with the `COLUMNS`; what a row does not say is None.
 
     Raises:
         InputError: No such folder, no trials in it, or a line that is not a whole row.
     """
-    foretold: dict[Any, Predicted] = {}
-    return [_slim(row, foretold) for row in each_row(folder)]
+    predictions: dict[Any, Predicted] = {}
+    return [_kept(row, predictions) for row in each_row(folder)]
 
 
-def _slim(row: Row, foretold: dict[Any, Predicted]) -> Row:
+def _kept(row: Row, predictions: dict[Any, Predicted]) -> Row:
     kept: dict[str, Any] = {name: value for name, value in row.items() if name not in LEFT_OUT}
     for name, value in kept.items():
         if type(value) is str:
@@ -53,5 +53,5 @@ def _slim(row: Row, foretold: dict[Any, Predicted]) -> Row:
     if said is not None:
         what = (said["fails"], said["operation"], said["code"])
         known: Predicted = {"fails": said["fails"], "operation": said["operation"], "code": said["code"]}
-        kept["predicted"] = foretold.setdefault(what, known)
+        kept["predicted"] = predictions.setdefault(what, known)
     return cast(Row, kept)
