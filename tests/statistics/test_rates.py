@@ -186,8 +186,8 @@ def test_predictions_are_counted_against_physics() -> None:
     assert (everything.scenario, everything.method, everything.executed) == ("all", "all", 8)
     assert everything.agreement == 6 / 8
     assert summary(everything) == (
-        "Predicted: 75.0 % of 8 executed trials ended as predicted (counted by as_demonstrated); failures that were not "
-        "predicted: 1, warnings that were wrong: 1."
+        "Predicted: 75.0 % of 8 executed trials ended as predicted (counted by as_demonstrated); failures that were "
+        "not predicted: 1, warnings that were wrong: 1."
     )
 
 
