@@ -32,6 +32,16 @@ LOADED = re.compile(
 )
 
 
+def on_config(config: Any) -> Any:
+    """The settings, without a page that a benchmark has yet to write."""
+    there = Path(config.docs_dir)
+    for section in config.nav:
+        for title, pages in section.items():
+            if isinstance(pages, list):
+                section[title] = [page for page in pages if page in GENERATED or (there / page).exists()]
+    return config
+
+
 def on_files(files: Files, config: Any) -> Files:
     """The files of the site, with the generated pages."""
     for path, write in GENERATED.items():
