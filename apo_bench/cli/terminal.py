@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from apo_bench.io.plain_text import clean
 from apo_bench.records import verdicts
+from apo_bench.records.row import FreedSet, Predicted, Row
 from apo_bench.records.settings import RANGE
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.confusion import summary
@@ -50,7 +51,7 @@ def print_scenarios(scenarios: Sequence[Scenario]) -> None:
     print_table(Data(scenarios, columns))
 
 
-def print_row(row: Mapping[str, Any]) -> None:
+def print_row(row: Row) -> None:
     """One trial, from what was asked to how it ended."""
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, value in _lines(row):
@@ -98,7 +99,7 @@ def print_comparison(found: Comparison) -> None:
     _console().print(differ if names else "Made with the same.")
 
 
-def print_prediction(rows: Iterable[Mapping[str, Any]]) -> None:
+def print_prediction(rows: Iterable[Row]) -> None:
     """In one line, how often plans predicted what happened."""
     _console().print(summary(confusions(rows)[-1]))
 
@@ -108,11 +109,11 @@ def _add(table: Table, *cells: str) -> None:
     table.add_row(*map(clean, cells))
 
 
-def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _lines(row: Row) -> list[tuple[str, str]]:
     if row["level"] is None:
         asked = "measured observation"
     else:
-        level = level_label(row["level"], row["level_deg"], row["noise"])
+        level = level_label(row["level"], row["level_deg"] or 0.0, row["noise"])
         asked = f"level {level}, careless {row['careless']:g}, seed {row['seed']}"
         asked += ", range finder" if row["eye"] == RANGE else f", {row['noise']} noise" * (row["noise"] != "isotropic")
         asked += f", relations {row['relations']}" * (row["relations"] != "given")
@@ -121,7 +122,7 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("trial", asked),
         ("method", row["method"]),
         ("result", _result(row)),
-        ("ended", row["sentence"]),
+        ("ended", row["sentence"] or ""),
     ]
     if row["gap_before_mm"] is not None:
         gaps = f"{row['gap_before_mm']:.3f} mm as seen"
@@ -154,7 +155,7 @@ def _lines(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     return lines
 
 
-def _attempt(attempt: Mapping[str, Any]) -> str:
+def _attempt(attempt: FreedSet) -> str:
     left = "did not come to rest" if attempt["gap_mm"] is None else f"leaves {attempt['gap_mm']:.3f} mm"
     return f"{_braced(attempt['free'])} {left}"
 
@@ -164,14 +165,14 @@ def _braced(operations: Iterable[int]) -> str:
     return "{" + ",".join(map(str, operations)) + "}"
 
 
-def _predicted(said: Mapping[str, Any]) -> str:
+def _predicted(said: Predicted) -> str:
     if not said["fails"]:
         return f"it fits, {said['size_mm']:.2f} mm off at most"
     size = "" if said["size_mm"] is None else f", {said['size_mm']:.2f} mm"
     return f"operation {said['operation']} fails: {said['code']}{size}"
 
 
-def _test(row: Mapping[str, Any]) -> str:
+def _test(row: Row) -> str:
     """`chi-square 31.2 of 13, p 0.003; one of R2, R4 may be wrong; R2 was left out`."""
     said = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_freedom']}, p {row['p_value']:.2g}"]
     if row["suspects"]:
@@ -181,7 +182,7 @@ def _test(row: Mapping[str, Any]) -> str:
     return "; ".join(said)
 
 
-def _result(row: Mapping[str, Any]) -> str:
+def _result(row: Row) -> str:
     if row["success"] is None:
         return "none: the demonstration failed"
     if row["success"]:

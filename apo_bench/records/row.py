@@ -193,6 +193,11 @@ def nullable(column: str) -> bool:
     return type(None) in get_args(ROW_FIELDS[column])
 
 
+def look_up(row: Row, column: str) -> Any:
+    """What a row says in a column that is not named where this is written."""
+    return row.get(column)
+
+
 def finite(x: float | None) -> float | None:
     """A number that a row can hold, else null."""
     return float(x) if x is not None and abs(x) <= LARGEST else None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.row import Row, look_up
 from apo_bench.statistics.bounded import mean_interval
 from apo_bench.statistics.half_level import HalfLevel
 from apo_bench.statistics.paired import tango
@@ -21,7 +22,7 @@ Results = Mapping[tuple[Any, ...], bool]
 """All that a trial is of but the method, its seed last -> success."""
 
 
-def answer(rows: Iterable[Mapping[str, Any]], found: Summary) -> str:
+def answer(rows: Iterable[Row], found: Summary) -> str:
     """The sentence, with methods in backquotes. Trials that were told wrong relations are left out where others are."""
     results = _results(rows)
     if not results:
@@ -37,7 +38,7 @@ def answer(rows: Iterable[Mapping[str, Any]], found: Summary) -> str:
     return f"{said}; at the same seeds it succeeds {' and '.join(compared)}." if compared else f"{said}."
 
 
-def _results(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[tuple[Any, ...], bool]]:
+def _results(rows: Iterable[Row]) -> dict[str, dict[tuple[Any, ...], bool]]:
     names = [name for name in Place._fields if name not in ("method", "relations", "fidelity")]
     right: dict[str, dict[tuple[Any, ...], bool]] = {}
     wrong: dict[str, dict[tuple[Any, ...], bool]] = {}
@@ -45,7 +46,7 @@ def _results(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[tuple[Any, ...
         if row["success"] is not None and row["level"] is not None and not knows_truth(row["method"]):
             told = row["relations"] if knows_relations(row["method"]) else "given"
             kept = right if told == "given" else wrong
-            key = (*(row[name] for name in names), row.get("fidelity"), told, row["seed"])
+            key = (*(look_up(row, name) for name in names), row.get("fidelity"), told, row["seed"])
             kept.setdefault(row["method"], {})[key] = row["success"]
     return right or wrong
 

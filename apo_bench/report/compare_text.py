@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from apo_bench.records import verdicts
+from apo_bench.records.key import KEY, row_key
 from apo_bench.records.replay_command import replay_command
 from apo_bench.records.report_rows import NUMBERS
+from apo_bench.records.row import Row
 from apo_bench.report.compare import Agreement, Comparison, Pair, Side
 from apo_bench.report.page.trials import verdict, why
 from apo_bench.report.run_facts import limits_of, scenario_files, words
@@ -161,7 +163,7 @@ def _value(x: Any) -> str:
     return "not said" if x is None else words(x)
 
 
-def _command(row: Mapping[str, Any], side: Side) -> str:
+def _command(row: Row, side: Side) -> str:
     return replay_command(row, scenario_files(side.run), limits_of(side.run))
 
 
@@ -187,12 +189,8 @@ def _agreement_form(a: Agreement) -> dict[str, Any]:
     }
 
 
-def _changed_form(pair: tuple[Mapping[str, Any], Mapping[str, Any]], found: Comparison) -> dict[str, Any]:
+def _changed_form(pair: tuple[Row, Row], found: Comparison) -> dict[str, Any]:
     a, b = pair
-    names = (
-        *("scenario", "clearance_mm", "seed", "careless", "level", "level_deg"),
-        *("noise", "relations", "grasp", "method"),
-    )
     said = {
         name: {
             "verdict": verdict(row),
@@ -203,4 +201,4 @@ def _changed_form(pair: tuple[Mapping[str, Any], Mapping[str, Any]], found: Comp
         }
         for name, row, side in (("first", a, found.first), ("second", b, found.second))
     }
-    return {**{name: a[name] for name in names}, **said}
+    return {**dict(zip(KEY, row_key(a), strict=True)), **said}

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from apo_bench.records.own_code import left_out, own_code
 from apo_bench.records.replay_command import Files
+from apo_bench.records.row import Row
 from apo_bench.records.salt import Salt
 from apo_bench.statistics.rates import NOT_EXECUTED, rank
-
-Row = Mapping[str, Any]
 
 
 class Draw(Protocol):
@@ -62,7 +61,7 @@ def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[
     for row in rows:
         moved = row.get("sim_seconds") and row["failure_stage"] not in (*NOT_EXECUTED, "plan")
         if row["success"] is False and moved and row["level"] is not None and (trust_code or not own_code(row)):
-            ways.setdefault((row["failure_stage"], row["failure_code"]), []).append(row)
+            ways.setdefault((str(row["failure_stage"]), str(row["failure_code"])), []).append(row)
     chosen: list[Row] = []
     for _, found in sorted(ways.items(), key=lambda way: (-len(way[1]), way[0]))[:most]:
         chosen.append(_newest(sorted(found, key=_order), chosen))

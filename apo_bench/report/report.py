@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from apo_bench.errors import InputError
 from apo_bench.io.parquet import write_columns
 from apo_bench.io.writing import check_folders, check_target, to_write
 from apo_bench.records.report_rows import COLUMNS as KEPT
 from apo_bench.records.report_rows import report_rows
+from apo_bench.records.row import Row
 from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import check_one, one_salt, read_salt
 from apo_bench.records.verdicts import by_verdict, verdict_of
@@ -120,7 +122,7 @@ def report(
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(folder: Path, rows: Sequence[Mapping[str, Any]], verdict: str, found: Summary, failed: Failures) -> Report:
+def _written(folder: Path, rows: Sequence[Row], verdict: str, found: Summary, failed: Failures) -> Report:
     run, timing = read_run(folder), read_timing(folder)
     files, took, known = scenario_files(run), times(timing), work(timing)
     recognised, confused, gap = recognitions(rows), confusions(rows), gaps(rows)
@@ -184,10 +186,10 @@ def _write_tables(tables: Mapping[str, Table], folder: Path) -> dict[str, Path]:
     return {name: tables[name].write(folder / f"{name}.csv") for name in wanted}
 
 
-def _write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+def _write_rows(rows: Sequence[Row], path: Path) -> None:
     """The rows themselves, what was predicted in columns of its own."""
     plain = [name for name in KEPT if name != "predicted"]
     columns = [[row.get(name) for row in rows] for name in plain]
     said = ("fails", "operation", "code")
-    predicted = [[None if (p := row.get("predicted")) is None else p[key] for row in rows] for key in said]
+    predicted = [[None if (p := row.get("predicted")) is None else itemgetter(key)(p) for row in rows] for key in said]
     write_columns([*plain, *(f"predicted_{key}" for key in said)], [*columns, *predicted], path)

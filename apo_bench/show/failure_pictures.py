@@ -26,9 +26,10 @@ from apo_bench.records.checked import row_of
 from apo_bench.records.key import row_key
 from apo_bench.records.own_code import left_out, own_code
 from apo_bench.records.replay_command import Files
+from apo_bench.records.row import Row
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import TrialSettings
-from apo_bench.report.failures import FailurePicture, Row
+from apo_bench.report.failures import FailurePicture
 
 _WIDTH, _HEIGHT, _QUALITY = 640, 480, 82
 _NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 from apo_bench.records.method import knows_truth
+from apo_bench.records.row import Row
 from apo_bench.statistics.rates import rank, rank_relations
 
 
@@ -41,9 +42,9 @@ class Calibration:
     culprits: Share
 
 
-def calibrations(rows: Iterable[Mapping[str, Any]]) -> tuple[Calibration, ...]:
+def calibrations(rows: Iterable[Row]) -> tuple[Calibration, ...]:
     """One per scenario, noise, relations and method; the oracle has nothing to be calibrated."""
-    groups: dict[tuple[str, str, str, str], list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, str, str, str], list[Row]] = {}
     for row in rows:
         if row["level"] is not None and row["success"] is not None and not knows_truth(row["method"]):
             groups.setdefault((row["scenario"], row["noise"], row["relations"], row["method"]), []).append(row)
@@ -51,12 +52,9 @@ def calibrations(rows: Iterable[Mapping[str, Any]]) -> tuple[Calibration, ...]:
     return tuple(_calibration(*key, groups[key]) for key in order)
 
 
-def _calibration(
-    scenario: str, noise: str, relations: str, method: str, rows: Sequence[Mapping[str, Any]]
-) -> Calibration:
-    planned = [row for row in rows if row["planned_error_fixed_mm"] is not None]
-    fixed = [row["planned_error_fixed_mm"] for row in planned]
-    tight = [row["planned_error_fixed_mm"] / row["clearance_mm"] for row in planned if row["clearance_mm"] > 0]
+def _calibration(scenario: str, noise: str, relations: str, method: str, rows: Sequence[Row]) -> Calibration:
+    planned = [(row, error_mm) for row in rows if (error_mm := row["planned_error_fixed_mm"]) is not None]
+    tight = [error_mm / row["clearance_mm"] for row, error_mm in planned if row["clearance_mm"] > 0]
     covered = [row["inside_95"] for row in rows if row["inside_95"] is not None]
     tested = [row for row in rows if row["test_passes"] is not None]
     failed = [row for row in tested if not row["test_passes"]]
@@ -68,11 +66,11 @@ def _calibration(
         method=method,
         planned=len(planned),
         covered=Share(sum(covered), len(covered)),
-        fixed_mm=_rms(fixed),
+        fixed_mm=_rms([error_mm for _, error_mm in planned]),
         fixed_over_clearance=_rms(tight),
-        free_mm=_rms([row["planned_error_free_mm"] for row in planned]),
+        free_mm=_rms([row["planned_error_free_mm"] or 0.0 for row, _ in planned]),
         failed_tests=Share(len(failed), len(tested)),
-        culprits=Share(sum(row["wrong_relation"] in row["suspects"] for row in known), len(known)),
+        culprits=Share(sum(row["wrong_relation"] in (row["suspects"] or ()) for row in known), len(known)),
     )
 
 

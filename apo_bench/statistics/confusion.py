@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
+from apo_bench.records.row import Row
 from apo_bench.statistics.rates import by_method
 
 ALL = "all"
@@ -50,21 +51,21 @@ class Confusion:
         return self.right / self.executed if self.executed else None
 
 
-def confusions(rows: Iterable[Mapping[str, Any]]) -> tuple[Confusion, ...]:
+def confusions(rows: Iterable[Row]) -> tuple[Confusion, ...]:
     """One per scenario and method, sorted as `tally` sorts, and one of them all at the end."""
     groups = by_method(rows)
     everything = [row for own in groups.values() for row in own]
     return (*(_counted(*key, own) for key, own in groups.items()), _counted(ALL, ALL, everything))
 
 
-def _counted(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Confusion:
+def _counted(scenario: str, method: str, rows: Sequence[Row]) -> Confusion:
     excluded = [row for row in rows if row["success"] is None]
-    executed = [row for row in rows if row["predicted"] is not None and row["success"] is not None]
-    caught = [row for row in executed if row["predicted"]["fails"] and not row["as_demonstrated"]]
-    stopped = [row for row in caught if row["failure_operation"] is not None]
+    executed = [(row, said) for row in rows if (said := row["predicted"]) is not None and row["success"] is not None]
+    caught = [(row, said) for row, said in executed if said["fails"] and not row["as_demonstrated"]]
+    stopped = [(row, said) for row, said in caught if row["failure_operation"] is not None]
 
     def count(fails: bool, fitted: bool) -> int:
-        return sum((row["predicted"]["fails"], row["as_demonstrated"]) == (fails, fitted) for row in executed)
+        return sum((said["fails"], row["as_demonstrated"]) == (fails, fitted) for row, said in executed)
 
     return Confusion(
         scenario=scenario,
@@ -73,7 +74,7 @@ def _counted(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> C
         fit_failed=count(False, False),
         fail_fitted=count(True, True),
         fail_failed=len(caught),
-        same_operation=sum(row["predicted"]["operation"] == row["failure_operation"] for row in stopped),
+        same_operation=sum(said["operation"] == row["failure_operation"] for row, said in stopped),
         stopped=len(stopped),
         not_executed=len(rows) - len(excluded) - len(executed),
         excluded=len(excluded),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.row import Row
 from apo_bench.records.settings import RANGE
 from apo_bench.statistics.rates import Place, by_place, order
 
@@ -49,7 +50,7 @@ class Curve:
         return np.asarray(self.success[:, np.searchsorted(self.levels, levels)])
 
 
-def curves(rows: Iterable[Mapping[str, Any]]) -> tuple[Curve, ...]:
+def curves(rows: Iterable[Row]) -> tuple[Curve, ...]:
     """One per setting that has two levels or more, sorted as `tally` sorts; the oracle meets no level.
 
     Where poses are drawn a level is as many degrees as mm; trials with another pair of the two are on no curve.

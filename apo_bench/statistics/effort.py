@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
-from typing import Any, final
+from typing import final
 
+from apo_bench.records.row import Row
 from apo_bench.statistics.rates import by_method
 
 
@@ -26,18 +27,18 @@ class Effort:
     """Largest."""
 
 
-def efforts(rows: Iterable[Mapping[str, Any]]) -> tuple[Effort, ...]:
+def efforts(rows: Iterable[Row]) -> tuple[Effort, ...]:
     """One per scenario and method that had a success, sorted as `tally` sorts."""
     groups = by_method(row for row in rows if row["success"])
     return tuple(_effort(*key, own) for key, own in groups.items())
 
 
-def _effort(scenario: str, method: str, rows: Sequence[Mapping[str, Any]]) -> Effort:
+def _effort(scenario: str, method: str, rows: Sequence[Row]) -> Effort:
     return Effort(
         scenario=scenario,
         method=method,
         trials=len(rows),
-        extra_operations=fmean(row["extra_operations"] for row in rows),
-        sim_seconds=median(row["sim_seconds"] for row in rows),
+        extra_operations=fmean(row["extra_operations"] or 0 for row in rows),
+        sim_seconds=median(row["sim_seconds"] or 0.0 for row in rows),
         pushed_mm=max((row["pushed_mm"] or 0.0 for row in rows), default=0.0),
     )

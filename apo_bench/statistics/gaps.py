@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.records.method import knows_relations
+from apo_bench.records.row import Row
 from apo_bench.statistics.rates import Place, order, place_of
 
 CUTS = (5.0, 50.0, 95.0)
@@ -33,7 +34,7 @@ class Gap:
     planned: Quantiles
 
 
-def gaps(rows: Iterable[Mapping[str, Any]]) -> tuple[Gap, ...]:
+def gaps(rows: Iterable[Row]) -> tuple[Gap, ...]:
     """One per cell of a method that corrects, sorted as `tally` sorts."""
     groups: dict[Place, list[tuple[float, float]]] = {}
     for row in rows:

@@ -12,6 +12,7 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.row import Row
 from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
 
@@ -75,7 +76,7 @@ class Paired:
         return Rate(self.only_reference, self.only_reference + self.both)
 
 
-def paired(rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
+def paired(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
     """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
 
     `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.

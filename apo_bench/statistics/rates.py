@@ -7,14 +7,19 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import itemgetter
 from types import MappingProxyType
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, TypeVar, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.method import parsed
+from apo_bench.records.row import Row
 from apo_bench.records.salt import one_salt
+from apo_bench.records.settings import TrialSettings
 
 CONFIDENCE = 0.95
+Line = TypeVar("Line", bound=Mapping[str, Any])
+"""A row, or a line of timings."""
 NOT_EXECUTED = ("observe", "correct", "worker")
 """Stages of failures at which no plan was carried out to its end: there was none, or its process died."""
 
@@ -30,8 +35,8 @@ class Place(NamedTuple):
     level: float
     level_deg: float
     method: str
-    grasp: str = "friction"
-    fidelity: str = "full"
+    grasp: str = TrialSettings.grasp
+    fidelity: str = TrialSettings.fidelity
 
 
 class Interval(NamedTuple):
@@ -142,21 +147,25 @@ def rank_relations(relations: str) -> tuple[int, str]:
     return int(relations != "given"), relations
 
 
-def place_of(row: Mapping[str, Any]) -> Place | None:
+def place_of(row: Row) -> Place | None:
     """The cell of a row; None for a measured demonstration, which has no level."""
     if row["level"] is None:
         return None
-    return Place(*[row[name] for name in Place._fields[:-1]] + [row.get("fidelity", "full")])
+    said: Row = row if "fidelity" in row else row | {"fidelity": "full"}
+    return Place._make(_PLACE(said))
 
 
-def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping[str, Any]]]:
+_PLACE = itemgetter(*Place._fields)
+
+
+def by_place(rows: Iterable[Row]) -> dict[Place, dict[int, Row]]:
     """Cell -> seed -> row.
 
     Raises:
         InputError: A trial is there twice; counted twice it would make intervals narrower than they are. Or the rows
             were drawn with several salts: their trials differ, whatever their seeds.
     """
-    cells: dict[Place, dict[int, Mapping[str, Any]]] = {}
+    cells: dict[Place, dict[int, Row]] = {}
     rows = list(rows)
     one_salt(rows)
     for row in rows:
@@ -173,15 +182,15 @@ def by_place(rows: Iterable[Mapping[str, Any]]) -> dict[Place, dict[int, Mapping
     return cells
 
 
-def by_method(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
+def by_method(rows: Iterable[Line]) -> dict[tuple[str, str], list[Line]]:
     """Scenario and method -> rows, sorted as `tally` sorts."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, str], list[Line]] = {}
     for row in rows:
         groups.setdefault((str(row["scenario"]), str(row["method"])), []).append(row)
     return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}
 
 
-def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
+def tally(rows: Iterable[Row]) -> tuple[Cell, ...]:
     """Count rows into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
 
     Rows of a measured demonstration have no level and belong to no cell.
@@ -193,7 +202,7 @@ def tally(rows: Iterable[Mapping[str, Any]]) -> tuple[Cell, ...]:
     return tuple(_cell(key, list(groups[key].values())) for key in sorted(groups, key=order))
 
 
-def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
+def _cell(key: Place, rows: list[Row]) -> Cell:
     counted = [row for row in rows if row["success"] is not None]
     failed = [row for row in counted if not row["success"]]
     why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in failed)
@@ -201,8 +210,8 @@ def _cell(key: Place, rows: list[Mapping[str, Any]]) -> Cell:
         **key._asdict(),
         trials=len(counted),
         successes=len(counted) - len(failed),
-        demonstrated=sum(row["as_demonstrated"] for row in counted),
-        loose_successes=sum(row["loose_success"] for row in counted),
+        demonstrated=sum(bool(row["as_demonstrated"]) for row in counted),
+        loose_successes=sum(bool(row["loose_success"]) for row in counted),
         not_executed=sum(row["failure_stage"] in NOT_EXECUTED for row in failed),
         excluded=len(rows) - len(counted),
         failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),

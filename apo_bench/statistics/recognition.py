@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
 from apo_bench.records.relations import RECOGNISED
+from apo_bench.records.row import Row, look_up
 from apo_bench.statistics.rates import Rate
 
 ALL = "all"
@@ -58,26 +59,26 @@ class Recognition:
         return self.all_right.rate
 
 
-def recognitions(rows: Iterable[Mapping[str, Any]]) -> tuple[Recognition, ...]:
+def recognitions(rows: Iterable[Row]) -> tuple[Recognition, ...]:
     """One per scenario, noise, eye, way of recognising, carelessness and level; and over all scenarios, where several.
 
     Methods of one seed were told the same, so each observation counts once.
     """
-    seen: dict[tuple[Any, ...], tuple[Place, Mapping[str, Any]]] = {}
+    seen: dict[tuple[Any, ...], tuple[Place, Row]] = {}
     for row in rows:
         if row["relations"] in RECOGNISED and row["contacts_right"] is not None and row["level"] is not None:
-            place = Place(*(row[name] for name in Place._fields))
+            place = Place(*(look_up(row, name) for name in Place._fields))
             seen.setdefault((place, row["seed"], row["clearance_mm"]), (place, row))
     several = len({place.scenario for place, _ in seen.values()}) > 1
-    groups: dict[Place, list[Mapping[str, Any]]] = {}
+    groups: dict[Place, list[Row]] = {}
     for place, row in seen.values():
         for where in (place, place._replace(scenario=ALL)) if several else (place,):
             groups.setdefault(where, []).append(row)
     return tuple(_counted(place, groups[place]) for place in sorted(groups, key=_order))
 
 
-def _counted(place: Place, rows: Sequence[Mapping[str, Any]]) -> Recognition:
-    right, missed, false = (sum(row[f"contacts_{of}"] for row in rows) for of in ("right", "missed", "false"))
+def _counted(place: Place, rows: Sequence[Row]) -> Recognition:
+    right, missed, false = (sum(look_up(row, f"contacts_{of}") for row in rows) for of in ("right", "missed", "false"))
     complete = sum(row["contacts_missed"] == row["contacts_false"] == 0 for row in rows)
     return Recognition(place, len(rows), complete, right, missed, false)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
+from apo_bench.records.row import Row
 from apo_bench.statistics.area import Area, AreaDifference, area_differences, areas
 from apo_bench.statistics.curve import curves
 from apo_bench.statistics.half_level import HalfLevel, half_levels
@@ -25,7 +26,7 @@ class Summary:
     area_differences: tuple[AreaDifference, ...]
 
 
-def summary(rows: Iterable[Mapping[str, Any]], references: Sequence[str] = REFERENCES) -> Summary:
+def summary(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> Summary:
     """Rates, pairs, half levels and areas of rows.
 
     Args:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, final
 
 from apo_bench.io.plain_text import clean
+from apo_bench.records.row import Row, look_up
 
-Count = Callable[[Mapping[str, Any]], None]
+Count = Callable[[Row], None]
 """Takes every row as it comes."""
 BESIDE = ("scenario", "clearance_mm", "grasp", "noise", "relations", "careless", "method")
 """What tells the lines of the table apart; its columns are levels."""
@@ -62,7 +63,7 @@ def progress(total: int) -> Iterator[Count]:
         def __rich__(self) -> Any:
             return Group(bar.get_renderable(), rates.table(max(1, console.size.height - FRAME)))
 
-    def count(row: Mapping[str, Any]) -> None:
+    def count(row: Row) -> None:
         rates.count(row)
         bar.advance(task)
 
@@ -75,7 +76,7 @@ def _lines(total: int) -> Count:
     began = said = time.monotonic()
     ended = 0
 
-    def count(row: Mapping[str, Any]) -> None:
+    def count(row: Row) -> None:
         nonlocal said, ended
         ended += 1
         now = time.monotonic()
@@ -97,11 +98,11 @@ class Rates:
         self._lines: dict[tuple[Any, ...], dict[tuple[float, float], tuple[int, int]]] = {}
         """Line -> level -> successes, trials; the line that had a trial last comes last."""
 
-    def count(self, row: Mapping[str, Any]) -> None:
+    def count(self, row: Row) -> None:
         """Add a row; one whose demonstration went wrong counts for nothing."""
-        if row["success"] is None:
+        if row["success"] is None or row["level"] is None or row["level_deg"] is None:
             return
-        line = tuple(row[name] for name in BESIDE)
+        line = tuple(look_up(row, name) for name in BESIDE)
         cells = self._lines.pop(line, {})
         self._lines[line] = cells
         level = (row["level"], row["level_deg"])

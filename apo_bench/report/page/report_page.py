@@ -10,6 +10,7 @@ from typing import Any, final
 from apo_bench.records import verdicts
 from apo_bench.records.method import knows_truth
 from apo_bench.records.replay_command import Files, replay_command
+from apo_bench.records.row import Row, look_up
 from apo_bench.records.salt import one_salt
 from apo_bench.records.settings import RANGE
 from apo_bench.report.failures import FailurePicture
@@ -25,7 +26,6 @@ from apo_bench.statistics.settings import Setting, at, setting_of
 from apo_bench.statistics.summary import Summary
 from apo_bench.statistics.times import Work
 
-Row = Mapping[str, Any]
 SECTIONS = {
     "success": "Success",
     "levels": "Success over level",
@@ -134,10 +134,10 @@ def _scope(rows: Sequence[Row]) -> str:
         return len({(row["scenario"], row["clearance_mm"], row["seed"], row["careless"]) for row in some})
 
     def many(name: str, called: str) -> str:
-        return _many(len({row[name] for row in rows}), called)
+        return _many(len({look_up(row, name) for row in rows}), called)
 
     excluded, tried = demonstrations([row for row in rows if row["success"] is None]), demonstrations(rows)
-    fidelity = ", ".join(sorted({str(row.get("fidelity", "full")) for row in rows}))
+    fidelity = ", ".join(sorted({str(row["fidelity"]) for row in rows}))
     return (
         f"{len(rows):,} trials of {many('scenario', 'scenario')}, {many('method', 'method')} and "
         f"{many('seed', 'seed')}, fidelity {fidelity}. {excluded:,} of {tried:,} demonstrations were not right "
@@ -215,10 +215,10 @@ def _said(found: Found) -> dict[str, Any]:
     salt = one_salt(rows)
     return {
         "schemas": sorted({str(row["schema"]) for row in rows}),
-        "fidelity": sorted({str(row.get("fidelity", "full")) for row in rows}),
+        "fidelity": sorted({str(row["fidelity"]) for row in rows}),
         "grasp": sorted({str(row["grasp"]) for row in rows}),
-        "arm": sorted({str(row.get("arm", "six_axis")) for row in rows}),
-        "time step [s]": sorted({row.get("timestep_s", 0.001) for row in rows}),
+        "arm": sorted({str(row["arm"]) for row in rows}),
+        "time step [s]": sorted({row["timestep_s"] for row in rows}),
         "clearance [mm]": sorted({row["clearance_mm"] for row in rows}),
         "seeds": f"{min(r['seed'] for r in rows)} to {max(r['seed'] for r in rows)}",
         "hosts": sorted({w.host for w in found.work}) or "not known",

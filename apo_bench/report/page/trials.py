@@ -13,6 +13,7 @@ from markupsafe import Markup
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.replay_command import Files, without_seed
 from apo_bench.records.report_rows import NUMBERS
+from apo_bench.records.row import Row
 from apo_bench.statistics.rates import Cell, by_place
 from apo_bench.statistics.settings import at
 
@@ -28,7 +29,7 @@ ASKED = (
 
 
 def trials(
-    rows: Iterable[Mapping[str, Any]],
+    rows: Iterable[Row],
     cells: Sequence[Cell],
     files: Files | None = None,
     pictured: Mapping[tuple[int, int], int] | None = None,
@@ -81,7 +82,7 @@ def packed(values: Mapping[str, Any]) -> Markup:
     return Markup(base64.b64encode(gzip.compress(text, compresslevel=6, mtime=0)).decode())
 
 
-def verdict(row: Mapping[str, Any]) -> str:
+def verdict(row: Row) -> str:
     """How a trial ended, in a word or two."""
     if row["success"] is None:
         return EXCLUDED
@@ -90,7 +91,7 @@ def verdict(row: Mapping[str, Any]) -> str:
     return LOOSE if row["loose_success"] else FAILED
 
 
-def why(row: Mapping[str, Any]) -> str:
+def why(row: Row) -> str:
     """`attach: force_stop, operation 3`; nothing where nothing failed."""
     if row["failure_stage"] is None:
         return ""
