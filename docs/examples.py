@@ -22,7 +22,7 @@ from apo_bench.assembly.reached import ReplayResult
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.render import Camera, camera_view, picture_with_arm
+from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import plan
 from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
@@ -150,7 +150,7 @@ def _state(watched: tuple[ReplayResult, list[tuple[float, Array]]], moment: Mome
     return next(qpos for time, qpos in states if time >= at)
 
 
-def _camera(goals: Array) -> Camera:
+def _camera(goals: Array) -> SceneCamera:
     """Looks at the middle of all places where something is put, across the assembly, from the side off the arm."""
     low, high = goals[:, :3, 3].min(axis=0), goals[:, :3, 3].max(axis=0)
     turn = float(np.degrees(np.arctan2(goals[0][1, 0], goals[0][0, 0])))

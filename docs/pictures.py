@@ -19,7 +19,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.believed_picture import belief_panel, draw_beliefs
-from apo_bench.simulation.scene.render import Camera, camera_view, picture_with_arm
+from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
 
@@ -77,7 +77,7 @@ def close_up(scene: Scene, state: Array, reference: Array) -> NDArray[np.uint8]:
     return picture_with_arm(scene, start, state, *SIZE, camera(reference))
 
 
-def camera(reference: Array) -> Camera:
+def camera(reference: Array) -> SceneCamera:
     """Looks at where the stick goes in."""
     turn = float(np.degrees(np.arctan2(reference[0][1, 0], reference[0][0, 0])))
     return camera_view(reference[0][:3, 3] - 0.085 * reference[0][:3, 0] + [0.0, 0.0, 0.065], 0.32, turn + 66.0, -24.0)

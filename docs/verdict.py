@@ -16,7 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.render import Camera, camera_view, picture
+from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
 from tests import audited_states as audited
 from tests.end_states import reached, verdict
@@ -121,7 +121,7 @@ def draw(state: audited.Seen, scenario: str, path: Path) -> None:
     imageio.imwrite(path, image, extension=".jpg", quality=QUALITY)
 
 
-def camera(poses: Mapping[str, Array], away: Collection[str]) -> Camera:
+def camera(poses: Mapping[str, Array], away: Collection[str]) -> SceneCamera:
     """One that sees all but the table and what was put away."""
     at = np.array([T[:3, 3] for part, T in poses.items() if part not in ("table", *away)])
     low, high = at.min(axis=0), at.max(axis=0)

@@ -227,7 +227,7 @@ def test_a_solver_that_runs_out_of_turns_has_not_converged(monkeypatch: pytest.M
     def hurried(system: Equations, goals: Array, free: Collection[int]) -> Solution:
         return solve_newton(system, goals, free, turns=1)
 
-    monkeypatch.setattr("apo_bench.correction.baselines.paper.solve", hurried)
+    monkeypatch.setattr("apo_bench.correction.baselines.paper.solve_newton", hurried)
     scene = scenes.stick_on_castles()
     found = paper(scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(0), 9.0, 9.0)))
     assert (found.status, found.sentence) == ("not_converged", CODES["not_converged"])

@@ -19,7 +19,7 @@ from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
 
 _Image = NDArray[np.uint8]
-_Camera = Any
+SceneCamera = Any
 """The name of a camera of the room, or a `mujoco.MjvCamera`."""
 _VIDEO_ENDINGS = (".mp4", ".gif")
 
@@ -29,7 +29,7 @@ def picture(
     poses: Poses,
     width: int = 640,
     height: int = 480,
-    camera: _Camera = "overview",
+    camera: SceneCamera = "overview",
     more: Callable[[Any], None] | None = None,
 ) -> _Image:
     """The parts where `poses` says (parts it does not name: at their start), without the arm, (height, width, 3).
@@ -47,7 +47,7 @@ def picture_with_arm(
     state: Array | None = None,
     width: int = 640,
     height: int = 480,
-    camera: _Camera = "overview",
+    camera: SceneCamera = "overview",
     more: Callable[[Any], None] | None = None,
 ) -> _Image:
     """The parts where `poses` says, with the arm at home and its fingers open, (height, width, 3).
@@ -69,7 +69,7 @@ def picture_with_arm(
 
 def camera_view(
     look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0
-) -> _Camera:
+) -> SceneCamera:
     """A camera that looks at a point of the world, (3,), [m]."""
     camera = mujoco.MjvCamera()
     camera.lookat[:], camera.distance = look_at, distance_m
@@ -86,7 +86,7 @@ class Film:
         fps: float = 20.0,
         width: int = 640,
         height: int = 480,
-        camera: _Camera | None = None,
+        camera: SceneCamera | None = None,
         speed: float = 2.0,
         shadows: bool = False,
     ) -> None:
@@ -178,7 +178,7 @@ class Viewer:
 
 
 def _drawn(
-    world: World, data: Any, width: int, height: int, camera: _Camera, more: Callable[[Any], None] | None = None
+    world: World, data: Any, width: int, height: int, camera: SceneCamera, more: Callable[[Any], None] | None = None
 ) -> _Image:
     with renderer(world.model, width, height) as draws:
         draws.update_scene(data, camera=camera)
