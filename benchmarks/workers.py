@@ -16,11 +16,10 @@ from pathlib import Path
 
 from apo_bench.records.row import Row
 from apo_bench.simulation.scene.arm import find_arm
-from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
+from apo_bench.sweeps.environment_lock import environment_lock, names_of
 from apo_bench.sweeps.grid import SweepSpec, load_all, units
 from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.worker import Timing
-from apo_bench.trial.fingerprint import content_hash
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 RESULT = Path(__file__).parent / "results" / "workers.json"
@@ -47,7 +46,7 @@ def rows_per_second(workers: int, trials: int) -> float:
     """Of trials at fidelity contact, from the second seed on."""
     grid = SweepSpec(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
     loaded, arm = load_all([grid]), find_arm(grid.arm).mjcf
-    lock = EnvironmentLock({given: content_hash(one, given, arm) for given, one in loaded.items()}, versions())
+    lock = environment_lock(names_of([grid]), loaded, arm)
     ended: list[tuple[float, int]] = []
 
     def emit(row: Row, timing: Timing) -> None:

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, Protocol, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.method import is_own
@@ -15,6 +15,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message, checked
+from apo_bench.sweeps.stopping import Check
 from apo_bench.sweeps.worker import Emit, lost, timing
 
 STARTING_S = 300.0
@@ -30,6 +31,33 @@ def check_limit(limit_s: float) -> None:
         raise InputError(
             f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {LONGEST_TRIAL_S:g} is allowed."
         )
+
+
+class Executor(Protocol):
+    """Runs all units and emits one row per trial, in the order in which trials end; `local` and `ray` have one each."""
+
+    def __call__(
+        self,
+        work: Sequence[Unit],
+        lock: EnvironmentLock,
+        *,
+        workers: int | None,
+        limit_s: float,
+        emit: Emit,
+        check: Check,
+    ) -> None:
+        """Run them.
+
+        Args:
+            workers: At most so many at a time.
+            limit_s: Wall time that a trial may take; one that takes longer has a failed row.
+            check: Asked now and then; when it raises `Stopped`, the trials under way get a moment to end.
+
+        Raises:
+            InputError: A worker found that the request cannot be honoured.
+            RuntimeError: A trial could not be run at all, or workers end before they have begun one.
+            Stopped: Passed on after the rows of the trials that had ended were emitted.
+        """
 
 
 @final

@@ -3,19 +3,68 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import metadata
+from pathlib import Path
 from typing import final
 
+from apo_bench.correction.own_code.own import check_correctors
 from apo_bench.errors import InputError
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.relations import make_relations
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
+from apo_bench.records.method import parsed
+from apo_bench.records.relations import RECOGNISED
+from apo_bench.records.settings import level_pair
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.sweeps.grid import SweepSpec
+from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
+from apo_bench.trial.methods import with_simulated
 
 PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
 )
 """Those whose version may show in a row."""
+
+
+@final
+@dataclass(frozen=True)
+class Names:
+    """What the trials of a sweep name, each once."""
+
+    arm: str
+    scenarios: tuple[str, ...]
+    """As they were given."""
+    methods: tuple[str, ...]
+    relations: tuple[str, ...]
+    noises: Mapping[str, float]
+    """Noise model -> the highest level that it has [mm, degrees]."""
+
+    def check(self, corrector_limit_s: float = CORRECTOR_LIMIT_S) -> set[str]:
+        """Raise an `InputError` unless methods, relations and noise models can be had here.
+
+        Returns:
+            The files of the modules that correctors of one's own bring in.
+        """
+        for noise, highest in self.noises.items():
+            make_noise(noise, Level(highest, highest))
+        for relations in self.relations:
+            if relations not in RECOGNISED:
+                make_relations(relations)
+        return check_correctors((with_simulated(parsed(method).plan) for method in self.methods), corrector_limit_s)
+
+    def hashes(self) -> dict[str, str]:
+        """Of noise files and of the modules of `module:name`, as they are here: what it is -> its hash."""
+        return {
+            **noise_content(*self.noises),
+            **own_content("relations", *self.relations),
+            **own_content("method", *self.methods),
+            **own_content("arm", self.arm),
+        }
 
 
 @final
@@ -29,6 +78,24 @@ class EnvironmentLock:
     """Package -> version, of `PACKAGES`."""
     corrector_limit_s: float = CORRECTOR_LIMIT_S
     """Wall time that a corrector in a process of its own may take."""
+    names: Names | None = None
+    """None where everything is on one machine."""
+    hashes: Mapping[str, str] = field(default_factory=dict)
+    """Of `names`."""
+
+    def check_here(self) -> None:
+        """Raise an `InputError` unless trials run on this machine as where the sweep was started."""
+        self.check_versions()
+        if self.names is None:
+            return
+        self.names.check(self.corrector_limit_s)
+        here = self.names.hashes()
+        for name, content in self.hashes.items():
+            if here.get(name) != content:
+                raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
+        arm = find_arm(self.names.arm)
+        for given in self.names.scenarios:
+            self.check_content(given, content_hash(load_scenario(given), given, arm.mjcf))
 
     def check_content(self, given: str, found: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""
@@ -47,6 +114,33 @@ class EnvironmentLock:
                     f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
                     f"sweep {version}; install the same everywhere."
                 )
+
+
+def names_of(grids: Sequence[SweepSpec]) -> Names:
+    """What grids name; all have the same arm."""
+    noises: dict[str, float] = {}
+    for grid in grids:
+        highest = max(max(level_pair(level)) for level in grid.levels)
+        noises |= {noise: max(highest, noises.get(noise, 0.0)) for noise in grid.noises}
+    return Names(
+        arm=grids[0].arm,
+        scenarios=tuple(dict.fromkeys(name for grid in grids for name in grid.scenarios)),
+        methods=tuple(dict.fromkeys(name for grid in grids for name in grid.methods)),
+        relations=tuple(dict.fromkeys(name for grid in grids for name in grid.relations)),
+        noises=noises,
+    )
+
+
+def environment_lock(
+    names: Names, loaded: Mapping[str, Scenario], arm_file: Path, corrector_limit_s: float = CORRECTOR_LIMIT_S
+) -> EnvironmentLock:
+    """The lock of a sweep that is started here.
+
+    Args:
+        loaded: Every scenario by what was given for it.
+    """
+    content = {given: content_hash(scenario, given, arm_file) for given, scenario in loaded.items()}
+    return EnvironmentLock(content, versions(), corrector_limit_s, names, names.hashes())
 
 
 def versions() -> dict[str, str]:

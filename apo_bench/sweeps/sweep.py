@@ -4,36 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
-from apo_bench.correction.own_code.own import check_correctors
 from apo_bench.errors import InputError, unknown
-from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.relations import make_relations
 from apo_bench.records.key import trial_key
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, Limits
-from apo_bench.records.method import parsed
-from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row
 from apo_bench.records.run_file import run_record
 from apo_bench.records.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
-from apo_bench.records.settings import METHOD, level_pair
+from apo_bench.records.settings import METHOD
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, find_arm
 from apo_bench.simulation.scene.physics import physics
-from apo_bench.sweeps.dispatch import check_limit
-from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
+from apo_bench.sweeps.dispatch import Executor, check_limit
+from apo_bench.sweeps.environment_lock import EnvironmentLock, Names, environment_lock, names_of
 from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, units
 from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.stopping import Check, listening
-from apo_bench.sweeps.worker import Emit, Timing, Worker, in_time
+from apo_bench.sweeps.worker import Timing, in_time
 from apo_bench.trial.code_version import code_files
-from apo_bench.trial.fingerprint import content_hash, content_pieces, noise_content, own_content, spec_hash
-from apo_bench.trial.methods import with_simulated
+from apo_bench.trial.fingerprint import content_pieces, spec_hash
 
 LARGEST_WORKERS = 256
 BACKENDS = ("local", "ray")
@@ -80,13 +74,14 @@ def run_sweep(
     grids = (grids,) if isinstance(grids, SweepSpec) else tuple(grids)
     _check_spread(workers, limit_s, backend, address)
     here = workers is None and backend == "local"
-    loaded, arm = _checked(grids, corrector_limit_s)
-    content = {given: content_hash(one, given, arm.mjcf) for given, one in loaded.items()}
-    lock = EnvironmentLock(content, versions(), corrector_limit_s)
+    check_grids(grids)
+    names = names_of(grids)
+    loaded, arm = _checked(names, grids, corrector_limit_s)
+    lock = environment_lock(names, loaded, arm.mjcf, corrector_limit_s)
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
-    made_of = _content(grids, loaded, arm)
+    made_of = _content(lock, loaded, arm)
     run = run_record(described(grids, loaded), made_of, code_files(), lock.versions, files, command, salt, limits)
     with listening() as check, RunFolder(Path(out), run) as store:
         work = _left(units(grids, loaded, salt), loaded, lock, store, check)
@@ -97,30 +92,17 @@ def run_sweep(
                 store.append(kept, timing)
                 count(kept)
 
-            if backend == "ray":
-                from apo_bench.sweeps.ray.backend import spread as spread_on_ray
-
-                spread_on_ray(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check, address=address)
-            elif workers is None:
-                _here(work, lock, emit, check)
-            else:
-                spread(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check)
+            execute = _executor(backend, address)
+            execute(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check)
         return store.rows()
 
 
-def _here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Check) -> None:
-    """Run the work in this process."""
-    worker = Worker(0, lock)
-    try:
-        for unit in work:
-            for kind, *said in worker.run(unit):
-                if kind == "row":
-                    emit(*said)
-                else:
-                    check()
-    finally:
-        worker.close()
-    check()
+def _executor(backend: str, address: str | None) -> Executor:
+    if backend == "local":
+        return spread
+    from apo_bench.sweeps.ray.backend import spread as spread_on_ray
+
+    return partial(spread_on_ray, address=address)
 
 
 def _left(
@@ -163,38 +145,18 @@ def _check_spread(workers: int | None, limit_s: float, backend: str, address: st
         check_ray(address)
 
 
-def _checked(grids: Sequence[SweepSpec], corrector_limit_s: float) -> tuple[Mapping[str, Scenario], Arm]:
+def _checked(names: Names, grids: Sequence[SweepSpec], corrector_limit_s: float) -> tuple[Mapping[str, Scenario], Arm]:
     """Everything that has a name, found before a folder is made or a process started."""
-    check_grids(grids)
     loaded = load_all(grids)
-    for grid in grids:
-        largest = max(max(level_pair(level)) for level in grid.levels)
-        for noise in grid.noises:
-            make_noise(noise, Level(largest, largest))
-    for relations in {relations: None for grid in grids for relations in grid.relations}:
-        if relations not in RECOGNISED:
-            make_relations(relations)
-    check_correctors((with_simulated(parsed(method).plan) for method in _methods(grids)), corrector_limit_s)
+    names.check(corrector_limit_s)
     physics(grids[0].timestep_s)
-    return loaded, find_arm(grids[0].arm)
+    return loaded, find_arm(names.arm)
 
 
-def _content(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario], arm: Arm) -> dict[str, Any]:
+def _content(lock: EnvironmentLock, loaded: Mapping[str, Scenario], arm: Arm) -> dict[str, str]:
     """What the trials are made of besides the package, piece by piece, so that a change can be named."""
-    pieces: dict[str, Any] = {}
+    pieces: dict[str, str] = {}
     for given, scenario in loaded.items():
         made_of = content_pieces(scenario, given, arm.mjcf)
         pieces |= {f"{scenario.name}, {piece}": hashed for piece, hashed in made_of.items()}
-    noises = {noise: None for grid in grids for noise in grid.noises}
-    relations = {relations: None for grid in grids for relations in grid.relations}
-    return {
-        **pieces,
-        **noise_content(*noises),
-        **own_content("relations", *relations),
-        **own_content("method", *_methods(grids)),
-        **own_content("arm", grids[0].arm),
-    }
-
-
-def _methods(grids: Sequence[SweepSpec]) -> tuple[str, ...]:
-    return tuple({method: None for grid in grids for method in grid.methods})
+    return {**pieces, **lock.hashes}

@@ -29,14 +29,12 @@ from apo_bench.resources import folder
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps import dispatch
 from apo_bench.sweeps.dispatch import Dispatch
-from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
+from apo_bench.sweeps.environment_lock import EnvironmentLock, environment_lock, names_of
 from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
 from apo_bench.sweeps.ray import backend as on_ray
 from apo_bench.sweeps.ray import pool, task
-from apo_bench.sweeps.ray.runtime_files import names, runtime_files
-from apo_bench.sweeps.ray.task import refusal
+from apo_bench.sweeps.ray.runtime_files import runtime_files
 from apo_bench.sweeps.sweep import run_sweep
-from apo_bench.trial.fingerprint import content_hash
 
 SPEC = SweepSpec(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
@@ -111,10 +109,7 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
 
 def lock_of(spec: SweepSpec) -> tuple[tuple[Unit, ...], EnvironmentLock]:
     loaded = load_all([spec])
-    arm = find_arm(spec.arm).mjcf
-    return tuple(units([spec], loaded)), EnvironmentLock(
-        {g: content_hash(s, g, arm) for g, s in loaded.items()}, versions()
-    )
+    return tuple(units([spec], loaded)), environment_lock(names_of([spec]), loaded, find_arm(spec.arm).mjcf)
 
 
 def lines(out: Path) -> list[bytes]:
@@ -249,19 +244,16 @@ def refuse_row(row: Row, timing: dict[str, Any]) -> None:
 
 def test_what_speaks_against_a_node_is_one_sentence(own: Path) -> None:
     work, lock = lock_of(replace(SPEC, methods=("code_of_mine:raises",)))
-    asked = names(work)
-    assert refusal(pickle.dumps((lock, asked))) is None
-    other = dict.fromkeys(lock.content, "0" * 16)
-    changed = dict.fromkeys(asked.content, "0" * 16)
-    for packed, words in (
-        ((replace(lock, content=other), asked), "other code or other files for 'carried_bridge'"),
-        ((lock, replace(asked, content=changed)), "the file behind the method code_of_mine:raises is another one"),
-        ((lock, replace(asked, methods=("not_there:at_all",))), "cannot be imported"),
-        ((lock, replace(asked, scenarios=("missing.toml",))), "missing.toml"),
+    lock.check_here()
+    for changed, words in (
+        ({"content": dict.fromkeys(lock.content, "0" * 16)}, "other code or other files for 'carried_bridge'"),
+        ({"hashes": dict.fromkeys(lock.hashes, "0" * 16)}, "the file behind the method code_of_mine:raises is another"),
+        ({"names": replace(lock.names, methods=("not_there:at_all",))}, "cannot be imported"),
+        ({"names": replace(lock.names, scenarios=("missing.toml",))}, "missing.toml"),
     ):
-        said = refusal(pickle.dumps(packed)) or ""
+        ((kind, said),) = task.messages(pickle.dumps(replace(lock, **changed)), work[0], "node 1")
         assert words in said
-        assert (said.count("\n"), said.startswith("the node '")) == (0, True)
+        assert (kind, said.count("\n"), said.startswith("the node '")) == ("refused", 0, True)
 
 
 def test_files_below_the_current_folder_travel_and_no_others(
@@ -276,7 +268,7 @@ def test_files_below_the_current_folder_travel_and_no_others(
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
     scenarios = ("deep/mine.toml", str(far))
     spec = replace(SPEC, scenarios=scenarios, methods=("code_of_mine:raises",), noises=("noise.toml", "camera"))
-    travel = runtime_files(names(tuple(units([spec], load_all([spec])))))
+    travel = runtime_files(names_of([spec]))
     assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml", "code_of_mine.py", "helper_of_mine.py"}
     assert all((own / name).samefile(path) for name, path in travel.items())
 

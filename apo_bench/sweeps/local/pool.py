@@ -26,21 +26,25 @@ FALSE_STARTS = 3
 
 
 def spread(
-    work: Sequence[Unit], lock: EnvironmentLock, *, workers: int, limit_s: float, emit: Emit, check: Check = never
+    work: Sequence[Unit],
+    lock: EnvironmentLock,
+    *,
+    workers: int | None,
+    limit_s: float,
+    emit: Emit,
+    check: Check = never,
 ) -> None:
-    """Run all units in `workers` processes and emit one row per trial, in the order in which trials end.
+    """Run all units on this machine, as an `Executor` does.
 
     A trial whose process dies, or that takes longer than `limit_s`, has a failed row; the rest of its unit goes on in
     a new process.
 
     Args:
-        check: Asked now and then; when it raises `Stopped`, the trials under way get a moment to end.
-
-    Raises:
-        InputError: A worker found that the request cannot be honoured.
-        RuntimeError: A trial could not be run at all, or processes end before they have begun one.
-        Stopped: Passed on after the rows of the trials that had ended were emitted.
+        workers: Processes; None stands for this one, where no trial has a limit.
     """
+    if workers is None:
+        _run_here(work, lock, emit, check)
+        return
     dispatch = Dispatch(work, lock, limit_s, emit, deaths=1, false_starts=FALSE_STARTS)
     members = [Member(number, lock, dispatch) for number in range(min(workers, len(work)))]
     try:
@@ -59,6 +63,20 @@ def spread(
     finally:
         for member in members:
             member.end()
+
+
+def _run_here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Check) -> None:
+    worker = Worker(0, lock)
+    try:
+        for unit in work:
+            for kind, *said in worker.run(unit):
+                if kind == "row":
+                    emit(*said)
+                else:
+                    check()
+    finally:
+        worker.close()
+    check()
 
 
 @final

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
-import pickle
 import re
 import socket
 import tempfile
@@ -22,7 +21,7 @@ from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.ray.driver import Plan, drive
-from apo_bench.sweeps.ray.runtime_files import names, runtime_files
+from apo_bench.sweeps.ray.runtime_files import runtime_files
 from apo_bench.sweeps.stopping import Check, never
 from apo_bench.sweeps.worker import Emit
 
@@ -73,25 +72,22 @@ def spread(
     check: Check = never,
     address: str | None = None,
 ) -> None:
-    """Run all units on a Ray cluster and emit one row per trial, in the order in which trials end.
+    """Run all units on a Ray cluster, as an `Executor` does.
 
     Args:
-        workers: At most so many at a time; None for as many as the cluster has CPUs.
-        limit_s: A trial that takes longer has a failed row.
-        check: Asked now and then; when it raises `Stopped`, the trials under way get a moment to end.
+        workers: None stands for as many as the cluster takes.
         address: As in `check_ray`.
 
     Raises:
         InputError: No such cluster, or one whose nodes cannot work as this machine does.
-        RuntimeError: A trial could not be run at all, or the cluster was lost.
-        Stopped: Passed on after the rows of the trials that had ended were emitted.
+        RuntimeError: The cluster was lost, or a trial could not be run at all.
     """
     if not work:
         return
     check_ray(address)
-    named = names(work)
     auth = None if address == "local" or os.environ.get("RAY_AUTH_MODE") == "disabled" else "disabled"
-    plan = Plan(tuple(work), lock, pickle.dumps((lock, named)), runtime_files(named), address, workers, limit_s, auth)
+    files = {} if lock.names is None else runtime_files(lock.names)
+    plan = Plan(tuple(work), lock, files, address, workers, limit_s, auth)
     while True:
         try:
             _drive(plan, emit, check)

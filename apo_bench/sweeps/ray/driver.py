@@ -7,6 +7,7 @@ it has a process of its own. What is worth saying goes through a pipe to the swe
 from __future__ import annotations
 
 import os
+import pickle
 import shutil
 import tempfile
 import time
@@ -45,8 +46,6 @@ class Plan:
 
     work: Sequence[Unit]
     lock: EnvironmentLock
-    packed: bytes
-    """The pickled `EnvironmentLock` and `Named`, for the workers."""
     files: Mapping[str, Path]
     """From `runtime_files`."""
     address: str | None
@@ -128,8 +127,9 @@ def _spread(plan: Plan, say: Callable[..., None], pipe: Any) -> None:
         say("row", row, timing)
 
     task = ray.remote(**ONE_TRY)(made_task())
+    packed = pickle.dumps(plan.lock)
     dispatch = Dispatch(plan.work, plan.lock, plan.limit_s, emit, deaths=DEATHS, false_starts=FALSE_STARTS)
-    pool = RayPool(dispatch, lambda unit: task.remote(plan.packed, unit), plan.workers)
+    pool = RayPool(dispatch, lambda unit: task.remote(packed, unit), plan.workers)
     deadline = float("inf")
     while pool.is_busy and time.monotonic() < deadline:
         pool.turn()

@@ -9,14 +9,10 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 from apo_bench.errors import InputError
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message, last_message
-from apo_bench.sweeps.ray.runtime_files import Named, check_here
 from apo_bench.sweeps.worker import Worker
-from apo_bench.trial.fingerprint import content_hash
 
 
 def made_task() -> Callable[[bytes, bytes], Iterator[Message]]:
@@ -49,7 +45,7 @@ def messages(packed: bytes, unit: Unit, node: str) -> Iterator[Message]:
     """What the worker of this process says of a unit.
 
     Args:
-        packed: As in `refusal`.
+        packed: The pickled `EnvironmentLock` of the sweep.
         node: The id of the node that it is on.
     """
     try:
@@ -64,31 +60,9 @@ def messages(packed: bytes, unit: Unit, node: str) -> Iterator[Message]:
 @lru_cache(maxsize=1)
 def _worker(packed: bytes) -> Worker:
     """Ray gives its processes task after task: scenes are compiled and modules imported once in each."""
-    said = refusal(packed)
-    if said is not None:
-        raise InputError(said)
-    lock, _ = _unpacked(packed)
-    return Worker(os.getpid(), lock)
-
-
-def refusal(packed: bytes) -> str | None:
-    """Why trials cannot run on this machine as they do where the sweep was started; None if they can.
-
-    Args:
-        packed: The pickled `EnvironmentLock` and `Named` of the sweep.
-    """
+    lock: EnvironmentLock = pickle.loads(packed)
     try:
-        lock, named = _unpacked(packed)
-        lock.check_versions()
-        check_here(named)
-        for given in named.scenarios:
-            for arm in named.arms:
-                lock.check_content(given, content_hash(load_scenario(given), given, find_arm(arm).mjcf))
+        lock.check_here()
     except InputError as error:
-        return f"the node '{platform.node()}' cannot work as this machine does: {error}"
-    return None
-
-
-def _unpacked(packed: bytes) -> tuple[EnvironmentLock, Named]:
-    lock, named = pickle.loads(packed)
-    return lock, named
+        raise InputError(f"the node '{platform.node()}' cannot work as this machine does: {error}") from error
+    return Worker(os.getpid(), lock)
