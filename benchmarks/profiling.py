@@ -25,7 +25,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.arm import Kinematics
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.planning import plan
+from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_recording, record_demonstration
 
 ROOT = Path(__file__).parents[1]
@@ -101,8 +101,10 @@ def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
 def planned(scene: Scene, method: str, seed: int) -> Any:
     """What a method would have the robot do."""
     shown = record_demonstration(scene, 1.0, seed)
-    made = plan(method, observe_recording(shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals)
-    assert made.plan is not None, made.refused
+    made = apply_method(
+        method, observe_recording(shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals
+    )
+    assert made.plan is not None, made.failure
     return made.plan
 
 

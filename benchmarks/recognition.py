@@ -32,7 +32,7 @@ from apo_bench.report.tables.recognition import recognition_table
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.recognition import ALL, Recognition, recognitions
-from apo_bench.trial.recognised import counted, recognised
+from apo_bench.trial.recognised_contacts import count_contacts, recognise_by
 from apo_bench.trial.stages import observe_recording, record_demonstration
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -58,10 +58,10 @@ def rows_of(scenario: str, seed: int, wide: int, twice: int) -> list[dict[str, A
         shown = record_demonstration(here, careless, seed)
         for level, kind in product(levels, kinds) if shown.demonstration.code == "ok" else ():
             seen = observe_recording(shown, make_noise("isotropic", Level(level, level)), seed)
-            told = recognised(seen, kind).assembly
+            told = recognise_by(seen, kind).assembly
             where = {"scenario": scenario, "noise": "isotropic", "eye": "noise", "relations": kind, "seed": seed}
             size = {"careless": careless, "level": level, "level_deg": level, "clearance_mm": here.clearance_mm}
-            made.append(where | size | counted(seen.assembly, told) | wrong(seen.assembly, told))
+            made.append(where | size | count_contacts(seen.assembly, told) | wrong(seen.assembly, told))
     return made
 
 

@@ -24,7 +24,7 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.planning import plan
+from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
 
 HERE = Path(__file__).parent / "pictures"
@@ -116,7 +116,7 @@ def _draw(name: str, strip: Strip) -> None:
     scene = build_scene(load_scenario(name))
     shown = record_demonstration(scene, 1.0, SEED)
     seen = observe_recording(shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
-    raw, corrected = plan("none", seen, None).plan, plan(strip.method, seen, None).plan
+    raw, corrected = apply_method("none", seen, None).plan, apply_method(strip.method, seen, None).plan
     assert raw is not None, "everything was seen"
     assert corrected is not None, f"{strip.method} corrects {name}"
     failed, right = (_watched(scene, each, shown.layout.goals) for each in (raw, corrected))

@@ -64,8 +64,8 @@ def _planned(
 ) -> tuple[Scenario, Plan, list[str]]:
     """The scenario, the plan that a method makes of an observation of it, and what is to be said with it."""
     from apo_bench.files.observation import read_observation_file
-    from apo_bench.trial.misgivings import misgivings
-    from apo_bench.trial.planning import plan as planned
+    from apo_bench.trial.plan_warning import plan_warning
+    from apo_bench.trial.planning import apply_method
 
     stated = zip(("deviation_mm", "deviation_deg"), deviations, strict=True)
     seen, loaded, assumed = read_observation_file(
@@ -73,11 +73,11 @@ def _planned(
     )
     if method == "oracle":
         raise InputError("--method oracle was given; it knows the truth, which an observation does not tell.")
-    found = planned(method, seen, None)
+    found = apply_method(method, seen, None)
     if found.plan is None:
-        why = found.refused.sentence if found.refused is not None else "no plan was made"
+        why = found.failure.sentence if found.failure is not None else "no plan was made"
         raise RuntimeError(f"{observation} gives no plan: {why.rstrip('.')}.")
-    wrong = misgivings(loaded, found.plan, found.correction)
+    wrong = plan_warning(loaded, found.plan, found.correction)
     notes = [assumed_deviations(*deviations)] if assumed and found.correction is not None else []
     return loaded, found.plan, [*notes, *([wrong] if wrong else [])]
 

@@ -37,7 +37,7 @@ def recognise(
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.recognised_text import difference_lines, evidence_table, recognition_form
     from apo_bench.sweeps.one import looked_at
-    from apo_bench.trial.recognised import recognised
+    from apo_bench.trial.recognised_contacts import recognise_by
 
     if relations not in RECOGNISED:
         raise InputError(unknown("way of recognising", relations, RECOGNISED))
@@ -45,7 +45,7 @@ def recognise(
     name = load_scenario(scenario).name
     with redirect_output(as_json):
         seen, assumed = looked_at(scenario, observation, asked, deviations)
-    found = recognised(seen, relations)
+    found = recognise_by(seen, relations)
     if as_json:
         typer.echo(json.dumps(recognition_form(name, relations, seen, found, assumed), allow_nan=False))
         return

@@ -62,14 +62,14 @@ def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) 
     from apo_bench.correction.own_code.own import correct_named
     from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.methods import with_simulated
-    from apo_bench.trial.misgivings import misgivings
+    from apo_bench.trial.plan_warning import plan_warning
 
     made = correct_named(looked, with_simulated(method))
     if not made.ok:
         raise RuntimeError(
             f"{method} did not correct what was seen: {made.sentence.rstrip('.')}; --seen draws what was seen."
         )
-    warning = misgivings(scenario, made.plan(looked), made)
+    warning = plan_warning(scenario, made.plan(looked), made)
     return belief_panel(f"corrected by {method}", looked, made.goals, step, warning)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.recognition.contacts import Evidence, Recognised
-from apo_bench.trial.recognised import counted
+from apo_bench.trial.recognised_contacts import count_contacts
 
 _SCHEMA = "apo-bench/recognised/1"
 
@@ -43,7 +43,7 @@ def evidence_table(found: Recognised, right: Assembly) -> Any:
 def difference_lines(observation: Observation, found: Recognised) -> list[str]:
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
     right = observation.assembly
-    count = counted(right, found.assembly)
+    count = count_contacts(right, found.assembly)
     missed = [f"missed: {made + 1}: {contact}" for made, contact in _missed(right, found)]
     total = count["contacts_right"] + count["contacts_missed"]
     if not missed and not count["contacts_false"]:
@@ -67,7 +67,7 @@ def recognition_form(
             {"operation": made + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
             for made, contact in _missed(observation.assembly, found)
         ],
-        **counted(observation.assembly, found.assembly),
+        **count_contacts(observation.assembly, found.assembly),
     }
 
 

@@ -10,46 +10,48 @@ from apo_bench.correction.posterior import contains_truth
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit
 from apo_bench.records.row import Row
-from apo_bench.trial.planning import Planned
+from apo_bench.trial.planning import MethodResult
 from apo_bench.trial.pose_error import goal_errors
 
 
-def confidence(planned: Planned, seen: Observation, told: Observation, truth: Array | None) -> Row:
+def confidence(
+    result: MethodResult, observation: Observation, corrector_input: Observation, truth: Array | None
+) -> Row:
     """The test of the correction, whether the truth lies in its posterior, and how far the plan is from the truth.
 
     Args:
-        seen: With the right relations.
-        told: With those that the corrector was told.
+        observation: With the right relations.
+        corrector_input: With those that the corrector was given.
         truth: (n, 4, 4), world frame, [m]; None if it is not known.
     """
-    wrong = None if told.assembly is seen.assembly else culprit(seen.assembly, told.assembly)
-    first: Row = {"wrong_relation": wrong}
-    return first | _test(planned.correction) | _truth(planned, told, truth)
+    right, given = observation.assembly, corrector_input.assembly
+    wrong: Row = {"wrong_relation": None if given is right else culprit(right, given)}
+    return wrong | _test(result.correction) | _truth(result, corrector_input, truth)
 
 
-def _test(made: Correction | None) -> Row:
-    if made is None:
+def _test(correction: Correction | None) -> Row:
+    if correction is None:
         return {}
-    dropped: Row = {"dropped": list(made.dropped)}
-    if made.test is None:
+    dropped: Row = {"dropped": list(correction.dropped)}
+    test = correction.test
+    if test is None:
         return dropped
     return dropped | {
-        "chi_square": _finite(made.test.chi_square),
-        "chi_square_freedom": int(made.test.freedom),
-        "p_value": _finite(made.test.p_value),
-        "test_passes": bool(made.test.passes),
-        "suspects": [suspect.relation for suspect in made.test.ambiguous],
+        "chi_square": _finite(test.chi_square),
+        "chi_square_freedom": int(test.freedom),
+        "p_value": _finite(test.p_value),
+        "test_passes": bool(test.passes),
+        "suspects": [suspect.relation for suspect in test.ambiguous],
     }
 
 
-def _truth(planned: Planned, told: Observation, truth: Array | None) -> Row:
+def _truth(result: MethodResult, corrector_input: Observation, truth: Array | None) -> Row:
     if truth is None:
         return {}
-    made = planned.correction
-    covered = None if made is None or not made.ok else contains_truth(told, made, truth)
-    fixed, free = (None, None) if planned.plan is None else _errors(planned.plan, truth)
+    correction = result.correction
+    fixed, free = (None, None) if result.plan is None else _errors(result.plan, truth)
     return {
-        "inside_95": covered,
+        "inside_95": contains_truth(corrector_input, correction, truth) if correction and correction.ok else None,
         "planned_error_fixed_mm": fixed,
         "planned_error_free_mm": free,
     }

@@ -1,4 +1,4 @@
-"""One trial: a demonstration, watched, planned by a method, replayed, judged; as one row."""
+"""One trial as one row: demonstrated, observed, planned by a method, replayed, judged."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.confidence import confidence
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.planning import Planned, plan
+from apo_bench.trial.planning import MethodResult, apply_method
 from apo_bench.trial.pose_error import pose_errors
-from apo_bench.trial.recognised import counted, understood
+from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
 from apo_bench.trial.row import head, result
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import (
@@ -46,7 +46,7 @@ MEASURED: Row = {"level": None, "level_deg": None, "careless": None, "noise": "m
 
 
 def run_trial(
-    spec: TrialSettings,
+    settings: TrialSettings,
     scene: Scene | None = None,
     *,
     recording: Recording | None = None,
@@ -58,40 +58,44 @@ def run_trial(
     """Run one trial.
 
     Args:
-        scene: Compiled for the scenario, clearance, grasp, arm and time step of `spec`; compiled here if it is not at
-            hand.
+        scene: Compiled for the scenario, clearance, grasp, arm and time step of `settings`; compiled here if it is
+            not at hand.
         recording: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
-        method: What `OwnCorrectors.find` makes of the method of `spec`, if it is at hand.
+        method: What `OwnCorrectors.find` makes of the method of `settings`, if it is at hand.
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
         cache: What replays of this scene and seed have in common; changes nothing but the time it takes.
 
     Raises:
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
-    scene = scene or scene_of(spec)
-    recording = recording or record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-    content = content or content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    first = head(spec, scene.scenario, spec_hash(spec, content)) | {"demonstration": recording.demonstration.code}
+    scene = scene or scene_of(settings)
+    recording = recording or record_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
+    content = content or content_hash(scene.scenario, settings.scenario, scene.arm.mjcf)
+    asked = head(settings, scene.scenario, spec_hash(settings, content))
+    asked |= {"demonstration": recording.demonstration.code}
     if recording.demonstration.code != "ok":
-        return first | result(demonstration_failure(recording.demonstration), success=None)
-    seen = observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
+        return asked | result(demonstration_failure(recording.demonstration), success=None)
     truth = recording.layout.goals
-    given = _corrector_input(spec, seen, truth)
-    planned = plan(method or parsed(spec.method).plan, seen, truth, given)
-    said = confidence(planned, seen, given, truth)
-    return first | _carry_out(planned, scene, truth, truth, watch, spec, cache) | said | _contacts(spec, seen, given)
+    observation = observe_recording(recording, noise_of(settings, scene, recording), settings.seed, settings.salt)
+    return asked | _row(settings, scene, observation, truth, truth, method, watch, cache)
 
 
-def noise_of(spec: TrialSettings, scene: Scene, recording: Recording) -> Noise:
+def noise_of(settings: TrialSettings, scene: Scene, recording: Recording) -> Noise:
     """The noise model of a trial, or the range finder that recorded its demonstration."""
-    if spec.eye == RANGE:
-        return range_sensor(scene, recording, spec.level_mm)
-    return make_noise(spec.noise, Level(spec.level_mm, spec.level_deg))
+    if settings.eye == RANGE:
+        return range_sensor(scene, recording, settings.level_mm)
+    return make_noise(settings.noise, Level(settings.level_mm, settings.level_deg))
 
 
 def run_measured(
-    spec: TrialSettings, scene: Scene, seen: Observation, text: str, *, method: Any = None, watch: Any = None
+    settings: TrialSettings,
+    scene: Scene,
+    observation: Observation,
+    text: str,
+    *,
+    method: Any = None,
+    watch: Any = None,
 ) -> Row:
     """Replay an observation that came from a file: its truth is not known.
 
@@ -105,79 +109,92 @@ def run_measured(
     Raises:
         InputError: The method is `oracle`, which would need the truth.
     """
-    if knows_truth(spec.method):
+    if knows_truth(settings.method):
         raise InputError(
-            f"the method '{spec.method}' was given for a measured observation, whose truth is not known; use none or "
-            "paper."
+            f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use none "
+            "or paper."
         )
-    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    first = head(spec, scene.scenario, spec_hash(spec, content, text)) | MEASURED | {"demonstration": "ok"}
-    given = _corrector_input(spec, seen, None)
-    planned = plan(method or parsed(spec.method).plan, seen, None, given)
-    said = confidence(planned, seen, given, None) | _contacts(spec, seen, given)
-    return (
-        first
-        | _carry_out(planned, scene, nominal_where_seen(scene.scenario.goals, seen), None, watch, spec, None)
-        | said
-    )
+    content = content_hash(scene.scenario, settings.scenario, scene.arm.mjcf)
+    asked = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
+    reference = nominal_where_seen(scene.scenario.goals, observation)
+    return asked | _row(settings, scene, observation, reference, None, method, watch, None)
 
 
-def nominal_where_seen(nominal: Array, seen: Observation) -> Array:
+def nominal_where_seen(nominal: Array, observation: Observation) -> Array:
     """The nominal goals (n, 4, 4) shifted and turned on the table to where the first operation was seen."""
-    k = int(np.argmax(seen.seen))
-    T = seen.goals[k] @ pose.inverse(nominal[k])
+    k = int(np.argmax(observation.seen))
+    T = observation.goals[k] @ pose.inverse(nominal[k])
     flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
-    flat[:2, 3] = (seen.goals[k] - flat @ nominal[k])[:2, 3]
+    flat[:2, 3] = (observation.goals[k] - flat @ nominal[k])[:2, 3]
     return np.asarray(flat @ nominal)
 
 
-def _corrector_input(spec: TrialSettings, seen: Observation, truth: Array | None) -> Observation:
-    """The observation as a corrector gets it: with the relations as given, as recognised, or wrong ones."""
-    if not knows_relations(spec.method):
-        return seen
-    if spec.relations in RECOGNISED:
-        return understood(seen, spec.relations)
-    if truth is None:
-        return seen
-    return with_relations(seen, make_relations(spec.relations), truth, stream(spec.seed, RELATIONS, spec.salt))
-
-
-def _contacts(spec: TrialSettings, seen: Observation, given: Observation) -> Row:
-    """How many of the contacts that a method was given are right."""
-    return cast(Row, counted(seen.assembly, given.assembly)) if knows_relations(spec.method) else {}
-
-
-def _carry_out(
-    planned: Planned,
+def _row(
+    settings: TrialSettings,
     scene: Scene,
+    observation: Observation,
+    reference: Array,
+    truth: Array | None,
+    method: Any,
+    watch: Any,
+    cache: ReplayCache | None,
+) -> Row:
+    """What the method made of the observation, and what came of its plan.
+
+    Args:
+        reference: (n, 4, 4) goals that are right for the judge.
+        truth: (n, 4, 4) goals of the layout; None if they are not known.
+    """
+    given = _corrector_input(settings, observation, truth)
+    made = apply_method(method or parsed(settings.method).plan, observation, truth, given)
+    row = _outcome(settings, scene, made, reference, truth, watch, cache) | confidence(made, observation, given, truth)
+    if knows_relations(settings.method):
+        row |= cast(Row, count_contacts(observation.assembly, given.assembly))
+    return row
+
+
+def _corrector_input(settings: TrialSettings, observation: Observation, truth: Array | None) -> Observation:
+    """The observation as a corrector gets it: with the relations as given, as recognised, or wrong ones."""
+    if not knows_relations(settings.method):
+        return observation
+    if settings.relations in RECOGNISED:
+        return with_recognised_contacts(observation, settings.relations)
+    if truth is None:
+        return observation
+    rng = stream(settings.seed, RELATIONS, settings.salt)
+    return with_relations(observation, make_relations(settings.relations), truth, rng)
+
+
+def _outcome(
+    settings: TrialSettings,
+    scene: Scene,
+    made: MethodResult,
     reference: Array,
     truth: Array | None,
     watch: Any,
-    spec: TrialSettings,
     cache: ReplayCache | None,
 ) -> Row:
-    said = _correction(planned)
-    if planned.plan is None:
-        assert planned.refused is not None
-        return result(planned.refused, success=False) | said
-    said |= {"predicted": predicted_outcome(planned.plan, scene)}
-    searches = parsed(spec.method).searches
-    attempt = replay_and_judge(planned.plan, scene, reference, watch, spec.fidelity, cache, searches)
+    """Carry out the plan, if there is one."""
+    if made.plan is None:
+        assert made.failure is not None
+        return result(made.failure, success=False) | _correction(made)
+    predicted: Row = {"predicted": predicted_outcome(made.plan, scene)}
+    searches = parsed(settings.method).searches
+    attempt = replay_and_judge(made.plan, scene, reference, watch, settings.fidelity, cache, searches)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
-    return end | said | _physics(attempt, planned.plan, truth)
+    return end | _correction(made) | predicted | _physics(attempt, made.plan, truth)
 
 
-def _correction(planned: Planned) -> Row:
+def _correction(made: MethodResult) -> Row:
     """What the method did, and what carrying it out would take beyond doing every operation once."""
-    extra = None if planned.plan is None else len(planned.plan.schedule) - len(planned.plan.assembly)
+    extra = None if made.plan is None else len(made.plan.schedule) - len(made.plan.assembly)
+    freed, tried = ((), ()) if made.correction is None else (made.correction.freed, made.correction.tried)
     return {
-        "freed": _numbers(planned.freed),
-        "tried": [
-            {"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in planned.tried
-        ],
+        "freed": _numbers(freed),
+        "tried": [{"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in tried],
         "extra_operations": extra,
-        "gap_before_mm": _mm(planned.gap_before_m),
-        "gap_after_mm": _mm(planned.gap_after_m),
+        "gap_before_mm": _mm(made.gap_before_m),
+        "gap_after_mm": _mm(made.gap_after_m),
     }
 
 

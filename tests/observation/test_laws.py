@@ -25,7 +25,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial import trial
-from apo_bench.trial.planning import plan
+from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import Recording, observe_recording, stream
 from tests import scenes
 
@@ -232,16 +232,16 @@ def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     shown = Recording(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
     for seed in range(40):
         seen = observe_recording(shown, make_noise(name, LEVEL), seed)
-        planned = plan("none", seen, CYCLE.goals)
+        planned = apply_method("none", seen, CYCLE.goals)
         if seen.seen.all():
             assert planned.plan is not None
             assert planned.plan.goals.tobytes() == seen.goals.tobytes()
         else:
             assert planned.plan is None
-            assert planned.refused is not None
-            assert planned.refused.code == "not_seen"
-            assert planned.refused.operation == int(np.argmin(seen.seen))
-            assert not plan("contact", seen, CYCLE.goals).plan
+            assert planned.failure is not None
+            assert planned.failure.code == "not_seen"
+            assert planned.failure.operation == int(np.argmin(seen.seen))
+            assert not apply_method("contact", seen, CYCLE.goals).plan
 
 
 @pytest.mark.parametrize("name", NAMES)

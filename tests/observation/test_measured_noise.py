@@ -31,7 +31,7 @@ from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.observation.observing import observe
 from apo_bench.records.settings import TrialSettings
 from apo_bench.trial.fingerprint import noise_content, spec_hash
-from apo_bench.trial.planning import plan
+from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of
 from tests import scenes
 from tests.bop_made import Known
@@ -158,7 +158,7 @@ def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
 def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]) -> None:
     for seed in range(30):
         seen = see(names[0], seed)
-        planned = plan("none", seen, TOWER.goals)
+        planned = apply_method("none", seen, TOWER.goals)
         assert (planned.plan is not None) == bool(seen.seen.all())
         if planned.plan is not None:
             assert planned.plan.goals.tobytes() == seen.goals.tobytes()

@@ -26,7 +26,7 @@ from apo_bench.observation.relations import (
 )
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.trial.planning import plan
+from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream
 from tests import scenes
 
@@ -119,7 +119,7 @@ def test_the_plan_and_those_who_do_not_ask_keep_the_right_relations() -> None:
     wrong = with_relations(seen, Shifted(3e-3), scene.goals, stream(4, RELATIONS))
     assert wrong.goals.tobytes() == seen.goals.tobytes()
     for method in ("oracle", "none"):
-        with_wrong, without = plan(method, seen, scene.goals, wrong), plan(method, seen, scene.goals)
+        with_wrong, without = apply_method(method, seen, scene.goals, wrong), apply_method(method, seen, scene.goals)
         assert with_wrong.plan is not None
         assert without.plan is not None
         assert with_wrong.plan.goals.tobytes() == without.plan.goals.tobytes()
@@ -130,7 +130,7 @@ def test_the_plan_and_those_who_do_not_ask_keep_the_right_relations() -> None:
         heard.append(observation)
         return observation.goals
 
-    made = plan(listens, seen, scene.goals, wrong)
+    made = apply_method(listens, seen, scene.goals, wrong)
     assert heard == [wrong]
     assert made.plan is not None
     assert made.plan.assembly is seen.assembly

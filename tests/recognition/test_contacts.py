@@ -25,7 +25,7 @@ from apo_bench.recognition.contacts import recognise
 from apo_bench.recognition.thresholds import FIXED_RULES, RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.trial.recognised import counted, recognised, understood
+from apo_bench.trial.recognised_contacts import count_contacts, recognise_by, with_recognised_contacts
 from tests import scenes
 
 NAMES = sorted(scenes.ALL)
@@ -166,14 +166,14 @@ def test_what_was_not_seen_touches_nothing() -> None:
     seen = replace(seen_at(scene, 0, 0.5), seen=np.array([True, False, True]))
     right = {(k, c) for k, c in contacts(scene.assembly) if "castle2" not in (c.manipulated.part, c.environment.part)}
     assert contacts(recognise(seen).assembly) == right
-    assert recognised(seen, "recognised-twice").evidence == recognise(seen).evidence
+    assert recognise_by(seen, "recognised-twice").evidence == recognise(seen).evidence
 
 
 def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None:
     scene = scenes.stick_on_castles()
     goals = np.array(scene.goals)
     goals[:, 2, 3] += [0.1, 0.2, 0.35]
-    seen = understood(stated(scenes.seen(scene, goals), 0.5), "recognised")
+    seen = with_recognised_contacts(stated(scenes.seen(scene, goals), 0.5), "recognised")
     assert not seen.assembly.relations()
     assert correct(seen, "contact").ok
     assert correct(seen, "paper").ok
@@ -183,7 +183,7 @@ def test_recognised_twice_sees_as_much_as_once() -> None:
     for name in ("stick_in_tower", "pockets"):
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 2, 1.0, play_m=0.25e-3)
-        once, twice = recognised(seen), recognised(seen, "recognised-twice")
+        once, twice = recognise_by(seen), recognise_by(seen, "recognised-twice")
         assert contacts(twice.assembly) == contacts(scene.assembly)
         assert max(abs(e.gap_m) for e in twice.evidence) < 1e-4  # looked at where the correction put the parts
         assert [e.seen_gap_m for e in twice.evidence] == [e.seen_gap_m for e in once.evidence]
@@ -213,8 +213,8 @@ def test_contacts_are_counted_against_the_right_ones() -> None:
     first, second = operations[1].contacts
     operations[1] = replace(operations[1], contacts=(first, Contact(second.environment, second.manipulated)))
     wrong = replace(right, operations=tuple(operations))
-    assert counted(right, wrong) == {"contacts_right": 4, "contacts_missed": 1, "contacts_false": 1}
-    assert counted(right, right) == {"contacts_right": 5, "contacts_missed": 0, "contacts_false": 0}
+    assert count_contacts(right, wrong) == {"contacts_right": 4, "contacts_missed": 1, "contacts_false": 1}
+    assert count_contacts(right, right) == {"contacts_right": 5, "contacts_missed": 0, "contacts_false": 0}
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial import stages
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.planning import plan
+from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import Recording, observe_recording, record_demonstration, stream
 from apo_bench.trial.trial import nominal_where_seen, run_measured, run_trial
 
@@ -134,7 +134,7 @@ def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None
 def test_a_schedule_is_carried_out_and_counted(scene: Scene, shown: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = observed(scene, shown)
     made = rebuilds(seen)
-    planned = plan(rebuilds, seen, None).plan
+    planned = apply_method(rebuilds, seen, None).plan
     assert planned is not None
     assert planned.schedule == made.schedule
     np.testing.assert_array_equal(planned.targets, made.targets)
@@ -255,21 +255,22 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
 
 
 def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown: Recording) -> None:
-    planned = plan(refuses, observed(scene, shown), shown.layout.goals)
+    planned = apply_method(refuses, observed(scene, shown), shown.layout.goals)
     assert planned.plan is None
-    assert planned.refused is not None
-    assert (planned.refused.stage, planned.refused.code) == ("correct", "not_converged")
-    assert planned.freed == (2, 1)
+    assert planned.failure is not None
+    assert (planned.failure.stage, planned.failure.code) == ("correct", "not_converged")
+    assert planned.correction is not None
+    assert planned.correction.freed == (2, 1)
 
 
 def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: Recording) -> None:
     seen = replace(observed(scene, shown), seen=np.array([True, False, True]))
-    raw = plan("none", seen, shown.layout.goals)
+    raw = apply_method("none", seen, shown.layout.goals)
     assert raw.plan is None
-    assert raw.refused is not None
-    assert (raw.refused.stage, raw.refused.code, raw.refused.operation) == ("observe", "not_seen", 1)
-    assert "operation 2" in raw.refused.sentence
-    oracle = plan("oracle", seen, shown.layout.goals)
+    assert raw.failure is not None
+    assert (raw.failure.stage, raw.failure.code, raw.failure.operation) == ("observe", "not_seen", 1)
+    assert "operation 2" in raw.failure.sentence
+    oracle = apply_method("oracle", seen, shown.layout.goals)
     assert oracle.plan is not None
     np.testing.assert_array_equal(oracle.plan.goals, shown.layout.goals)
 
@@ -302,7 +303,7 @@ def test_noise_reaches_the_robot(scene: Scene, shown: Recording) -> None:
     one, two = (pose.log(pose.inverse(goals[0.0]) @ goals[L]) for L in (1.0, 2.0))
     assert np.abs(one).max() > 1e-4
     np.testing.assert_allclose(two, 2 * one, rtol=1e-6, atol=1e-12)
-    raw = plan("none", observed(scene, shown), None).plan
+    raw = apply_method("none", observed(scene, shown), None).plan
     assert raw is not None
     np.testing.assert_array_equal(raw.goals, goals[1.0])
 
@@ -316,7 +317,7 @@ def test_streams_are_apart_and_the_key_is_seed_and_stage() -> None:
 
 def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: Recording) -> None:
     """The truth varies: a corrector that knows the scenario by heart builds it elsewhere on the table."""
-    planned = plan(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
+    planned = apply_method(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
     assert planned.plan is not None
     assert planned.gap_after_m < 1e-9
     verdict = stages.replay_and_judge(planned.plan, scene, shown.layout.goals).verdict

@@ -20,36 +20,36 @@ from apo_bench.recognition.contacts import Recognised, recognise
 from apo_bench.recognition.thresholds import FIXED_RULES
 
 
-def recognised(seen: Observation, kind: str = "recognised") -> Recognised:
+def recognise_by(observation: Observation, kind: str = "recognised") -> Recognised:
     """The contacts of an observation, found in one of the ways of `RECOGNISED`; its own are not looked at."""
     if kind == "recognised-fixed":
-        return recognise(seen, FIXED_RULES)
-    first = recognise(seen)
-    return first if kind == "recognised" else _again(seen, first)
+        return recognise(observation, FIXED_RULES)
+    first = recognise(observation)
+    return first if kind == "recognised" else _again(observation, first)
 
 
-def understood(seen: Observation, kind: str) -> Observation:
-    """The same observation with the contacts that were recognised."""
-    return replace(seen, assembly=recognised(seen, kind).assembly)
+def with_recognised_contacts(observation: Observation, kind: str) -> Observation:
+    """The observation with the contacts that were recognised in place of its own."""
+    return replace(observation, assembly=recognise_by(observation, kind).assembly)
 
 
-def counted(right: Assembly, told: Assembly) -> dict[str, int]:
-    """How many of the contacts that were told are right, how many were missed, how many are false."""
-    there, named = _contacts(right), _contacts(told)
+def count_contacts(right: Assembly, given: Assembly) -> dict[str, int]:
+    """How many of the contacts that were given are right, how many were missed, how many are false."""
+    true, named = _contacts(right), _contacts(given)
     return {
-        "contacts_right": len(there & named),
-        "contacts_missed": len(there - named),
-        "contacts_false": len(named - there),
+        "contacts_right": len(true & named),
+        "contacts_missed": len(true - named),
+        "contacts_false": len(named - true),
     }
 
 
-def _again(seen: Observation, first: Recognised) -> Recognised:
+def _again(observation: Observation, first: Recognised) -> Recognised:
     """Recognise at the corrected goals; if there is no correction, the first is the last word."""
-    made = correct(replace(seen, assembly=first.assembly), "contact")
-    if not made.ok or made.covariance is None:
+    correction = correct(replace(observation, assembly=first.assembly), "contact")
+    if not correction.ok or correction.covariance is None:
         return first
-    corrected = replace(seen, goals=made.goals, covariance=floored(made.covariance))
-    return recognise(corrected, first_seen=seen.goals)
+    corrected = replace(observation, goals=correction.goals, covariance=floored(correction.covariance))
+    return recognise(corrected, first_seen=observation.goals)
 
 
 def _contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
