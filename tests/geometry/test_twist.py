@@ -45,8 +45,9 @@ def adjoint(T: Array) -> Array:
 @given(SEEDS, ANGLES)
 @settings(max_examples=100, deadline=None)
 def test_the_exponential_is_that_of_poses(seed: int, angle: float) -> None:
+    """Just above 1e-4 rad, 1 - cos in `pose.exp` keeps 1e-16 of 5e-9: up to 1.1e-12 of the length that is moved."""
     xi = twist(seed, angle)
-    assert_allclose(exp_and_jacobian(xi)[0], pose.exp(xi), rtol=0, atol=1e-13)
+    assert_allclose(exp_and_jacobian(xi)[0], pose.exp(xi), rtol=0, atol=2e-12)
 
 
 @given(SEEDS, ANGLES)
