@@ -13,6 +13,7 @@ def mcnemar(only_first: int, only_second: int) -> float:
         only_first: Pairs in which the first alone succeeded.
         only_second: Pairs in which the second alone succeeded.
     """
-    from statsmodels.stats.contingency_tables import mcnemar as test
+    from scipy.stats import binomtest
 
-    return float(test([[0, only_first], [only_second, 0]], exact=True).pvalue)
+    pairs = only_first + only_second
+    return float(binomtest(min(only_first, only_second), pairs, 0.5).pvalue) if pairs else 1.0

@@ -104,9 +104,10 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
     After S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979),
     65-70.
     """
-    from statsmodels.stats.multitest import multipletests
-
-    return dict(zip(p, map(float, multipletests(list(p.values()), method="holm")[1]), strict=True)) if p else {}
+    order = sorted(p, key=lambda test: p[test])
+    raised = np.maximum.accumulate([(len(p) - i) * p[test] for i, test in enumerate(order)])
+    found = dict(zip(order, np.minimum(raised, 1.0).tolist(), strict=True))
+    return {test: found[test] for test in p}
 
 
 def place_of_reference(place: Place, reference: str) -> Place:
