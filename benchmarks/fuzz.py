@@ -254,7 +254,7 @@ def _within(place: Path, arguments: Sequence[str]) -> int:
 
 
 def _read_plan(name: str) -> int:
-    from apo_bench.files.json_forms import read_plan
+    from apo_bench.files.json_reading import read_plan
 
     try:
         read_plan(name)

@@ -54,7 +54,7 @@ def read_observation_file(
     deviation_deg: float = DEVIATION_DEG,
 ) -> ObservationFile:
     """An observation from a file, with its scenario, and whether a standard deviation had to be assumed."""
-    from apo_bench.files import json_forms as files
+    from apo_bench.files import json_reading
     from apo_bench.scenario.file import load_scenario
 
     check_deviations(deviation_mm, deviation_deg)
@@ -62,7 +62,7 @@ def read_observation_file(
         raise InputError(f"{path!r} was given as an observation; give the path of a .csv or .json file.")
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
-        seen, assumed = files.read_json_observed(path, known, (deviation_mm, deviation_deg))
+        seen, assumed = json_reading.read_json_observed(path, known, (deviation_mm, deviation_deg))
         _check_near(path, seen)
     else:
         seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
@@ -76,9 +76,9 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
         InputError: Anything that is not as described, or a standard deviation is missing.
     """
     if Path(path).suffix.lower() != ".csv":
-        from apo_bench.files import json_forms as files
+        from apo_bench.files import json_reading
 
-        observation = files.read_json_observation(path, scenario)
+        observation = json_reading.read_json_observation(path, scenario)
         _check_near(path, observation)
         return observation
     observation, _, assumed = read_observation_file(path, scenario)

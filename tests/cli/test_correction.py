@@ -15,7 +15,8 @@ from apo_bench.assembly.correction_record import Consistency, Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
 from apo_bench.cli import app as cli
-from apo_bench.files.json_forms import observation_form, read_plan, write_form
+from apo_bench.files.json_forms import observation_form, write_form
+from apo_bench.files.json_reading import read_plan
 from apo_bench.files.observation import read_observation
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario, scenario_names

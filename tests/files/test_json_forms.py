@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Step
 from apo_bench.errors import InputError
 from apo_bench.files import json_forms as files
+from apo_bench.files import json_reading
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
@@ -47,7 +48,7 @@ def form() -> dict[str, Any]:
 def read(tmp_path: Path, document: Any, scenario: Scenario | None = SCENARIO) -> Observation:
     path = tmp_path / "seen.json"
     path.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
-    return files.read_json_observation(path, scenario)
+    return json_reading.read_json_observation(path, scenario)
 
 
 @QUICK
@@ -71,7 +72,7 @@ def test_a_demonstration_comes_back(tmp_path: Path) -> None:
     careless[1, 1, 1] = 8e-6
     shown = Demonstration(SCENARIO.assembly, SCENARIO.start, seen.goals, SCENARIO.start, careless, "ok")
     files.write_form(files.demonstration_form(shown, "stick_in_tower"), tmp_path / "shown.json")
-    back = files.read_demonstration(tmp_path / "shown.json")
+    back = json_reading.read_demonstration(tmp_path / "shown.json")
     np.testing.assert_allclose(back.goals, shown.goals, rtol=0, atol=1e-13)
     np.testing.assert_allclose(back.careless, shown.careless, rtol=1e-12, atol=0)
     np.testing.assert_allclose(back.final["stick"], shown.final["stick"], rtol=0, atol=1e-13)
@@ -82,7 +83,7 @@ def test_a_plan_comes_back_with_its_schedule(tmp_path: Path) -> None:
     schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
     plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals, schedule)
     files.write_form(files.plan_form(plan, "stick_in_tower"), tmp_path / "plan.json")
-    back = files.read_plan(tmp_path / "plan.json")
+    back = json_reading.read_plan(tmp_path / "plan.json")
     np.testing.assert_allclose(back.goals, plan.goals, rtol=0, atol=1e-13)
     assert back.schedule == schedule
 
@@ -96,7 +97,7 @@ def test_a_plan_comes_back_with_its_targets(seed: int, tmp_path: Path) -> None:
     form = files.plan_form(plan, "stick_in_tower")
     assert ["position_mm" in entry for entry in form["schedule"]] == [False, True, True, False, False]
     files.write_form(form, tmp_path / "plan.json")
-    back = files.read_plan(tmp_path / "plan.json", SCENARIO)
+    back = json_reading.read_plan(tmp_path / "plan.json", SCENARIO)
     assert back.schedule == schedule
     np.testing.assert_allclose(back.targets, targets, rtol=0, atol=1e-13)
     np.testing.assert_allclose(back.goals, plan.goals, rtol=0, atol=1e-13)
@@ -106,7 +107,7 @@ def test_a_plan_without_a_schedule_does_everything_once(tmp_path: Path) -> None:
     plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
     form = files.plan_form(plan, "stick_in_tower") | {"schedule": []}
     files.write_form(form, tmp_path / "plan.json")
-    back = files.read_plan(tmp_path / "plan.json")
+    back = json_reading.read_plan(tmp_path / "plan.json")
     assert back.schedule == plan.schedule == (Step(0), Step(1), Step(2))
     np.testing.assert_array_equal(back.targets, back.goals)
 
@@ -139,7 +140,7 @@ def test_a_schedule_that_makes_no_sense_is_refused(schedule: Any, words: str, tm
     plan = Plan(SCENARIO.assembly, SCENARIO.start, observation(4).goals)
     files.write_form(files.plan_form(plan, "stick_in_tower") | {"schedule": schedule}, tmp_path / "plan.json")
     with pytest.raises(InputError) as refused:
-        files.read_plan(tmp_path / "plan.json")
+        json_reading.read_plan(tmp_path / "plan.json")
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
 
@@ -181,9 +182,9 @@ def test_a_scenario_file_is_found_beside_the_observation(tmp_path: Path) -> None
 def test_the_scenario_must_be_the_one_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "seen.json"
     path.write_text(json.dumps(form()))
-    assert files.read_json_observation(path, SCENARIO).assembly is SCENARIO.assembly
+    assert json_reading.read_json_observation(path, SCENARIO).assembly is SCENARIO.assembly
     with pytest.raises(InputError, match=r"scenario: .*stick_on_castles.*was given"):
-        files.read_json_observation(path, load_scenario("stick_on_castles"))
+        json_reading.read_json_observation(path, load_scenario("stick_on_castles"))
 
 
 def test_a_scenario_by_name_is_loaded(tmp_path: Path) -> None:
@@ -297,13 +298,13 @@ def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
     second["deviation_mm"] = 3.0
     path = tmp_path / "some.json"
     path.write_text(json.dumps(document), encoding="utf-8-sig")
-    seen, assumed = files.read_json_observed(path, SCENARIO, (2.0, 0.5))
+    seen, assumed = json_reading.read_json_observed(path, SCENARIO, (2.0, 0.5))
     assert assumed
     found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
     np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.5)]])
     np.testing.assert_allclose(found[1, 0], 1e-3 * np.sqrt(first["covariance_mm_deg"][0][0]))
     with pytest.raises(InputError, match="operation 1: state either"):
-        files.read_json_observation(path, SCENARIO)
+        json_reading.read_json_observation(path, SCENARIO)
     second["deviation_deg"] = 200.0
     with pytest.raises(InputError, match=r"a standard deviation from 0.0001 to 180 is needed"):
         read(tmp_path, document | {"operations": [*form()["operations"][:2], second]})
@@ -311,12 +312,12 @@ def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.json: the JSON file cannot be read"):
-        files.read_json_observation(tmp_path / "none.json")
+        json_reading.read_json_observation(tmp_path / "none.json")
     with pytest.raises(InputError, match="a folder was given"):
-        files.read_json_observation(tmp_path)
+        json_reading.read_json_observation(tmp_path)
     (tmp_path / "latin.json").write_bytes(b"\xe4")
     with pytest.raises(InputError, match="not UTF-8"):
-        files.read_json_observation(tmp_path / "latin.json")
+        json_reading.read_json_observation(tmp_path / "latin.json")
     with pytest.raises(InputError, match="cannot be written"):
         files.write_form({}, tmp_path / "no" / "where.json")
 

@@ -10,6 +10,7 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.files import json_forms as files
+from apo_bench.files import json_reading
 from apo_bench.files.csv_form import read_table, table
 from apo_bench.files.observation import as_planned, read_observation
 from apo_bench.scenario.file import load_scenario
@@ -68,9 +69,9 @@ def test_play_in_json_and_without(tmp_path: Path) -> None:
     form = files.observation_form(seen, "stick_in_tower")
     assert form["play_mm"] == pytest.approx(0.3)
     files.write_form(form, path)
-    for read in (files.read_json_observation, read_observation):
+    for read in (json_reading.read_json_observation, read_observation):
         assert read(path, SCENARIO).play_m == pytest.approx(0.3e-3)
     del form["play_mm"]
     files.write_form(form, path)
-    for read in (files.read_json_observation, read_observation):
+    for read in (json_reading.read_json_observation, read_observation):
         assert read(path, SCENARIO).play_m == pytest.approx(0.4e-3)

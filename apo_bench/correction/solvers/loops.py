@@ -26,7 +26,7 @@ _Index = NDArray[np.intp]
 _Words = tuple[_Index, _Index, _Index]
 """Letters, columns and inverse (0 or 1) of `CompactEquations`, each (c, w)."""
 _Rule = tuple[int, float, float, float, float, float, float, float]
-"""TURNS, STEP, SURE, DAMPING, FALL, FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
+"""MOST_TURNS, STEP, SURE, DAMPING, FALL, SQUARED_GAP_FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
 _SHORT = 9
 """Terms of the series of exp that are enough below one radian."""
 

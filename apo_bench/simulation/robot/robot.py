@@ -1,7 +1,7 @@
 """The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
 
 The controller knows what it commanded, its own joint and finger positions and the force on the part in its hand. It
-never reads where a part is.
+never reads where a part is. It is one class, longer than most: to follow, to feel and to look share every step.
 """
 
 from __future__ import annotations

@@ -1,0 +1,213 @@
+"""Demonstrations, observations and plans from their JSON forms, which `json_forms` describes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
+from apo_bench.assembly.schedule import REMEDY, schedule_fault
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError, unknown
+from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
+from apo_bench.files.json_forms import DEMONSTRATION, OBSERVATION, PLAN
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.strict_json import JsonNode, read_json
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Scenario
+
+_DEVIATIONS = ("deviation_mm", "deviation_deg")
+_POSE = ("position_mm", "quaternion_wxyz")
+_TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
+
+
+def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> Demonstration:
+    """A demonstration from its file; see `read_json_observation` for `scenario` and errors."""
+    root = _root(path, DEMONSTRATION, ("start", "operations", "final", "code"), ())
+    found = _scenario(root["scenario"], scenario, Path(path).parent)
+    entries = _operations(root["operations"], found.assembly, ("careless_mm_deg",), ())
+    return Demonstration(
+        assembly=found.assembly,
+        start=_poses(root["start"], found),
+        goals=np.array([_pose(entry) for entry in entries]),
+        final=_poses(root["final"], found),
+        careless=np.array([_covariance(entry["careless_mm_deg"], definite=False) for entry in entries]),
+        code=root["code"].text(),
+        gap_m=found.gap_mm * 1e-3,
+        play_m=found.clearance_mm * 1e-3,
+    )
+
+
+def read_json_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
+    """An observation from its file, measured or written by `write_form`.
+
+    `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`) and `seen`
+    (default: true) may be left out. Instead of `covariance_mm_deg`, `deviation_mm` and `deviation_deg` state one
+    standard deviation for the three directions and one for the three turns.
+
+    Args:
+        scenario: The scenario the file must be of; by default the one it names, where a relative path to a
+            `.toml` file counts from the folder of the file.
+
+    Raises:
+        InputError: Anything in the file that is not as described, naming file and key.
+    """
+    return read_json_observed(path, scenario, None)[0]
+
+
+def read_json_observed(
+    path: str | Path, scenario: Scenario | None, assumed: tuple[float, float] | None
+) -> tuple[Observation, bool]:
+    """An observation from its file, and whether a standard deviation had to be assumed.
+
+    Args:
+        assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.
+    """
+    root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm", "play_mm"))
+    found = _scenario(root["scenario"], scenario, Path(path).parent)
+    stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
+    entries = _operations(root["operations"], found.assembly, (), stated)
+    observation = Observation(
+        assembly=found.assembly,
+        start=_poses(root["start"], found) if "start" in root else _own_start(found),
+        goals=np.array([_pose(entry) for entry in entries]).reshape(-1, 4, 4),
+        covariance=np.array([_stated(entry, assumed) for entry in entries]).reshape(-1, 6, 6),
+        seen=np.array([entry["seen"].flag() if "seen" in entry else True for entry in entries]),
+        gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else found.gap_mm * 1e-3,
+        play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
+    )
+    complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
+    return observation, not complete
+
+
+def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
+    """A plan from its file; see `read_json_observation` for `scenario` and errors."""
+    root = _root(path, PLAN, ("start", "operations", "schedule"), ())
+    found = _scenario(root["scenario"], scenario, Path(path).parent)
+    goals = np.array([_pose(entry) for entry in _operations(root["operations"], found.assembly, (), ())])
+    steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]
+    schedule = tuple(step for step, _ in steps)
+    if steps and (wrong := schedule_fault(schedule, len(goals))):
+        raise InputError(f"{path}, schedule: it {wrong}; {REMEDY}.")
+    targets = np.array([T for _, T in steps] or goals)
+    return Plan(found.assembly, _poses(root["start"], found), goals, schedule, targets)
+
+
+def _own_start(scenario: Scenario) -> Poses:
+    """Where the scenario's parts start, those with clearance let down to rest."""
+    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
+
+
+def _root(
+    path: str | Path, schema: str, required: tuple[str, ...], optional: tuple[str, ...]
+) -> Mapping[str, JsonNode]:
+    document = read_json(path)
+    if isinstance(document.value, dict) and "schema" in document.value and document.value["schema"] != schema:
+        document.child(document.value["schema"], "schema").fail(f'"{schema}" is needed')
+    return document.fields(("schema", "scenario", *required), optional)
+
+
+def _scenario(node: JsonNode, given: Scenario | None, folder: Path) -> Scenario:
+    from apo_bench.scenario.file import load_scenario
+
+    name = node.text()
+    if given is not None:
+        if Path(name).stem != given.name:
+            node.fail(
+                f'the scenario "{given.name}" was asked for', "give the file of that scenario, or ask for its own"
+            )
+        return given
+    return load_scenario(folder / name if name.endswith(".toml") or "/" in name else name)
+
+
+def _operations(
+    node: JsonNode, assembly: Assembly, required: tuple[str, ...], optional: tuple[str, ...]
+) -> list[Mapping[str, JsonNode]]:
+    entries = [
+        entry.fields(("operation", "part", *_POSE, *required), optional)
+        for entry in node.items("operation", len(assembly))
+    ]
+    for k, (entry, operation) in enumerate(zip(entries, assembly.operations, strict=True)):
+        if entry["operation"].integer() != k + 1:
+            entry["operation"].fail(f"{k + 1} is needed", "the operations stand in order, numbered from 1")
+        if entry["part"].text() != operation.main:
+            entry["part"].fail(f'"{operation.main}" is needed', "it is the part that this operation moves")
+    return entries
+
+
+def _pose(fields: Mapping[str, JsonNode]) -> Array:
+    position, q = fields["position_mm"].numbers(3), fields["quaternion_wxyz"].numbers(4)
+    if abs(np.linalg.norm(q) - 1.0) > 1e-3:
+        fields["quaternion_wxyz"].fail("a quaternion of length 1 (within 0.001) is needed", "divide it by its length")
+    return pose.unpack(np.concatenate([position * 1e-3, q]))
+
+
+def _poses(node: JsonNode, scenario: Scenario) -> Poses:
+    parts = tuple(scenario.assembly.solids)
+    for part in node.value if isinstance(node.value, dict) else ():
+        if part not in parts:
+            raise InputError(f"{node.file}, {node.key}: {unknown('part', part, parts)}")
+    fields = node.fields(parts)
+    return {part: _pose(fields[part].fields(_POSE)) for part in parts}
+
+
+def _covariance(node: JsonNode, *, definite: bool = True) -> Array:
+    C = node.numbers(6, 6)
+    largest = float(np.abs(C).max())
+    if np.abs(C - C.T).max() > 1e-9 * largest:
+        node.fail("a symmetric 6 x 6 matrix is needed", "entry (i, j) must equal entry (j, i)")
+    lowest = float(np.linalg.eigvalsh((C + C.T) / 2)[0])
+    if definite and lowest <= 1e-15 * largest:
+        node.fail("a positive definite 6 x 6 matrix is needed", "every variance must be above 0 and consistent")
+    if not definite and lowest < -1e-9 * largest:
+        node.fail("a positive semidefinite 6 x 6 matrix is needed", "no variance may be negative")
+    return (C + C.T) / 2 / np.outer(_TO_MM_DEG, _TO_MM_DEG)
+
+
+def _stated(entry: Mapping[str, JsonNode], assumed: tuple[float, float] | None) -> Array:
+    """The covariance of an operation, (6, 6) [m, rad], out of either way to state it, or of what is assumed."""
+    by_deviation = [key for key in _DEVIATIONS if key in entry]
+    if "covariance_mm_deg" in entry and not by_deviation:
+        C = _covariance(entry["covariance_mm_deg"])
+        if not is_sensible(C):
+            node = entry["covariance_mm_deg"]
+            raise InputError(
+                f"{node.file}, {node.key}: the square root of a variance is out of range; {ALLOWED_DEVIATIONS}."
+            )
+        return C
+    if "covariance_mm_deg" in entry or (assumed is None and len(by_deviation) != 2):
+        node = entry["operation"]
+        raise InputError(
+            f"{node.file}, {node.key.removesuffix(', operation')}: state either 'covariance_mm_deg' or both "
+            f"'deviation_mm' and 'deviation_deg', {_named(entry, by_deviation)} was given."
+        )
+    mm, deg = assumed or (0.0, 0.0)
+    mm = _deviation(entry["deviation_mm"], SHIFT_M, 1e-3) if "deviation_mm" in entry else mm
+    deg = _deviation(entry["deviation_deg"], TURN_RAD, np.pi / 180.0) if "deviation_deg" in entry else deg
+    return np.diag(np.array([mm] * 3 + [deg] * 3) / _TO_MM_DEG) ** 2
+
+
+def _deviation(node: JsonNode, limits: tuple[float, float], unit: float) -> float:
+    x = node.number(0.0, above=True)
+    if not is_within(x * unit, limits):
+        node.fail(f"a standard deviation from {limits[0] / unit:g} to {limits[1] / unit:g} is needed")
+    return x
+
+
+def _named(entry: Mapping[str, JsonNode], by_deviation: list[str]) -> str:
+    given = [key for key in ("covariance_mm_deg", *by_deviation) if key in entry]
+    return " with ".join(f"'{key}'" for key in given) or "neither"
+
+
+def _step(node: JsonNode, goals: Array) -> tuple[Step, Array]:
+    """A step of the schedule and its target, which is the goal of its operation if none is stated."""
+    stated = isinstance(node.value, dict) and any(key in node.value for key in _POSE)
+    fields = node.fields(("operation", *_POSE) if stated else ("operation",), ("undo",) if stated else ("undo", *_POSE))
+    number = fields["operation"].integer()
+    if not 1 <= number <= len(goals):
+        fields["operation"].fail(f"an operation from 1 to {len(goals)} is needed")
+    step = Step(number - 1, fields["undo"].flag() if "undo" in fields else False)
+    return step, _pose(fields) if stated else goals[step.operation]
