@@ -22,7 +22,7 @@ MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test numeric docs lowest clean
+.PHONY: sweep headline test test-extras numeric docs lowest clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
@@ -40,8 +40,12 @@ test: $(VENV)/.installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mkdocs --quiet build --strict --site-dir build/site
-	$(BIN)/pytest -q -n 2 --dist worksteal
+	$(BIN)/pytest -q -n 2 --dist worksteal -m "not extras"
 	$(NUMERIC)
+
+# the tests that start a Ray cluster
+test-extras: $(VENV)/.installed-dev
+	$(BIN)/pytest -q -m extras $$(grep -rl pytest.mark.extras tests --include=test_*.py)
 
 # the tests marked numeric, under every other kernel of OpenBLAS, NumPy and Numba that the processor allows
 numeric: $(VENV)/.installed-dev

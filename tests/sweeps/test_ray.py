@@ -147,7 +147,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     return lines(out)
 
 
-@pytest.mark.slow
+@pytest.mark.extras
 def test_a_node_that_is_lost_costs_no_row_and_changes_none(cluster: Any, here: list[bytes], tmp_path: Path) -> None:
     second = next(node for node in cluster.list_all_nodes() if node is not cluster.head_node)
     rows_then = []
@@ -170,7 +170,7 @@ def test_a_node_that_is_lost_costs_no_row_and_changes_none(cluster: Any, here: l
     assert all({"host", "worker", "trial_s"} <= set(entry) for entry in timing)
 
 
-@pytest.mark.slow
+@pytest.mark.extras
 def test_a_driver_that_is_stopped_or_killed_goes_on_later(cluster: Any, here: list[bytes], tmp_path: Path) -> None:
     out = tmp_path / "run"
     asked = ["--levels", "1", "--careless", "0", "--methods", "none,paper", "--trials", "5", "--out", str(out)]
@@ -204,7 +204,7 @@ def test_a_driver_that_is_stopped_or_killed_goes_on_later(cluster: Any, here: li
     assert lines(out) == here
 
 
-@pytest.mark.slow
+@pytest.mark.extras
 def test_a_trial_that_ends_its_worker_or_hangs_is_one_failed_row(cluster: Any, own: Path) -> None:
     """And files of the current folder, with what they import, travel to the nodes."""
     methods = tuple(f"code_of_mine:{name}" for name in ("dies", "raises", "hangs"))
@@ -230,7 +230,7 @@ def test_a_trial_that_ends_its_worker_or_hangs_is_one_failed_row(cluster: Any, o
     assert not any(row["success"] for row in rows)
 
 
-@pytest.mark.slow
+@pytest.mark.extras
 def test_nodes_with_other_packages_or_code_are_refused(cluster: Any) -> None:
     work, lock = lock_of(SPEC)
     other = replace(lock, versions={**lock.versions, "mujoco": "3.0.0"})
