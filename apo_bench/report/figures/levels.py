@@ -181,6 +181,6 @@ def _lines(
 
 def _power(k: int) -> str:
     """`0.01`, or `10⁻⁴`."""
-    if -2 <= k <= 3:
+    if -3 <= k <= 3:
         return f"{10.0**k:g}"
     return "10" + str(k).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

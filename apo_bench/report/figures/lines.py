@@ -96,20 +96,16 @@ def _sample(style: Style) -> Callable[[Any], None]:
 
 
 def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
-    axis.spines[:].set_visible(False)
-    if x.logarithmic:
-        axis.set_xscale("log")
-    if y.logarithmic:
-        axis.set_yscale("log")
+    for name, one in (("x", x), ("y", y)):
+        if one.logarithmic:
+            axis.set(**{f"{name}scale": "log"})
+            getattr(axis, f"{name}axis").set_ticks([], minor=True)
     axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
     crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
     for side, ticks, size in ((axis.xaxis, x.ticks, 8 if crowded else 10), (axis.yaxis, y.ticks, 10)):
-        side.set_ticks([at for at, _ in ticks], [label for _, label in ticks], fontsize=size, color=INK)
-        side.set_ticks([], minor=True)
-    axis.tick_params(length=0)
+        side.set_ticks([at for at, _ in ticks], [label for _, label in ticks], fontsize=size)
     axis.hlines([at for at, _ in y.ticks], x.low, x.high, color=RULE, linewidth=1, zorder=0)
-    axis.set_xlabel(x.label, color=INK)
-    axis.set_ylabel(y.label, color=INK)
+    axis.set(xlabel=x.label, ylabel=y.label)
 
 
 def _band(axis: Any, line: Line) -> None:
