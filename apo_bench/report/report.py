@@ -46,12 +46,8 @@ PNG = ("success_over_level", "success_over_tightness", "recognised")
 """Figures that are also kept as PNG."""
 FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confusion", "times")
 """Tables that are also kept as files; those of the last two kinds, and what was recognised, if there is any."""
-OURS = (
-    *("recognised.csv", "recognised.parquet", "times.csv", "times.parquet", "recognised.png", "recognised.svg"),
-    *("success_over_level.png", "success_over_level.svg", "success_over_tightness.png", "success_over_tightness.svg"),
-    *("failure_stages.svg", "gap_before_and_after.svg", "prediction.svg", "timing.svg"),
-)
-"""Files that not every report has."""
+OURS = (*FILES, *PNG, "failure_stages", "gap_before_and_after", "prediction", "timing")
+"""Names of our tables and figures, without endings; `difference_to_..` is ours too."""
 PAGE, TABLES, FIGURES, ROWS = "report.html", "tables", "figures", "rows.parquet"
 
 
@@ -175,7 +171,7 @@ def _written(folder: Path, rows: Sequence[Row], verdict: str, found: Summary, fa
 def _remove_older(folder: Path) -> None:
     """What an earlier report wrote and this one may not: nothing beside the page shall be of other rows."""
     for path in (*(folder / TABLES).glob("*"), *(folder / FIGURES).glob("*")):
-        if path.name in OURS or (path.name.startswith("difference_to_") and path.suffix == ".svg"):
+        if path.stem in OURS or (path.name.startswith("difference_to_") and path.suffix == ".svg"):
             path.unlink()
 
 
