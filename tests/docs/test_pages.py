@@ -103,6 +103,10 @@ def test_each_reason_not_to_run_a_command_is_of_a_command() -> None:
     assert [how for how in PARSED_ONLY if not any(re.match(how, " ".join(line.words)) for line in LINES)] == []
 
 
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
 def sessions() -> Iterator[tuple[Path, list[Block | Line]]]:
     """What is run of each page, in its order."""
     before: set[object] = set()
