@@ -64,26 +64,30 @@ class SettingInfo:
     def is_text(self) -> bool:
         return getattr(self.kind, "__origin__", self.kind) is str
 
+    @property
+    def is_whole(self) -> bool:
+        return getattr(self.kind, "__origin__", self.kind) is int
+
 
 def about(help: str = "", **more: Any) -> Mapping[str, Any]:
     """The metadata of a field that is a setting; `more` as in `SettingInfo`."""
     return {"info": SettingInfo(help, **more)}
 
 
-def check_value(info: SettingInfo, value: object) -> None:
-    """Raise an `InputError` unless a setting may be this; nothing is asked of one that is not `called` anything."""
+def check_value(info: SettingInfo, value: object, called: str = "", meaning: str = "") -> None:
+    """Raise an `InputError` unless a setting may be this; nothing is asked of one that is not `called` anything.
+
+    Args:
+        called, meaning: In place of those of the setting.
+    """
     if info.choices:
         if not isinstance(value, str) or value not in info.choices:
             raise InputError(unknown(info.called, str(value), info.choices))
-    elif info.called and info.kind.__origin__ is int:
-        low, high = info.range
-        if not (isinstance(value, Integral) and low <= int(value) <= high):
-            raise InputError(f"a {info.called} of {value} was given; whole numbers from {low} to {high} are allowed.")
     elif info.called:
-        low, high = info.range
+        (low, high), name = info.range, called or info.called
         number = float(value) if isinstance(value, Real) else math.nan
+        if info.is_whole and not (isinstance(value, Integral) and low <= number <= high):
+            raise InputError(f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.")
         if not low <= number <= high:
-            given = f"{number:g}" if isinstance(value, Real) else repr(value)
-            raise InputError(
-                f"a {info.called} of {given} was given; a number from {low:g} to {high:g} is allowed, {info.meaning}."
-            )
+            given, why = f"{number:g}" if isinstance(value, Real) else repr(value), meaning or info.meaning
+            raise InputError(f"a {name} of {given} was given; a number from {low:g} to {high:g} is allowed, {why}.")

@@ -231,9 +231,7 @@ def check(name: str, value: object, eye: str = "noise", called: str = "") -> Non
         eye: What levels are of.
         called: What to call it, if not as usual.
     """
-    info = SETTINGS[name]
-    meaning = _PER_RAY if name == "level_mm" and eye == RANGE else info.meaning
-    check_value(replace(info, meaning=meaning, called=called or info.called), value)
+    check_value(SETTINGS[name], value, called, _PER_RAY if name == "level_mm" and eye == RANGE else "")
 
 
 def check_together(fidelity: str, *grasps: str) -> None:
