@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.setting_options import ScenarioArgument
 
 NO_RESULT = 1
 
@@ -19,7 +20,7 @@ def register(app: typer.Typer) -> None:
 
 
 def eye(
-    scenario: Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")],
+    scenario: ScenarioArgument,
     level: Annotated[float, typer.Option(help="Standard deviation of one ray, mm.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Which demonstration.")] = 0,
     careless: Annotated[float, typer.Option(help="0 is a careful human, 1 the scenario's.")] = 1.0,

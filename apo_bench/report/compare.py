@@ -14,7 +14,7 @@ from apo_bench.records.report_rows import NUMBERS, report_rows
 from apo_bench.records.row import Row
 from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import one_salt, with_salt
-from apo_bench.records.settings import ROW
+from apo_bench.records.settings import ROW, SETTINGS
 from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
@@ -299,6 +299,6 @@ def _said(side: Side) -> dict[str, Any]:
                 said |= {f"{name} {i}: {key}": x for key, x in inner.items()}
         else:
             said[name] = value
-    for name in ("schema", "fidelity", "arm", "timestep_s"):
+    for name in ("schema", *(info.column for info in SETTINGS.values() if info.shared)):
         said[f"rows: {name}"] = sorted(set(map(itemgetter(name), side.rows)))
     return said

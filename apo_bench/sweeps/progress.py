@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from typing import Any, final
 
 from apo_bench.io.plain_text import clean
+from apo_bench.records.key import KEY
 from apo_bench.records.row import Row, look_up
 
 Count = Callable[[Row], None]
 """Takes every row as it comes."""
-BESIDE = ("scenario", "clearance_mm", "grasp", "noise", "relations", "careless", "method")
+BESIDE = tuple(column for column in KEY if column not in ("seed", "level", "level_deg"))
 """What tells the lines of the table apart; its columns are levels."""
 FRAME = 6
 """Lines of the terminal that are not cells: the bar, the head, a line for what does not fit."""

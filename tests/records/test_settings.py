@@ -6,6 +6,7 @@ import json
 import shutil
 import sys
 from dataclasses import asdict, fields
+from inspect import signature
 from pathlib import Path
 from typing import get_type_hints
 
@@ -13,6 +14,7 @@ import pytest
 
 from apo_bench.cli import app as cli
 from apo_bench.cli.setting_options import sweep_options, trial_options
+from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError
 from apo_bench.records.asked import asked, settings_of
 from apo_bench.records.key import KEY
@@ -52,6 +54,14 @@ def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
     options = {option.name for option in trial_options()}
     assert options == {info.keyword for info in SETTINGS.values() if info.name != "scenario"} | {"level"}
     assert {"levels", "methods", "clearance", "timestep_ms", "fidelity"} < {option.name for option in sweep_options()}
+
+
+def test_the_environment_has_the_same_defaults() -> None:
+    defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
+    here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
+    assert here == ["careless", "eye", "grasp", "arm", "timestep_s"]
+    assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
+    assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
 
 
 def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:

@@ -13,7 +13,8 @@ from markupsafe import Markup
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.replay_command import Files, without_seed
 from apo_bench.records.report_rows import NUMBERS
-from apo_bench.records.row import Row
+from apo_bench.records.row import Row, look_up
+from apo_bench.records.settings import SETTINGS
 from apo_bench.statistics.rates import Cell, by_place
 from apo_bench.statistics.settings import at
 
@@ -21,10 +22,7 @@ FAILED, RIGHT, LOOSE, EXCLUDED = "failed", "right", "loosely right", "excluded"
 OTHERWISE = "right, not as demonstrated"
 DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_seconds": 1}
 """Of numbers; of those in mm and degrees, and of others, three."""
-ASKED = (
-    *("scenario", "level", "level_deg", "careless", "clearance_mm", "eye", "noise", "grasp", "arm", "relations"),
-    *("method", "timestep_s", "fidelity"),
-)
+ASKED = tuple(info.column for name, info in SETTINGS.items() if name not in ("seed", "salt"))
 """What commands of trials differ in, but for seeds and for what was lost."""
 
 
@@ -51,7 +49,7 @@ def trials(
         seeds = groups[at(cell)]
         for seed in sorted(seeds):
             row = seeds[seed]
-            asked = (*(row.get(name) for name in ASKED), row.get("failure_stage") == "worker")
+            asked = (*(look_up(row, name) for name in ASKED), row.get("failure_stage") == "worker")
             if asked not in commands:
                 commands[asked] = without_seed(row, files, limits)
             said = {
