@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
-MOST = 20
+_MOST = 20
 """A longer list of names helps nobody."""
-LONGEST = 200
+_LONGEST = 200
 """So much of a name that is not known is said again."""
 
 
@@ -21,9 +21,9 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     names = sorted(allowed)
     near = get_close_matches(given, names, n=1, cutoff=0.5)
     hint = f"; did you mean '{near[0]}'?" if near else "."
-    shown = names if len(names) <= MOST else get_close_matches(given, names, n=MOST, cutoff=0.3)
+    shown = names if len(names) <= _MOST else get_close_matches(given, names, n=_MOST, cutoff=0.3)
     more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
-    return f"unknown {kind} '{given[:LONGEST]}'{hint} Known: {', '.join(shown) or 'none'}{more}."
+    return f"unknown {kind} '{given[:_LONGEST]}'{hint} Known: {', '.join(shown) or 'none'}{more}."
 
 
 def failed(what: str, error: Exception) -> InputError:

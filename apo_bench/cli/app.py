@@ -43,7 +43,7 @@ app = typer.Typer(
 )
 
 WRONG_REQUEST = 2
-INTERRUPTED = 130
+_INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
     except (Interrupted, KeyboardInterrupt) as error:
-        return _complain(str(error) or "interrupted.", getattr(error, "code", INTERRUPTED))
+        return _complain(str(error) or "interrupted.", getattr(error, "code", _INTERRUPTED))
     except (RuntimeError, streams.Unusable) as error:
         return _complain(str(error), NO_RESULT)
     except MemoryError:
@@ -73,8 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not hasattr(error, "format_message"):
             raise
         return _complain(" ".join(error.format_message().split()), WRONG_REQUEST)
-    if code == INTERRUPTED:  # what the command line library makes of Ctrl-C
-        return _complain("interrupted.", INTERRUPTED)
+    if code == _INTERRUPTED:  # what the command line library makes of Ctrl-C
+        return _complain("interrupted.", _INTERRUPTED)
     return int(code or 0)
 
 

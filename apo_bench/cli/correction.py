@@ -15,14 +15,14 @@ from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
 
-NO_RESULT = 1
-EXACT_M = 1e-9
+_NO_RESULT = 1
+_EXACT_M = 1e-9
 """Contacts that hold this well are a solution, at which a rank can be read off."""
-DOUBTS = ("apply", "warn", "refuse", "drop")
+_DOUBTS = ("apply", "warn", "refuse", "drop")
 
-DeviationMm = Annotated[float, typer.Option(help="Standard deviation of what was seen, mm, where none is stated.")]
-DeviationDeg = Annotated[float, typer.Option(help="The same in degrees.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+_DeviationMm = Annotated[float, typer.Option(help="Standard deviation of what was seen, mm, where none is stated.")]
+_DeviationDeg = Annotated[float, typer.Option(help="The same in degrees.")]
+_AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -36,10 +36,10 @@ def explain(
     observation: Annotated[
         Path | None, typer.Option(help="At the corrected goals of this .json or .csv; default: the nominal ones.")
     ] = None,
-    deviation_mm: DeviationMm = 1.0,
-    deviation_deg: DeviationDeg = 1.0,
+    deviation_mm: _DeviationMm = 1.0,
+    deviation_deg: _DeviationDeg = 1.0,
     out: Annotated[Path | None, typer.Option(help="Draw the free directions into this file: .png.")] = None,
-    as_json: AsJson = False,
+    as_json: _AsJson = False,
 ) -> None:
     """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
     from apo_bench.correction.correctors import correct as corrected
@@ -84,10 +84,10 @@ def correct(
     if_doubtful: Annotated[
         str | None, typer.Option(help="If the test fails: apply, warn, refuse or drop; default: warn.")
     ] = None,
-    deviation_mm: DeviationMm = 1.0,
-    deviation_deg: DeviationDeg = 1.0,
+    deviation_mm: _DeviationMm = 1.0,
+    deviation_deg: _DeviationDeg = 1.0,
     out: Annotated[Path | None, typer.Option(help="Write the corrected goals: a plan .json, or .csv.")] = None,
-    as_json: AsJson = False,
+    as_json: _AsJson = False,
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
     from apo_bench.correction.own_code.own import correct_named
@@ -123,7 +123,7 @@ def correct(
     if not made.ok:
         if out is not None:
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
-        raise typer.Exit(NO_RESULT)
+        raise typer.Exit(_NO_RESULT)
     if out is not None:
         _write(out, scenario, loaded.name, seen, made)
         if not as_json:
@@ -136,7 +136,7 @@ def _explained(seen: Observation, made: Correction) -> Any:
     from apo_bench.correction.explanation import explain as explained
     from apo_bench.correction.posterior import LARGEST_POSTERIOR
 
-    if not made.ok or 6 * len(made.goals) > LARGEST_POSTERIOR or gap_of(seen, made.goals, made.dropped) > EXACT_M:
+    if not made.ok or 6 * len(made.goals) > LARGEST_POSTERIOR or gap_of(seen, made.goals, made.dropped) > _EXACT_M:
         return None
     return explained(seen, made.goals, made.dropped)
 
@@ -145,8 +145,8 @@ def _corrector(method: str, doubt: str | None) -> Any:
     """The corrector `contact` with what it is to do in doubt, or any other by its name."""
     from apo_bench.correction.contact import ContactCorrector, Doubt
 
-    if doubt is not None and doubt not in DOUBTS:
-        raise InputError(f"--if-doubtful {doubt} was given; {', '.join(DOUBTS[:-1])} or {DOUBTS[-1]} is allowed.")
+    if doubt is not None and doubt not in _DOUBTS:
+        raise InputError(f"--if-doubtful {doubt} was given; {', '.join(_DOUBTS[:-1])} or {_DOUBTS[-1]} is allowed.")
     if method == "contact":
         return ContactCorrector(cast(Doubt, doubt or "warn"))
     if doubt is not None:

@@ -10,10 +10,10 @@ import typer
 from apo_bench.cli.arguments import check_writable
 from apo_bench.errors import InputError
 
-NO_RESULT = 1
-HELP = "Noise models: list, cards, fits to measured poses."
-NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
-noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=HELP)
+_NO_RESULT = 1
+_HELP = "Noise models: list, cards, fits to measured poses."
+_NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
+noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=_HELP)
 
 
 def register(app: typer.Typer) -> None:
@@ -42,7 +42,7 @@ def list_models() -> None:
 
 @noise.command()
 def card(
-    name: Annotated[str, typer.Argument(help=NAME)],
+    name: Annotated[str, typer.Argument(help=_NAME)],
     level: Annotated[
         float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
     ] = 1.0,
@@ -63,7 +63,7 @@ def card(
         return
     if not len(drawn.errors):
         typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
-        raise typer.Exit(NO_RESULT)
+        raise typer.Exit(_NO_RESULT)
     try:
         draw_histogram(drawn, out)
     except OSError as error:

@@ -11,24 +11,24 @@ import typer
 from apo_bench.cli.arguments import numbers
 from apo_bench.errors import InputError
 
-HELP = "How many trials it takes: for a rate, for a difference, for no loss; and what so many can show."
-QUESTIONS = """How many trials does it take?
+_HELP = "How many trials it takes: for a rate, for a difference, for no loss; and what so many can show."
+_QUESTIONS = """How many trials does it take?
   apo-bench power rate --rate 0.9 --half-width 0.05     for a success rate, known to 5 points to either side
   apo-bench power pairs --win 0.1 --lose 0.02           to show which of two methods is better, over the same seeds
   apo-bench power margin --margin 0.03                  to show that a method is not worse by 3 points
   apo-bench power shows --trials 100                    what so many can show"""
-SCHEMA = "apo-bench/power/1"
-power = typer.Typer(add_completion=False, rich_markup_mode=None, help=HELP)
+_SCHEMA = "apo-bench/power/1"
+power = typer.Typer(add_completion=False, rich_markup_mode=None, help=_HELP)
 
-Power = Annotated[float, typer.Option(help="How often it shall be shown if it is so.")]
-Win = Annotated[float | None, typer.Option(help="Share of the seeds at which the method alone is right.")]
-Lose = Annotated[float | None, typer.Option(help="Share of the seeds at which the reference alone is right.")]
-Rates = Annotated[str | None, typer.Option(help="Instead: the two success rates, as 0.95,0.85.")]
-Agree = Annotated[
+_Power = Annotated[float, typer.Option(help="How often it shall be shown if it is so.")]
+_Win = Annotated[float | None, typer.Option(help="Share of the seeds at which the method alone is right.")]
+_Lose = Annotated[float | None, typer.Option(help="Share of the seeds at which the reference alone is right.")]
+_Rates = Annotated[str | None, typer.Option(help="Instead: the two success rates, as 0.95,0.85.")]
+_Agree = Annotated[
     float | None, typer.Option(help="With --rates: share of the seeds at which both end alike; default: by chance.")
 ]
-Comparisons = Annotated[int, typer.Option(help="How many such tests the report makes; each is held to its share.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+_Comparisons = Annotated[int, typer.Option(help="How many such tests the report makes; each is held to its share.")]
+_AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -40,14 +40,14 @@ def register(app: typer.Typer) -> None:
 def _without_command(context: typer.Context) -> None:
     """List the questions that can be asked."""
     if context.invoked_subcommand is None:
-        typer.echo(QUESTIONS)
+        typer.echo(_QUESTIONS)
 
 
 @power.command()
 def rate(
     half_width: Annotated[float, typer.Option(help="Half the width that the 95 % interval may have, as 0.05.")],
     rate: Annotated[float, typer.Option(help="The success rate that is expected; 0.5 takes most.")] = 0.5,
-    as_json: AsJson = False,
+    as_json: _AsJson = False,
 ) -> None:
     """Trials for a success rate: until Wilson's 95 % interval is narrow enough."""
     from apo_bench.statistics.power import rate_trials, wilson_half_width
@@ -64,13 +64,13 @@ def rate(
 
 @power.command()
 def pairs(
-    win: Win = None,
-    lose: Lose = None,
-    rates: Rates = None,
-    agree: Agree = None,
-    power: Power = 0.8,
-    comparisons: Comparisons = 1,
-    as_json: AsJson = False,
+    win: _Win = None,
+    lose: _Lose = None,
+    rates: _Rates = None,
+    agree: _Agree = None,
+    power: _Power = 0.8,
+    comparisons: _Comparisons = 1,
+    as_json: _AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until McNemar's exact test shows which one is better."""
     from apo_bench.statistics.power import ERROR, paired_power, paired_trials
@@ -90,12 +90,12 @@ def pairs(
 @power.command()
 def margin(
     margin: Annotated[float, typer.Option(help="By how much the method may not be worse, as 0.03.")],
-    win: Win = None,
-    lose: Lose = None,
-    rates: Rates = None,
-    agree: Agree = None,
-    power: Power = 0.8,
-    as_json: AsJson = False,
+    win: _Win = None,
+    lose: _Lose = None,
+    rates: _Rates = None,
+    agree: _Agree = None,
+    power: _Power = 0.8,
+    as_json: _AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until Tango's 95 % interval shows that one is not worse by a margin."""
     from apo_bench.statistics.power import margin_power, margin_trials
@@ -116,9 +116,9 @@ def margin(
 @power.command()
 def shows(
     trials: Annotated[int, typer.Option(help="Seeds per cell, the same for every method.")],
-    power: Power = 0.8,
-    comparisons: Comparisons = 1,
-    as_json: AsJson = False,
+    power: _Power = 0.8,
+    comparisons: _Comparisons = 1,
+    as_json: _AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
     from apo_bench.statistics.power import evidence
@@ -172,4 +172,4 @@ def _held(comparisons: int) -> str:
 
 
 def _say(found: Mapping[str, Any], words: str, as_json: bool) -> None:
-    typer.echo(json.dumps({"schema": SCHEMA, **found}, allow_nan=False) if as_json else words)
+    typer.echo(json.dumps({"schema": _SCHEMA, **found}, allow_nan=False) if as_json else words)

@@ -11,8 +11,8 @@ import typer
 from apo_bench.cli.arguments import path_given
 from apo_bench.errors import InputError
 
-MOST_PICTURES = 100
-Folder = Annotated[
+_MOST_PICTURES = 100
+_Folder = Annotated[
     Path, typer.Argument(parser=path_given, metavar="FOLDER", help="The folder that `sweep --out` wrote.")
 ]
 
@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
 
 
 def report(
-    folder: Folder,
+    folder: _Folder,
     pictures: Annotated[int, typer.Option(help="Failures that are drawn at most; each is run again for it.")] = 6,
     salt_file: Annotated[
         Path | None,
@@ -39,8 +39,8 @@ def report(
     from apo_bench.report.report import report as write_report
     from apo_bench.show.failure_pictures import failure_pictures
 
-    if not 0 <= pictures <= MOST_PICTURES:
-        raise InputError(f"--pictures {pictures} was given; a whole number from 0 to {MOST_PICTURES} is allowed.")
+    if not 0 <= pictures <= _MOST_PICTURES:
+        raise InputError(f"--pictures {pictures} was given; a whole number from 0 to {_MOST_PICTURES} is allowed.")
     made = write_report(folder, pictures, salt_file, trust_code=trust_code, draw=failure_pictures)
     print_cells(made.cells)
     print_report(made)

@@ -20,7 +20,7 @@ from apo_bench.records.limits import CORRECTOR_LIMIT_S
 if TYPE_CHECKING:
     from apo_bench.sweeps.grid import SweepSpec
 
-KILLED = 128
+_KILLED = 128
 """And the number of the signal: the exit code of a process that one has ended."""
 
 
@@ -36,7 +36,7 @@ def interrupted(error: KeyboardInterrupt, more: str = "") -> Interrupted:
     """What a command says that a signal has ended, with its exit code: 128 and the number of the signal."""
     number = int(getattr(error, "number", signal.SIGINT))
     said = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-    return Interrupted(f"{said}{more}.", KILLED + number)
+    return Interrupted(f"{said}{more}.", _KILLED + number)
 
 
 def register(app: typer.Typer) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from apo_bench.report.compare import Comparison
     from apo_bench.report.report import Report
 
-MOST_NAMES = 8
+_MOST_NAMES = 8
 """Settings that differ, named on the terminal."""
 
 
@@ -94,8 +94,8 @@ def print_comparison(found: Comparison) -> None:
     _console().print(clean(in_words(found)))
     print_table(agreement_table(found))
     names = [d.what for d in found.differences]
-    more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
-    differ = clean(f"Not the same: {', '.join(names[:MOST_NAMES])}{more}")
+    more = f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
+    differ = clean(f"Not the same: {', '.join(names[:_MOST_NAMES])}{more}")
     _console().print(differ if names else "Made with the same.")
 
 

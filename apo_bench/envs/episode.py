@@ -31,7 +31,7 @@ class Settings:
             check("clearance_mm", self.clearance_mm)
 
 
-OPTIONS = tuple(field.name for field in fields(Settings))
+_OPTIONS = tuple(field.name for field in fields(Settings))
 
 
 def with_options(usual: Settings, options: object, eye: str) -> Settings:
@@ -43,11 +43,13 @@ def with_options(usual: Settings, options: object, eye: str) -> Settings:
     if options is None:
         return usual
     if not isinstance(options, Mapping):
-        raise InputError(f"the options {options!r} were given to reset(); a dict with {', '.join(OPTIONS)} is allowed.")
+        raise InputError(
+            f"the options {options!r} were given to reset(); a dict with {', '.join(_OPTIONS)} is allowed."
+        )
     said: dict[str, Any] = dict(options)
     for name in said:
-        if name not in OPTIONS:
-            raise InputError(unknown("option of reset()", str(name), OPTIONS))
+        if name not in _OPTIONS:
+            raise InputError(unknown("option of reset()", str(name), _OPTIONS))
     if "level" in said:
         said["level"] = Level(*level_pair(said["level"], eye))
     return replace(usual, **said)

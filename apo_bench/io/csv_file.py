@@ -8,7 +8,7 @@ from pathlib import Path
 
 from apo_bench.io.writing import to_write
 
-OBEYED = "=+-@\t\r"
+_OBEYED = "=+-@\t\r"
 """What a formula begins with."""
 
 
@@ -27,7 +27,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]])
 
 def _cell(x: object) -> object:
     """Texts that have ' in front already get another one, so that a reader can take one away."""
-    if not isinstance(x, str) or not x.lstrip("'").startswith(tuple(OBEYED)) or _number(x):
+    if not isinstance(x, str) or not x.lstrip("'").startswith(tuple(_OBEYED)) or _number(x):
         return x
     return f"'{x}"
 

@@ -20,13 +20,13 @@ from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.settings import RANGE, ROW, SETTINGS, TrialSettings
 from apo_bench.records.verdicts import MEANING
 
-USUAL: Mapping[str, Any] = MappingProxyType(
+_USUAL: Mapping[str, Any] = MappingProxyType(
     {info.column: info.default for name, info in SETTINGS.items() if not info.key and name not in ("eye", "salt")}
 )
 """What a row that does not say means."""
-NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye")
+_NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye")
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
-TOGETHER = (
+_TOGETHER = (
     ("level", "level_deg", "careless"),
     ("success", "loose_success"),
     ("contacts_right", "contacts_missed", "contacts_false"),
@@ -35,8 +35,8 @@ TOGETHER = (
     ("test_passes", "suspects"),
 )
 """Fields that are null together."""
-LONGEST_QUOTE = 60
-TIMED = ("scenario", "method")
+_LONGEST_QUOTE = 60
+_TIMED = ("scenario", "method")
 _KINDS = {
     "object": "an object",
     "array": "a list",
@@ -55,7 +55,7 @@ def _struct(name: str, fields: Mapping[str, Any], required: Sequence[str], **mor
 
 
 _ROW = msgspec.json.Decoder(_struct("Row", ROW_FIELDS, REQUIRED))
-_TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, TIMED))
+_TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, _TIMED))
 _WRITTEN = _struct("Written", ROW_FIELDS, REQUIRED, forbid_unknown_fields=True)
 _RUN = msgspec.json.Decoder(dict[str, Any])
 _KNOWN = _struct("Run", RUN_FIELDS, ())
@@ -84,7 +84,7 @@ def row_of(line: bytes, where: str) -> Row:
 
 def as_usual(row: Mapping[str, Any]) -> Row:
     """A row with what it does not say about how it was run."""
-    usual = {"eye": RANGE if row["noise"] == RANGE else TrialSettings.eye, **USUAL}
+    usual = {"eye": RANGE if row["noise"] == RANGE else TrialSettings.eye, **_USUAL}
     return cast(Row, {**row, **{name: value for name, value in usual.items() if row.get(name) is None}})
 
 
@@ -154,10 +154,10 @@ def _parsed(decoder: Any, text: bytes, where: str, half: re.Pattern[str]) -> Any
 
 def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
     """The field and what is wrong with it, of fields that do not go together."""
-    for name in NAMES:
+    for name in _NAMES:
         if row.get(name) and CONTROL.search(row[name]):
             return name, "text without control characters is needed"
-    for names in TOGETHER:
+    for names in _TOGETHER:
         if len({row.get(name) is None for name in names}) > 1:
             return names[0], f"{' and '.join(names)} are null together, or none of them is"
     if row["schema"] == ROW and (row.get("as_demonstrated") is None) != (row["success"] is None):
@@ -176,7 +176,7 @@ def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
 def _said(error: msgspec.ValidationError) -> tuple[str, str]:
     """The field, and what is needed there and what was given, in words."""
     text, _, place = str(error).partition(" - at `$")
-    field = clean(place.rstrip("`").lstrip(".")).replace("[...]", " (an entry)").strip()[:LONGEST_QUOTE]
+    field = clean(place.rstrip("`").lstrip(".")).replace("[...]", " (an entry)").strip()[:_LONGEST_QUOTE]
     missing = re.fullmatch(r"Object missing required field `(.*)`", text)
     if missing:
         return f"{field}.{missing[1]}".strip("."), "it is missing"
@@ -201,7 +201,7 @@ def _kinds(said: str) -> str:
 
 def _short(text: str) -> str:
     said = clean(text)
-    return said if len(said) <= LONGEST_QUOTE else said[: LONGEST_QUOTE - 3] + "..."
+    return said if len(said) <= _LONGEST_QUOTE else said[: _LONGEST_QUOTE - 3] + "..."
 
 
 def _refuse(error: Exception, where: str, none: str) -> Never:

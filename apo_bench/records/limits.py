@@ -7,7 +7,7 @@ from typing import final
 
 CORRECTOR_LIMIT_S = 120.0
 """What one correction in a process of its own may take."""
-TRIAL_LIMIT_S = 600.0
+_TRIAL_LIMIT_S = 600.0
 """What one trial of a sweep may take."""
 
 
@@ -16,7 +16,7 @@ TRIAL_LIMIT_S = 600.0
 class Limits:
     """Of a sweep; said of a trial whose process, or that of its corrector, died or was ended."""
 
-    trial_s: float | None = TRIAL_LIMIT_S
+    trial_s: float | None = _TRIAL_LIMIT_S
     """None where trials had no process of their own."""
     corrector_s: float = CORRECTOR_LIMIT_S
 

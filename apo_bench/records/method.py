@@ -7,9 +7,9 @@ from typing import NamedTuple
 from apo_bench.errors import InputError, unknown
 from apo_bench.records.short_names import METHODS
 
-SEARCH = "search"
+_SEARCH = "search"
 """What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
-_ENDING = f"+{SEARCH}"
+_ENDING = f"+{_SEARCH}"
 
 
 class Method(NamedTuple):
@@ -22,7 +22,7 @@ class Method(NamedTuple):
 
 def parsed(method: str) -> Method:
     """The parts of a method's name."""
-    if method == SEARCH:
+    if method == _SEARCH:
         return Method("none", True)
     return Method(method.removesuffix(_ENDING), method.endswith(_ENDING))
 
@@ -35,13 +35,13 @@ def checked_method(method: str) -> str:
     """
     plan, searches = parsed(method)
     if searches and parsed(plan).searches:
-        raise InputError(f"the method '{method}' was given; +{SEARCH} is said once, as in contact+{SEARCH}.")
+        raise InputError(f"the method '{method}' was given; +{_SEARCH} is said once, as in contact+{_SEARCH}.")
     if ":" not in plan and plan not in METHODS:
         raise InputError(
-            unknown("method", plan or method, (*METHODS, SEARCH))
-            + f" Or give your own corrector as 'package.module:name'; any of them may be followed by +{SEARCH}."
+            unknown("method", plan or method, (*METHODS, _SEARCH))
+            + f" Or give your own corrector as 'package.module:name'; any of them may be followed by +{_SEARCH}."
         )
-    return SEARCH if searches and plan == "none" else method
+    return _SEARCH if searches and plan == "none" else method
 
 
 def knows_truth(method: str) -> bool:

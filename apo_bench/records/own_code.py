@@ -12,7 +12,7 @@ from typing import Any
 from apo_bench.records.relations import WRONG
 from apo_bench.records.short_names import RESIDUALS
 
-MOST = 3
+_MOST = 3
 """Names in the sentence."""
 
 
@@ -31,9 +31,9 @@ def left_out(rows: Iterable[Mapping[str, Any]]) -> str:
     if not met:
         return ""
     names = list(dict.fromkeys(name for own in met for name in own))
-    more = f" and {len(names) - MOST} more" * (len(names) > MOST)
+    more = f" and {len(names) - _MOST} more" * (len(names) > _MOST)
     many = "1 failed trial names" if len(met) == 1 else f"{len(met):,} failed trials name"
     return (
-        f"{many} code that does not come with the package ({', '.join(names[:MOST])}{more}); a report runs it only "
+        f"{many} code that does not come with the package ({', '.join(names[:_MOST])}{more}); a report runs it only "
         "with --trust-code"
     )

@@ -18,8 +18,8 @@ GIVEN = "given"
 """The contacts come with the demonstration, and are right."""
 WRONG = tuple(RELATIONS)
 RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice")
-KINDS = (GIVEN, *WRONG, *RECOGNISED)
-SHIFT_MM, LARGEST_SHIFT_MM = 2.0, 50.0
+_KINDS = (GIVEN, *WRONG, *RECOGNISED)
+SHIFT_MM, _LARGEST_SHIFT_MM = 2.0, 50.0
 
 
 def relations_name(given: str) -> str:
@@ -35,9 +35,9 @@ def relations_name(given: str) -> str:
         size_mm = float(size or SHIFT_MM)
     except ValueError:
         size_mm = math.nan
-    if not 0.0 < size_mm <= LARGEST_SHIFT_MM:
+    if not 0.0 < size_mm <= _LARGEST_SHIFT_MM:
         raise InputError(
-            f"the relations '{given}' were given; a size above 0 and up to {LARGEST_SHIFT_MM:g} mm is allowed: "
+            f"the relations '{given}' were given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: "
             "shifted:3."
         )
     return f"shifted:{size_mm:g}"
@@ -46,8 +46,8 @@ def relations_name(given: str) -> str:
 def checked_relations(given: str) -> str:
     """The relations as rows spell them; raise an `InputError` unless there are such."""
     name = relations_name(given)
-    if name.partition(":")[0] in KINDS and name not in KINDS and not name.startswith("shifted:"):
+    if name.partition(":")[0] in _KINDS and name not in _KINDS and not name.startswith("shifted:"):
         raise InputError(f"the relations '{given}' were given; only shifted has a size, as in shifted:3.")
-    if ":" not in name and name not in KINDS:
-        raise InputError(unknown("kind of relations", given, KINDS) + " Or give your own as 'package.module:name'.")
+    if ":" not in name and name not in _KINDS:
+        raise InputError(unknown("kind of relations", given, _KINDS) + " Or give your own as 'package.module:name'.")
     return name

@@ -11,11 +11,11 @@ from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
 from apo_bench.records.method import is_own
 from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
 
-SALT_FILE = "FILE"
+_SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
-ALWAYS = ("clearance_mm", "method")
+_ALWAYS = ("clearance_mm", "method")
 """Said even if it is as usual."""
-APART = ("scenario", "level_mm", "level_deg", "seed", "salt")
+_APART = ("scenario", "level_mm", "level_deg", "seed", "salt")
 """Said in a way of its own."""
 Files = Mapping[str, str]
 """Scenarios that were given as files: name -> path."""
@@ -48,11 +48,11 @@ def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
             info = SETTINGS[name]
             say(info.option, float(row[info.column]), info.default)
     for name, info in SETTINGS.items():
-        if name not in APART and not (name == "noise" and measured):
-            value, usual = row[info.column], None if name in ALWAYS else info.default
+        if name not in _APART and not (name == "noise" and measured):
+            value, usual = row[info.column], None if name in _ALWAYS else info.default
             if value != usual:
                 say(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
-    say(SETTINGS["salt"].option, SALT_FILE if row.get("salt") else None)
+    say(SETTINGS["salt"].option, _SALT_FILE if row.get("salt") else None)
     if row.get("failure_stage") == "worker":
         say("trial-limit", limits.trial_s)
         if is_own(row["method"]):

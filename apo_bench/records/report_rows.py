@@ -28,9 +28,9 @@ NUMBERS: Mapping[str, str] = {
     "sim_seconds": "simulated [s]",
 }
 """Numbers of a row that the page shows, in its order, with what they are called there."""
-LEFT_OUT = ("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "reached")
+_LEFT_OUT = ("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "reached")
 """Not kept of a row; it is read again where it is needed."""
-COLUMNS = tuple(column for column in ROW_FIELDS if column not in LEFT_OUT)
+COLUMNS = tuple(column for column in ROW_FIELDS if column not in _LEFT_OUT)
 """What is kept of a row."""
 
 
@@ -45,7 +45,7 @@ def report_rows(folder: str | Path) -> list[Row]:
 
 
 def _kept(row: Row, predictions: dict[Any, Predicted]) -> Row:
-    kept: dict[str, Any] = {name: value for name, value in row.items() if name not in LEFT_OUT}
+    kept: dict[str, Any] = {name: value for name, value in row.items() if name not in _LEFT_OUT}
     for name, value in kept.items():
         if type(value) is str:
             kept[name] = sys.intern(value)

@@ -29,29 +29,29 @@ from apo_bench.records.settings import (
 LONGEST_SENTENCE = 1000
 LARGEST = 1e15
 """Of a number that physics or a solver gave; beyond, sums and pictures of it say nothing."""
-Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
-Size = Annotated[float, Meta(ge=0.0, le=LARGEST)]
-Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-Count = Annotated[int, Meta(ge=0, le=1_000_000)]
-Operation = Annotated[int, Meta(ge=1, le=100_000)]
-Pose = Annotated[list[Number], Meta(min_length=7, max_length=7)]
+_Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
+_Size = Annotated[float, Meta(ge=0.0, le=LARGEST)]
+_Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_Count = Annotated[int, Meta(ge=0, le=1_000_000)]
+_Operation = Annotated[int, Meta(ge=1, le=100_000)]
+_Pose = Annotated[list[_Number], Meta(min_length=7, max_length=7)]
 
 
 class FreedSet(TypedDict):
     """A set of operations that were freed, and the gap that was left [mm]."""
 
-    step: Operation
-    free: list[Operation]
-    gap_mm: Number | None
+    step: _Operation
+    free: list[_Operation]
+    gap_mm: _Number | None
 
 
 class Predicted(TypedDict):
     """What a plan said about itself, and how far off it is then [mm]."""
 
     fails: bool
-    operation: Operation | None
+    operation: _Operation | None
     code: Literal["ok", "residual", "interference", "unstable_goal"]
-    size_mm: NotRequired[Number | None]
+    size_mm: NotRequired[_Number | None]
 
 
 class Row(TypedDict, total=False):
@@ -94,7 +94,7 @@ class Row(TypedDict, total=False):
     """Time step of the physics [s]."""
     fidelity: Fidelity | None
     """`full`, or `contact`: only the part of each motion in which things may touch was simulated."""
-    thresholds: dict[str, Size] | None
+    thresholds: dict[str, _Size] | None
     """What the judge demands: lengths in mm, angles in degrees."""
     demonstration: str | None
     """How the human's own assembly ended: `ok` or a code."""
@@ -109,7 +109,7 @@ class Row(TypedDict, total=False):
     """Stage at which a trial failed that was no success."""
     failure_code: str | None
     """Code of why a trial failed that was no success."""
-    failure_operation: Operation | None
+    failure_operation: _Operation | None
     """Operation in which a trial failed, if it is known."""
     sentence: str | None
     """How the trial ended, for a person."""
@@ -117,17 +117,17 @@ class Row(TypedDict, total=False):
     """Code of why a trial is not as demonstrated."""
     conditions: dict[str, bool] | None
     """The conditions of success, each by itself."""
-    worst_gap_mm: Number | None
+    worst_gap_mm: _Number | None
     """Largest gap, or depth, of faces that should touch [mm]."""
-    worst_angle_deg: Number | None
+    worst_angle_deg: _Number | None
     """Largest angle between faces that should touch [deg]."""
-    least_overlap: Number | None
+    least_overlap: _Number | None
     """Smallest overlap of faces that should touch, as a part of the true overlap."""
-    penetration_mm: Number | None
+    penetration_mm: _Number | None
     """Largest depth of one part in another [mm]."""
-    pushed_mm: Number | None
+    pushed_mm: _Number | None
     """Largest distance by which a part that was in place was moved [mm]."""
-    freed: list[Operation] | None
+    freed: list[_Operation] | None
     """Operations whose motion parameters were corrected."""
     tried: list[FreedSet] | None
     """Which operations were freed at which step, and the gap that was left."""
@@ -135,15 +135,15 @@ class Row(TypedDict, total=False):
     """Steps of the plan beyond doing every operation once."""
     predicted: Predicted | None
     """What the plan said about itself before it was carried out."""
-    gap_before_mm: Number | None
+    gap_before_mm: _Number | None
     """Gap of the contacts at the poses seen [mm]."""
-    gap_after_mm: Number | None
+    gap_after_mm: _Number | None
     """Gap of the contacts at the corrected poses [mm]."""
     chi_square: Annotated[float, Meta(ge=0.0, le=1e300)] | None
     """Statistic of the test whether contacts and poses seen are consistent."""
     chi_square_freedom: Annotated[int, Meta(ge=0, le=LARGEST_SEED)] | None
     """Degrees of freedom of `chi_square`."""
-    p_value: Share | None
+    p_value: _Share | None
     """p-value of `chi_square`."""
     test_passes: bool | None
     """Whether contacts and poses seen are consistent by that test."""
@@ -155,25 +155,25 @@ class Row(TypedDict, total=False):
     """The contact that is wrong, where wrong ones were given."""
     inside_95: bool | None
     """Whether the truth lies in the 95 % region that the corrector states."""
-    planned_error_fixed_mm: Size | None
+    planned_error_fixed_mm: _Size | None
     """Root mean square distance of the plan from the truth, along directions that contacts fix [mm]."""
-    planned_error_free_mm: Size | None
+    planned_error_free_mm: _Size | None
     """Root mean square distance of the plan from the truth, along directions that contacts leave free [mm]."""
-    contacts_right: Count | None
+    contacts_right: _Count | None
     """Contacts that the corrector was told and that are right."""
-    contacts_missed: Count | None
+    contacts_missed: _Count | None
     """Contacts that are there and that the corrector was not told."""
-    contacts_false: Count | None
+    contacts_false: _Count | None
     """Contacts that the corrector was told and that are not there."""
-    reached: dict[str, Pose] | None
+    reached: dict[str, _Pose] | None
     """Part -> where it ended: x, y, z [mm], qw, qx, qy, qz, world frame."""
-    pose_error_fixed_mm: Size | None
+    pose_error_fixed_mm: _Size | None
     """Root mean square distance of where the parts ended from the truth, along directions that contacts fix [mm]."""
-    pose_error_free_mm: Size | None
+    pose_error_free_mm: _Size | None
     """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
-    peak_force_n: Size | None
+    peak_force_n: _Size | None
     """Largest contact force that the gripper met [N]."""
-    sim_seconds: Size | None
+    sim_seconds: _Size | None
     """Simulated time [s]."""
 
 
@@ -182,9 +182,9 @@ _CODE, _STAGE = _ENDS[tuple(CODES)] | None, _ENDS[STAGES] | None
 _CLOSED = {"failure_stage": _STAGE} | dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
 ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
 """Column -> its type, with the range that it may have."""
-NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
+_NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
 """What every row says, besides its key."""
-REQUIRED = ("schema", *KEY, *NEEDED)
+REQUIRED = ("schema", *KEY, *_NEEDED)
 """Without them a line is no row; what else a row does not say is null, or as usual."""
 
 

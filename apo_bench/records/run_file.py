@@ -16,8 +16,8 @@ from apo_bench.records.checked import run_of
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.salt import Salt
 
-RUN = "apo-bench/run/3"
-LARGEST_BYTES = 16_000_000
+_RUN = "apo-bench/run/3"
+_LARGEST_BYTES = 16_000_000
 
 
 def run_record(
@@ -40,7 +40,7 @@ def run_record(
         versions: Of packages that may show in a row.
     """
     return {
-        "schema": RUN,
+        "schema": _RUN,
         "grids": list(grids),
         "files": dict(files),
         "salt": None if salt is None else salt.hash,
@@ -71,7 +71,7 @@ def read_run(folder: Path) -> dict[str, Any]:
         InputError: It cannot be read, or is something else; one sentence with file and field.
     """
     path = folder / "run.json"
-    return run_of(read_bytes(path, "run file", LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
+    return run_of(read_bytes(path, "run file", _LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
 
 
 def check_same(folder: Path, run: Mapping[str, Any]) -> None:
@@ -83,8 +83,8 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     schema = before.get("schema")
     if schema is None:
         raise InputError(f"'{folder}' has trials but no readable run.json; choose another folder.")
-    if schema != RUN:
-        raise InputError(f"'{folder}' has a run.json of schema '{schema}', '{RUN}' is needed; choose another folder.")
+    if schema != _RUN:
+        raise InputError(f"'{folder}' has a run.json of schema '{schema}', '{_RUN}' is needed; choose another folder.")
     now = json.loads(json.dumps(run))
     grids = before.get("grids")
     if not isinstance(grids, list) or len(grids) != len(now["grids"]):

@@ -19,12 +19,12 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_bytes
 
-FEWEST, MOST = 16, 512
+FEWEST, _MOST = 16, 512
 """Bytes of a salt; 16 are 128 bits."""
-FEWEST_DIFFERENT = 8
+_FEWEST_DIFFERENT = 8
 """Of 16 bytes at random fewer are different in one of 10^11 cases."""
-FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")
-TEXT = "one line of 32 to 1024 hexadecimal digits, an even number of them, drawn at random"
+_FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")
+_TEXT = "one line of 32 to 1024 hexadecimal digits, an even number of them, drawn at random"
 
 
 @final
@@ -51,10 +51,10 @@ def read_salt(path: str | Path) -> Salt:
     Raises:
         InputError: There is no such file, it cannot be read, or it holds something else.
     """
-    found = FORM.fullmatch(read_bytes(path, "salt file"))
+    found = _FORM.fullmatch(read_bytes(path, "salt file"))
     secret = bytes.fromhex(found[1].decode()) if found is not None else b""
-    if not FEWEST <= len(secret) <= MOST or len(set(secret)) < FEWEST_DIFFERENT:
-        raise InputError(f"'{path}' is not a salt file; it must hold {TEXT}.")
+    if not FEWEST <= len(secret) <= _MOST or len(set(secret)) < _FEWEST_DIFFERENT:
+        raise InputError(f"'{path}' is not a salt file; it must hold {_TEXT}.")
     return Salt(secret)
 
 

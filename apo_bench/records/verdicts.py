@@ -16,7 +16,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.settings import ROW
 
 SUCCESS, AS_DEMONSTRATED = "success", "as_demonstrated"
-WORDS = (
+_WORDS = (
     "These rows were written before the verdict success was given (they are older than {row}): wherever success is "
     "said here, it is as_demonstrated, which also asks that every contact was made when and where it was shown. Run "
     "the sweep again with this version for success."
@@ -62,4 +62,4 @@ def by_verdict(rows: Sequence[Row], verdict: str) -> Sequence[Row]:
 
 def words(verdict: str) -> str:
     """What is to be said of it at the top; empty where success is success."""
-    return "" if verdict == SUCCESS else WORDS.format(row=ROW)
+    return "" if verdict == SUCCESS else _WORDS.format(row=ROW)

@@ -16,9 +16,9 @@ from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Interval, Place, rank, wilson
 from apo_bench.statistics.summary import Summary
 
-AGAINST = ("none", "paper", "contact")
+_AGAINST = ("none", "paper", "contact")
 """The best method is compared with these; if none of them was tried, with the next best."""
-Results = Mapping[tuple[Any, ...], bool]
+_Results = Mapping[tuple[Any, ...], bool]
 """All that a trial is of but the method, its seed last -> success."""
 
 
@@ -33,7 +33,7 @@ def answer(rows: Iterable[Row], found: Summary) -> str:
     said += f"(95 %: {100 * low:.1f} to {100 * high:.1f} %)"
     half = [h for h in found.half_levels if h.setting.method == best and h.setting.relations == "given"]
     said += f" and in half of them or more {_reach(half)}" if half else ""
-    known = [m for m in AGAINST if m in results and m != best] or others[:1]
+    known = [m for m in _AGAINST if m in results and m != best] or others[:1]
     compared = [words for words in (_compared(best, m, results) for m in known) if words]
     return f"{said}; at the same seeds it succeeds {' and '.join(compared)}." if compared else f"{said}."
 
@@ -51,7 +51,7 @@ def _results(rows: Iterable[Row]) -> dict[str, dict[tuple[Any, ...], bool]]:
     return right or wrong
 
 
-def _ranked(results: Mapping[str, Results]) -> list[str]:
+def _ranked(results: Mapping[str, _Results]) -> list[str]:
     """The best first, by trials that all have that were tried in half of all places or more."""
     most = max(map(len, results.values()))
     widely = [method for method in results if 2 * len(results[method]) >= most]
@@ -64,7 +64,7 @@ def _ranked(results: Mapping[str, Results]) -> list[str]:
     return sorted(widely, key=lambda method: (-rate(method), rank(method), method))
 
 
-def _compared(ours: str, other: str, results: Mapping[str, Results]) -> str:
+def _compared(ours: str, other: str, results: Mapping[str, _Results]) -> str:
     """`more often than `none` by 41.2 points (95 %: 38.9 to 43.4)`; nothing where they have no trial in common."""
     a, b = results[ours], results[other]
     both = {key: float(a[key]) - float(b[key]) for key in a if key in b}
@@ -89,7 +89,7 @@ def _by_seed(results: Mapping[tuple[Any, ...], float]) -> list[float]:
     return [float(np.round(np.mean(sorted(seeds[seed])), 12)) for seed in sorted(seeds)]
 
 
-def _rate_interval(results: Results) -> Interval:
+def _rate_interval(results: _Results) -> Interval:
     """Wilson's where every seed has one trial, as in the tables; else of the means over seeds."""
     by_seed = _by_seed(results)
     if len(by_seed) == len(results):

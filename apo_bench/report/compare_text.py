@@ -19,7 +19,7 @@ from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Cell, Place, Rate, place_of
 from apo_bench.statistics.settings import at, setting_of
 
-SCHEMA = "apo-bench/comparison/1"
+_SCHEMA = "apo-bench/comparison/1"
 MOST = 2000
 """Changed trials that are listed."""
 
@@ -110,7 +110,7 @@ def in_words(found: Comparison) -> str:
 def comparison_form(found: Comparison) -> dict[str, Any]:
     """As JSON holds it."""
     return {
-        "schema": SCHEMA,
+        "schema": _SCHEMA,
         "first": str(found.first.folder),
         "second": str(found.second.folder),
         "verdict": found.first.verdict,

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.report.tables.table import Column, Table
 
-LONG = 400
+_LONG = 400
 """Longer values are cut; they stand in the file."""
-MANY = 20
+_MANY = 20
 """A table of more lines is folded."""
 
 
@@ -47,7 +47,7 @@ def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[Facts]:
     for key, values in run.items():
         name = key.replace("_", " ")
         if isinstance(values, dict) and values:
-            made.append(Facts(name, _table(name, values), len(values) > MANY))
+            made.append(Facts(name, _table(name, values), len(values) > _MANY))
         elif isinstance(values, list) and values:
             made.append(Facts(name, _side_by_side(name, values), False))
     return made
@@ -81,4 +81,4 @@ def words(value: Any) -> str:
         said = ", ".join(x if isinstance(x, str) else json.dumps(x) for x in value) or "–"
     else:
         said = json.dumps(value)
-    return said if len(said) <= LONG else said[:LONG] + " …"
+    return said if len(said) <= _LONG else said[:_LONG] + " …"

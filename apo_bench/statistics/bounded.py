@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.statistics.rates import CONFIDENCE, Interval
 
-STEPS = 48
+_STEPS = 48
 """Halvings: what is left is less than 1e-14 of the range."""
 
 
@@ -44,7 +44,7 @@ def surprise(
     z = values - np.asarray(mean)[..., None]
     least = np.broadcast_to(-1.0 / (high - np.asarray(mean)), z.shape[:-1]).copy()
     most = np.broadcast_to(1.0 / (np.asarray(mean) - low), z.shape[:-1]).copy()
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         a = 0.5 * (least + most)
         rising = (counts * z / np.where(counts > 0, 1.0 + a[..., None] * z, 1.0)).sum(-1) > 0.0
         least, most = np.where(rising, a, least), np.where(rising, most, a)

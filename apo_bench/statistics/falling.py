@@ -22,22 +22,22 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 
-STEEPNESS = np.geomspace(0.4, 40.0, 18)
+_STEEPNESS = np.geomspace(0.4, 40.0, 18)
 """Per unit of the natural logarithm: from hardly falling to a step."""
-CEILINGS = np.array([1.0, 0.98, 0.95, 0.9, 0.82, 0.7, 0.6])
-POWERS = np.array([-12.0, -3.0, 0.0, 1.0, 3.0, 12.0])
+_CEILINGS = np.array([1.0, 0.98, 0.95, 0.9, 0.82, 0.7, 0.6])
+_POWERS = np.array([-12.0, -3.0, 0.0, 1.0, 3.0, 12.0])
 """Of the shape; those of the mirror image are negative, and 0 stands for the normal curve."""
-OTHERS = tuple(x.ravel() for x in np.meshgrid(STEEPNESS, CEILINGS, POWERS, indexing="ij"))
+OTHERS = tuple(x.ravel() for x in np.meshgrid(_STEEPNESS, _CEILINGS, _POWERS, indexing="ij"))
 """(m,) steepness, ceiling and power of every curve that has a half level."""
-CONSTANTS = 4
+_CONSTANTS = 4
 """Of a curve: half level, steepness, ceiling, power."""
-PER_UNIT = 40
+_PER_UNIT = 40
 """Half levels per unit of the logarithm, between the smallest and the largest level."""
-OUTSIDE = np.array([0.05, 0.2, 0.5, 1.0, 2.0, 4.0])
+_OUTSIDE = np.array([0.05, 0.2, 0.5, 1.0, 2.0, 4.0])
 """How far beyond them others lie: enough to know that the likeliest is there."""
-NORMAL = 0.6
+_NORMAL = 0.6
 """A normal curve of this times the steepness is about as steep as the logistic one."""
-LEAST, STEP = 1e-9, 1e-4
+_LEAST, _STEP = 1e-9, 1e-4
 
 
 @final
@@ -76,7 +76,7 @@ def curve(log_levels: Array, log_half: Array, steepness: Array, ceiling: Array, 
     from scipy.special import expit, logit, ndtr, ndtri
 
     half = 0.5 / ceiling
-    normal = ceiling * ndtr(NORMAL * steepness * (log_half - log_levels) + ndtri(half))
+    normal = ceiling * ndtr(_NORMAL * steepness * (log_half - log_levels) + ndtri(half))
     mirrored, n = power < 0, np.maximum(1.0, np.abs(power))
     shift = np.where(mirrored, -logit((1.0 - half) ** (1.0 / n)), logit(half ** (1.0 / n)))
     x = steepness * (log_half - log_levels) + shift
@@ -96,18 +96,18 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
     def at(half: float, steeper: float) -> Array:
         return curve(log_levels, log_half + half, steepness * (1.0 + steeper), ceiling, power)
 
-    p = np.clip(at(0.0, 0.0), LEAST, 1.0 - LEAST)
-    by_half, by_steepness = (at(STEP, 0.0) - at(-STEP, 0.0), at(0.0, STEP) - at(0.0, -STEP))
-    by_half, by_steepness = by_half / (2 * STEP), by_steepness / (2 * STEP)
+    p = np.clip(at(0.0, 0.0), _LEAST, 1.0 - _LEAST)
+    by_half, by_steepness = (at(_STEP, 0.0) - at(-_STEP, 0.0), at(0.0, _STEP) - at(0.0, -_STEP))
+    by_half, by_steepness = by_half / (2 * _STEP), by_steepness / (2 * _STEP)
     weight = known.sum(axis=-2) / (p * (1.0 - p))
     hh, hs, ss = (
         (weight * x).sum(axis=-1, keepdims=True) for x in (by_half**2, by_half * by_steepness, by_steepness**2)
     )
-    free = np.where(ss > LEAST, hs / np.maximum(ss, LEAST), 0.0)
+    free = np.where(ss > _LEAST, hs / np.maximum(ss, _LEAST), 0.0)
     direction = (by_half - free * by_steepness) / (p * (1.0 - p))
     scores = (np.where(known, right - p[..., None, :], 0.0) * direction[..., None, :]).sum(axis=-1)
     expected, seen = (hh - free * hs)[..., 0], (scores**2).sum(axis=-1)
-    return np.asarray(np.maximum(1.0, np.where(expected > LEAST, seen / np.maximum(expected, LEAST), 1.0)))
+    return np.asarray(np.maximum(1.0, np.where(expected > _LEAST, seen / np.maximum(expected, _LEAST), 1.0)))
 
 
 def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
@@ -123,7 +123,7 @@ def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
 
     trials = np.maximum(right + wrong, 1.0)
     best = (xlogy(right, right / trials) + xlogy(wrong, wrong / trials)).sum(axis=-1)
-    freedom = max(1, right.shape[-1] - CONSTANTS)
+    freedom = max(1, right.shape[-1] - _CONSTANTS)
     return np.asarray(np.maximum(1.0, 2.0 * (best - likelihood) / chdtri(freedom, 0.05)))
 
 
@@ -131,8 +131,8 @@ def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
 def _table(log_levels: tuple[float, ...]) -> tuple[Array, Array, Array]:
     """The half levels (m,), and (k, m * others) the logarithms of success and failure of every curve."""
     x = np.array(log_levels)
-    inside = np.linspace(x[0], x[-1], 2 + int(PER_UNIT * (x[-1] - x[0])))
-    h = np.unique(np.r_[x[0] - OUTSIDE, inside, x[-1] + OUTSIDE])
+    inside = np.linspace(x[0], x[-1], 2 + int(_PER_UNIT * (x[-1] - x[0])))
+    h = np.unique(np.r_[x[0] - _OUTSIDE, inside, x[-1] + _OUTSIDE])
     p = curve(x[:, None, None], h[:, None], *OTHERS)
-    p = np.clip(p, LEAST, 1.0 - LEAST).reshape(len(x), -1)
+    p = np.clip(p, _LEAST, 1.0 - _LEAST).reshape(len(x), -1)
     return h, np.log(p), np.log1p(-p)

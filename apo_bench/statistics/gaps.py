@@ -12,7 +12,7 @@ from apo_bench.records.method import knows_relations
 from apo_bench.records.row import Row
 from apo_bench.statistics.rates import Place, order, place_of
 
-CUTS = (5.0, 50.0, 95.0)
+_CUTS = (5.0, 50.0, 95.0)
 
 
 class Quantiles(NamedTuple):
@@ -46,5 +46,5 @@ def gaps(rows: Iterable[Row]) -> tuple[Gap, ...]:
 
 
 def _gap(place: Place, both: Sequence[tuple[float, float]]) -> Gap:
-    seen, planned = (Quantiles(*map(float, q)) for q in np.percentile(np.array(both), CUTS, axis=0).T)
+    seen, planned = (Quantiles(*map(float, q)) for q in np.percentile(np.array(both), _CUTS, axis=0).T)
     return Gap(place, len(both), seen, planned)

@@ -23,7 +23,7 @@ from apo_bench.statistics.curve import Curve, Setting
 from apo_bench.statistics.falling import profile
 from apo_bench.statistics.rates import CONFIDENCE
 
-LIKELIEST = 0.05
+_LIKELIEST = 0.05
 """Half levels that are no more surprising than this are as good as the likeliest; their middle is the estimate."""
 
 
@@ -122,7 +122,7 @@ def _profiled(levels: Array, success: Array) -> tuple[float | None, str | None, 
     x = np.log(levels)
     found = profile(x, success)
     h, surprise, most = found.log_half, found.surprise, threshold(len(success))
-    middle = float(np.median(h[surprise <= LIKELIEST]))
+    middle = float(np.median(h[surprise <= _LIKELIEST]))
     beyond = "below" if middle < x[0] else "above" if middle > x[-1] else None
     believed = np.flatnonzero(surprise <= most)
     low = min(_end(h, surprise, most, int(believed[0]), -1), float(x[-1]))

@@ -17,10 +17,10 @@ from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
 
 K = TypeVar("K", bound=Hashable)
-Counts = Array | int
+_Counts = Array | int
 
 REFERENCES = ("paper", "none")
-EDGE = 1e-9
+_EDGE = 1e-9
 """Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
 
 
@@ -143,12 +143,12 @@ def tango(b: int, c: int, n: int) -> Interval:
     if n == 0:
         return Interval(-1.0, 1.0)
     z, d = float(norm.ppf((1 + CONFIDENCE) / 2)), (b - c) / n
-    low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + EDGE, d - EDGE)
-    high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + EDGE, 1 - EDGE)
+    low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + _EDGE, d - _EDGE)
+    high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + _EDGE, 1 - _EDGE)
     return Interval(float(low), float(high))
 
 
-def score(b: Counts, c: Counts, n: Counts, delta: Array | float) -> Array:
+def score(b: _Counts, c: _Counts, n: _Counts, delta: Array | float) -> Array:
     """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
     B = -b - c + (2 * n - b + c) * delta
     q = (np.sqrt(np.maximum(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)

@@ -20,10 +20,10 @@ from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson
 
 ERROR = 0.05
 """Of a two-sided test."""
-POWER = 0.8
-MOST = 1_000_000
+_POWER = 0.8
+_MOST = 1_000_000
 """More trials than this are not sought."""
-SPREAD = 9.0
+_SPREAD = 9.0
 """Standard deviations beyond which a count is not expected (less than 1e-18 of all cases)."""
 
 
@@ -81,7 +81,7 @@ def shares(rate: float, reference: float, agree: float | None = None) -> tuple[f
     return win, lose
 
 
-def paired_trials(win: float, lose: float, power: float = POWER, comparisons: int = 1) -> int:
+def paired_trials(win: float, lose: float, power: float = _POWER, comparisons: int = 1) -> int:
     """The pairs at which McNemar's exact test shows which method is better, with a given power.
 
     Args:
@@ -115,7 +115,7 @@ def paired_power(pairs: int, win: float, lose: float, error: float = ERROR) -> f
     return float(np.sum(binom.pmf(m, pairs, better + worse) * rejects))
 
 
-def margin_trials(margin: float, win: float = 0.0, lose: float = 0.0, power: float = POWER) -> int:
+def margin_trials(margin: float, win: float = 0.0, lose: float = 0.0, power: float = _POWER) -> int:
     """The pairs at which Tango's 95 % interval shows that a method is not worse by `margin`, with a given power.
 
     With neither wins nor losses, the usual question between two good methods, z^2 / (n + z^2) must be below the margin.
@@ -144,10 +144,10 @@ def margin_power(pairs: int, margin: float, win: float = 0.0, lose: float = 0.0)
     return float(np.sum(np.where(fits & rejects, weight, 0.0)))
 
 
-def evidence(trials: int, power: float = POWER, comparisons: int = 1) -> Evidence:
+def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> Evidence:
     """What so many trials can show; see `Evidence`."""
-    if not 1 <= trials <= MOST:
-        raise InputError(f"{trials} trials were given; a whole number from 1 to {MOST} is allowed.")
+    if not 1 <= trials <= _MOST:
+        raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error, z2 = _error(comparisons), _z() ** 2
     discordant = int(np.ceil(1 - np.log2(error) - 1e-9))
@@ -173,8 +173,8 @@ def _least(enough: Callable[[int], bool], what: str) -> int:
     high = 1
     while not enough(high):
         high *= 2
-        if high > MOST:
-            raise InputError(f"more than {MOST} {what} would be needed; ask for less.")
+        if high > _MOST:
+            raise InputError(f"more than {_MOST} {what} would be needed; ask for less.")
     low = high // 2
     while high - low > 1:
         middle = (low + high) // 2
@@ -186,7 +186,7 @@ def _least(enough: Callable[[int], bool], what: str) -> int:
 
 def _likely(n: int, p: float) -> Array:
     """The counts out of n that are not out of the question."""
-    spread = SPREAD * np.sqrt(n * p * (1 - p)) + 40.0 * (0.0 < p < 1.0)
+    spread = _SPREAD * np.sqrt(n * p * (1 - p)) + 40.0 * (0.0 < p < 1.0)
     return np.arange(max(0, int(n * p - spread)), min(n, int(np.ceil(n * p + spread))) + 1, dtype=float)
 
 
@@ -197,8 +197,8 @@ def _z() -> float:
 
 
 def _error(comparisons: int) -> float:
-    if not 1 <= comparisons <= MOST:
-        raise InputError(f"{comparisons} comparisons were given; a whole number from 1 to {MOST} is allowed.")
+    if not 1 <= comparisons <= _MOST:
+        raise InputError(f"{comparisons} comparisons were given; a whole number from 1 to {_MOST} is allowed.")
     return ERROR / comparisons
 
 

@@ -14,7 +14,7 @@ from apo_bench.io.reading import each_line
 from apo_bench.records.checked import timing_of
 from apo_bench.statistics.rates import by_method
 
-PARTS = ("compile_s", "demonstrate_s", "trial_s")
+_PARTS = ("compile_s", "demonstrate_s", "trial_s")
 
 
 @final
@@ -70,7 +70,7 @@ def work(lines: Iterable[Mapping[str, Any]]) -> tuple[Work, ...]:
     """One per host and worker."""
     groups: dict[tuple[str, str], list[float]] = {}
     for line in lines:
-        busy = sum(float(line.get(part) or 0.0) for part in PARTS)
+        busy = sum(float(line.get(part) or 0.0) for part in _PARTS)
         groups.setdefault((_known(line.get("host")), _known(line.get("worker"))), []).append(busy)
     return tuple(Work(*key, len(groups[key]), sum(groups[key])) for key in sorted(groups))
 

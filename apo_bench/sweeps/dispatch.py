@@ -20,16 +20,16 @@ from apo_bench.sweeps.worker import Emit, lost, timing
 
 STARTING_S = 300.0
 """What a worker gets to be ready, and to compile a scene."""
-LONGEST_TURN_S = 2.0
+_LONGEST_TURN_S = 2.0
 """What lies between two looks at the clock beyond this does not count: this process was asleep."""
-LONGEST_TRIAL_S = 1e6
+_LONGEST_TRIAL_S = 1e6
 
 
 def check_limit(limit_s: float) -> None:
     """Raise an `InputError` unless a trial can have such a limit."""
-    if not (math.isfinite(limit_s) and 0.0 < limit_s <= LONGEST_TRIAL_S):
+    if not (math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_TRIAL_S):
         raise InputError(
-            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {LONGEST_TRIAL_S:g} is allowed."
+            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {_LONGEST_TRIAL_S:g} is allowed."
         )
 
 
@@ -111,7 +111,7 @@ class Dispatch:
     def tick(self) -> None:
         """Look at the clock, which stands still while this process does."""
         now = time.monotonic()
-        self._now += min(now - self._looked, LONGEST_TURN_S)
+        self._now += min(now - self._looked, _LONGEST_TURN_S)
         self._looked = now
 
     def given(self, job: Job) -> None:

@@ -24,7 +24,7 @@ from apo_bench.sweeps.grid import SweepSpec
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
 from apo_bench.trial.methods import with_simulated
 
-PACKAGES = (
+_PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
 )
@@ -75,7 +75,7 @@ class EnvironmentLock:
     content: Mapping[str, str]
     """What was given for a scenario -> its `content_hash`."""
     versions: Mapping[str, str]
-    """Package -> version, of `PACKAGES`."""
+    """Package -> version, of the packages that a result depends on."""
     corrector_limit_s: float = CORRECTOR_LIMIT_S
     """Wall time that a corrector in a process of its own may take."""
     names: Names | None = None
@@ -145,4 +145,4 @@ def environment_lock(
 
 def versions() -> dict[str, str]:
     """Package -> version, as installed here."""
-    return {package: metadata.version(package) for package in PACKAGES}
+    return {package: metadata.version(package) for package in _PACKAGES}

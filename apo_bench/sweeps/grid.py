@@ -27,18 +27,18 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
 LARGEST_TRIALS = 1_000_000
-MOST_TRIALS = 1_000_000
+_MOST_TRIALS = 1_000_000
 """Of all cells of a sweep together: their specifications are held in memory, half a kilobyte each."""
 AXES = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 """What a sweep has several of."""
-MAY_BE_EMPTY = ("clearance_mm", "noise")
+_MAY_BE_EMPTY = ("clearance_mm", "noise")
 SHARED = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
-BY_RULE = ("scenario", "careless", "clearance_mm", "eye", "noise", "relations", "method")
-PLAIN = tuple(info for info in SETTINGS.values() if info.axis and info.name not in BY_RULE)
+_BY_RULE = ("scenario", "careless", "clearance_mm", "eye", "noise", "relations", "method")
+_PLAIN = tuple(info for info in SETTINGS.values() if info.axis and info.name not in _BY_RULE)
 """Settings that every trial has, the oracle too."""
 
-Level = float | tuple[float, float]
+_Level = float | tuple[float, float]
 """Mm and degrees, or the two apart."""
 
 
@@ -49,7 +49,7 @@ class SweepSpec:
 
     scenarios: tuple[str, ...]
     """Names, or paths of scenario files."""
-    levels: tuple[Level, ...] = LEVEL.swept
+    levels: tuple[_Level, ...] = LEVEL.swept
     careless: tuple[float, ...] = SETTINGS["careless"].swept
     methods: tuple[str, ...] = SETTINGS["method"].swept
     clearances_mm: tuple[float, ...] = ()
@@ -71,7 +71,7 @@ class SweepSpec:
         for info in AXES:
             given = map(_plain, getattr(self, info.axis))
             values = tuple(dict.fromkeys(map(info.spelled, given) if info.spelled else given))
-            if not values and info.name not in MAY_BE_EMPTY:
+            if not values and info.name not in _MAY_BE_EMPTY:
                 raise InputError(f"no {info.axis} were given for the sweep; at least one is needed.")
             object.__setattr__(self, info.axis, values)
         if not 1 <= self.trials <= LARGEST_TRIALS:
@@ -118,9 +118,9 @@ def check_grids(grids: Sequence[SweepSpec]) -> None:
         if len(given) > 1:
             raise InputError(f"{name} of a sweep is {' and '.join(map(str, given))}; run a sweep for each.")
     most = sum(grid.trials * _per_seed(grid) for grid in grids)
-    if most > MOST_TRIALS:
+    if most > _MOST_TRIALS:
         raise InputError(
-            f"the sweep has up to {most:,} trials, and at most {MOST_TRIALS:,} are allowed in one folder; share them "
+            f"the sweep has up to {most:,} trials, and at most {_MOST_TRIALS:,} are allowed in one folder; share them "
             "out over several: other seeds, or other scenarios, in each."
         )
 
@@ -170,7 +170,7 @@ def _per_seed(grid: SweepSpec) -> int:
     return (
         len(grid.scenarios)
         * max(1, len(grid.clearances_mm))
-        * math.prod(len(getattr(grid, info.axis)) for info in PLAIN)
+        * math.prod(len(getattr(grid, info.axis)) for info in _PLAIN)
         * trials
     )
 
@@ -190,16 +190,16 @@ def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: S
     same |= {"scenario": given, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
 
     def trial(
-        method: str, level: Level, careless: float, way: tuple[str, str], relations: str, plain: Sequence[Any]
+        method: str, level: _Level, careless: float, way: tuple[str, str], relations: str, plain: Sequence[Any]
     ) -> TrialSettings:
         mm, deg = level_pair(level, way[0])
         eye, noise = way
-        others: dict[str, Any] = {info.name: value for info, value in zip(PLAIN, plain, strict=True)}
+        others: dict[str, Any] = {info.name: value for info, value in zip(_PLAIN, plain, strict=True)}
         others |= {"level_mm": mm, "level_deg": deg, "careless": careless, "eye": eye, "noise": noise}
         return TrialSettings(**same, **others, relations=relations, method=method)
 
     ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]
-    plain = list(product(*(getattr(grid, info.axis) for info in PLAIN)))
+    plain = list(product(*(getattr(grid, info.axis) for info in _PLAIN)))
     for method, others in product(filter(knows_truth, grid.methods), plain):
         yield trial(method, 0.0, 0.0, ways[0], TrialSettings.relations, others)
     for others, careless, level, way, method in product(plain, grid.careless, grid.levels, ways, grid.methods):

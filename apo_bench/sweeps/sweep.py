@@ -29,8 +29,8 @@ from apo_bench.sweeps.worker import Timing, in_time
 from apo_bench.trial.code_version import code_files
 from apo_bench.trial.fingerprint import content_pieces, spec_hash
 
-LARGEST_WORKERS = 256
-BACKENDS = ("local", "ray")
+_LARGEST_WORKERS = 256
+_BACKENDS = ("local", "ray")
 
 
 def run_sweep(
@@ -132,11 +132,11 @@ def _left(
 
 
 def _check_spread(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
-    if workers is not None and not 1 <= workers <= LARGEST_WORKERS:
-        raise InputError(f"{workers} workers were given; a whole number from 1 to {LARGEST_WORKERS} is allowed.")
+    if workers is not None and not 1 <= workers <= _LARGEST_WORKERS:
+        raise InputError(f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.")
     check_limit(limit_s)
-    if backend not in BACKENDS:
-        raise InputError(unknown("backend", backend, BACKENDS))
+    if backend not in _BACKENDS:
+        raise InputError(unknown("backend", backend, _BACKENDS))
     if address is not None and backend != "ray":
         raise InputError(f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.")
     if backend == "ray":

@@ -26,13 +26,13 @@ from apo_bench.records.asked import in_python
 from apo_bench.records.settings import LEVEL, SETTINGS
 from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSpec
 
-SEVERAL = {info.axis: info for info in AXES}
+_SEVERAL = {info.axis: info for info in AXES}
 """Keys whose values are lists."""
-COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": SETTINGS["seed"].range}
-ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
+_COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": SETTINGS["seed"].range}
+_ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """One for the whole sweep: they stand at the top of the file only."""
-MOST_ENTRIES = 1000
-KEYS = (*SEVERAL, *COUNTS)
+_MOST_ENTRIES = 1000
+KEYS = (*_SEVERAL, *_COUNTS)
 
 
 def is_sweep_file(given: str) -> bool:
@@ -56,7 +56,7 @@ def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
     Raises:
         InputError: Anything in the file that is not as described.
     """
-    top = read_toml(path, "sweep file").fields(("scenarios",), (*KEYS[1:], *ALONE, "also"))
+    top = read_toml(path, "sweep file").fields(("scenarios",), (*KEYS[1:], *_ALONE, "also"))
     tables = [entry.fields((), KEYS) for entry in _tables(top["also"])] if "also" in top else []
     first = {key: _value(key, node) for key, node in top.items() if key != "also"}
     further = [first | {key: _value(key, node) for key, node in table.items()} for table in tables]
@@ -80,13 +80,13 @@ def _grid(name: str, said: Mapping[str, Any]) -> SweepSpec:
 
 
 def _value(key: str, node: JsonNode) -> Any:
-    if key in COUNTS:
-        return _count(node, *COUNTS[key])
-    if key in ALONE:
-        return node.text() if ALONE[key].is_text else node.number(0.0, above=True)
-    if SEVERAL[key].is_text:
+    if key in _COUNTS:
+        return _count(node, *_COUNTS[key])
+    if key in _ALONE:
+        return node.text() if _ALONE[key].is_text else node.number(0.0, above=True)
+    if _SEVERAL[key].is_text:
         return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
-    low, high = SEVERAL[key].range
+    low, high = _SEVERAL[key].range
     read = _level if key == LEVEL.axis else partial(JsonNode.number, low=low, high=high)
     return tuple(read(entry) for entry in _entries(node, key, "numbers"))
 
@@ -102,9 +102,9 @@ def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
 
 
 def _few(entries: Sequence[JsonNode], node: JsonNode) -> Sequence[JsonNode]:
-    if len(entries) > MOST_ENTRIES:
+    if len(entries) > _MOST_ENTRIES:
         raise InputError(
-            f"{node.file}, {node.key}: at most {MOST_ENTRIES} entries are allowed, {len(entries)} were given."
+            f"{node.file}, {node.key}: at most {_MOST_ENTRIES} entries are allowed, {len(entries)} were given."
         )
     return entries
 

@@ -36,7 +36,7 @@ Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
 Emit = Callable[[Row, Timing], None]
 """Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
-ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
+_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
 
 
 @final
@@ -157,7 +157,7 @@ def misbehaved(spec: TrialSettings, content: str, demonstration: str, said: str)
     Args:
         said: What it did; addresses of objects, which differ from run to run, are left out.
     """
-    said = ADDRESS.sub("0x...", said.encode(errors="replace").decode())
+    said = _ADDRESS.sub("0x...", said.encode(errors="replace").decode())
     return _failed(spec, content, demonstration, Outcome("correct", "raised", None, said))
 
 

@@ -25,7 +25,7 @@ from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.code_version import code_files
 
-SCHEMAS = (ROW, files.DEMONSTRATION, files.OBSERVATION, files.PLAN)
+_SCHEMAS = (ROW, files.DEMONSTRATION, files.OBSERVATION, files.PLAN)
 
 
 def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> str:
@@ -36,7 +36,7 @@ def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Pat
     Args:
         given: What `load_scenario` was given.
     """
-    said = [content_pieces(scenario, given, arm_file), dict(code_files()), __version__, SCHEMAS]
+    said = [content_pieces(scenario, given, arm_file), dict(code_files()), __version__, _SCHEMAS]
     return _hash(json.dumps(said, sort_keys=True).encode())
 
 

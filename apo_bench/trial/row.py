@@ -13,7 +13,7 @@ from apo_bench.records.row import LONGEST_SENTENCE, ROW_FIELDS, Row
 from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
 from apo_bench.scenario.scenario import Scenario
 
-FOUND = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))
+_FOUND = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))
 """Columns of what came out."""
 
 
@@ -39,4 +39,4 @@ def result(end: Outcome, *, success: bool | None) -> Row:
         "failure_operation": None if end.operation is None else end.operation + 1,
         "sentence": clean(end.sentence)[:LONGEST_SENTENCE],
     }
-    return cast(Row, dict.fromkeys(FOUND)) | known
+    return cast(Row, dict.fromkeys(_FOUND)) | known

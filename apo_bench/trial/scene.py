@@ -9,7 +9,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 
-SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)
+_SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)
 
 
 def scene_of(settings: TrialSettings, scenario: Scenario | None = None) -> Scene:
@@ -22,9 +22,9 @@ def scene_of(settings: TrialSettings, scenario: Scenario | None = None) -> Scene
         InputError: There is no such scenario or arm, or a part cannot have the clearance.
     """
     found = load_scenario(settings.scenario) if scenario is None else scenario
-    return build_scene(found, **{name: getattr(settings, name) for name in SHAPING})
+    return build_scene(found, **{name: getattr(settings, name) for name in _SHAPING})
 
 
 def scene_key(settings: TrialSettings) -> tuple[Any, ...]:
     """Equal where the same scene serves."""
-    return (settings.scenario, *(getattr(settings, name) for name in SHAPING))
+    return (settings.scenario, *(getattr(settings, name) for name in _SHAPING))

@@ -17,11 +17,11 @@ from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.settings import Setting, level_of, level_words
 
-LEFT, RIGHT, HIGH, STEP, APART = 138, 46, 11, 14, 5
+_LEFT, _RIGHT, _HIGH, _STEP, _APART = 138, 46, 11, 14, 5
 """Where bars begin and end, their height, from one to the next, and between methods, px."""
-LETTER, SMALL, MOST = 6.6, 5.8, 48
+_LETTER, _SMALL, _MOST = 6.6, 5.8, 48
 """How wide letters of names and of levels are, px; letters of a name that is shown whole."""
-Box = tuple[float, float, float, float]
+_Box = tuple[float, float, float, float]
 
 
 def outcome_figure(grouped: Mapping[Setting, Sequence[Cell]]) -> Figure:
@@ -51,7 +51,7 @@ def canvas(axis: Any, height: float) -> None:
     axis.set(xlim=(0, WIDTH), ylim=(height, 0))
 
 
-def boxes(axis: Any, found: Sequence[Box], colors: Sequence[Any]) -> Any:
+def boxes(axis: Any, found: Sequence[_Box], colors: Sequence[Any]) -> Any:
     """Filled boxes (x, y, width, height)."""
     corners = [[(x, y), (x + w, y), (x + w, y + h), (x, y + h)] for x, y, w, h in found]
     return axis.add_collection(PolyCollection(corners, facecolors=colors, linewidths=0, clip_on=False), autolim=False)
@@ -73,21 +73,21 @@ def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     y = 6.0
     for method in dict.fromkeys(cell.method for cell in cells):
         own = [cell for cell in cells if cell.method == method]
-        beside = LETTER * len(method) + SMALL * len(_level(own[0], setting)) <= LEFT - 12
-        names.append((y + APART, method if len(method) <= MOST else f"{method[: MOST - 1]}…"))
-        y += APART if beside else APART + STEP
-        bars += [(y + STEP * i, cell) for i, cell in enumerate(own)]
-        y += STEP * len(own)
+        beside = _LETTER * len(method) + _SMALL * len(_level(own[0], setting)) <= _LEFT - 12
+        names.append((y + _APART, method if len(method) <= _MOST else f"{method[: _MOST - 1]}…"))
+        y += _APART if beside else _APART + _STEP
+        bars += [(y + _STEP * i, cell) for i, cell in enumerate(own)]
+        y += _STEP * len(own)
     height = int(y + 32)
 
     def draw(axis: Any, tip: Tips) -> None:
         canvas(axis, height)
         small = {"fontsize": 9, "color": SOFT}
         for top, name in names:
-            axis.text(0, top + HIGH - 2, name)
+            axis.text(0, top + _HIGH - 2, name)
         for top, cell in bars:
-            axis.text(LEFT - 6, top + HIGH - 2, _level(cell, setting), ha="right", **small)
-            axis.text(WIDTH - RIGHT + 5, top + HIGH - 2, f"n {cell.trials}", **small)
+            axis.text(_LEFT - 6, top + _HIGH - 2, _level(cell, setting), ha="right", **small)
+            axis.text(WIDTH - _RIGHT + 5, top + _HIGH - 2, f"n {cell.trials}", **small)
         pieces = [piece for top, cell in bars for piece in _bar(cell, setting, top)]
         drawn = boxes(axis, [box for box, _, _ in pieces], [color for _, color, _ in pieces])
         tip(drawn, [said for _, _, said in pieces])
@@ -98,7 +98,7 @@ def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     return Panel(setting.title(), draw, height, (0, 0, 0, 0))
 
 
-def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[Box, str, str]]:
+def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[_Box, str, str]]:
     """Boxes with their colours and what is said of them."""
     found, done, level = stages_of(cell), 0, _level(cell, setting)
     at = f"{cell.method}{f', level {level}' if level else ''}"
@@ -106,7 +106,7 @@ def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[Box, str, str
         if count:
             left, right = _x(done / cell.trials), _x((done + count) / cell.trials)
             said = f"{at}: {ending} {count} of {cell.trials} ({percent(count / cell.trials)})"
-            yield (left, y, right - left, HIGH), color_of(ending), said
+            yield (left, y, right - left, _HIGH), color_of(ending), said
             done += count
 
 
@@ -120,4 +120,4 @@ def _level(cell: Cell, setting: Setting) -> str:
 
 
 def _x(share: float) -> float:
-    return LEFT + (WIDTH - LEFT - RIGHT) * share
+    return _LEFT + (WIDTH - _LEFT - _RIGHT) * share

@@ -10,11 +10,11 @@ from apo_bench.report.figures.sheet import Figure, Panel, Tips
 from apo_bench.report.figures.styles import SOFT
 from apo_bench.statistics.confusion import ALL, Confusion
 
-SIDE, TOP, LEFT = 74, 34, 108
+_SIDE, _TOP, _LEFT = 74, 34, 108
 """Of a square; where the first begins, px."""
-HEIGHT = TOP + 2 * SIDE + 6
-RIGHT_COLOR, WRONG_COLOR = "#0072b2", "#d55e00"
-Counts = tuple[tuple[int, int], tuple[int, int]]
+_HEIGHT = _TOP + 2 * _SIDE + 6
+_RIGHT_COLOR, _WRONG_COLOR = "#0072b2", "#d55e00"
+_Counts = tuple[tuple[int, int], tuple[int, int]]
 """Predicted to fit, predicted to fail: each fitted, failed."""
 
 
@@ -28,31 +28,31 @@ def prediction_figure(found: Sequence[Confusion]) -> Figure:
     return Figure("Predicted against real failure", panels)
 
 
-def _sum(own: Sequence[Confusion]) -> Counts:
+def _sum(own: Sequence[Confusion]) -> _Counts:
     fits = sum(c.fit_fitted for c in own), sum(c.fit_failed for c in own)
     fails = sum(c.fail_fitted for c in own), sum(c.fail_failed for c in own)
     return fits, fails
 
 
-def _panel(method: str, counts: Counts) -> Panel:
+def _panel(method: str, counts: _Counts) -> Panel:
     n = sum(map(sum, counts))
 
     def draw(axis: Any, tip: Tips) -> None:
-        canvas(axis, HEIGHT)
+        canvas(axis, _HEIGHT)
         small = {"fontsize": 9, "color": SOFT}
         for i, words in enumerate(("predicted to fit", "predicted to fail")):
-            axis.text(LEFT - 8, TOP + SIDE * (i + 0.5) + 4, words, ha="right")
+            axis.text(_LEFT - 8, _TOP + _SIDE * (i + 0.5) + 4, words, ha="right")
             for j, word in enumerate(("fitted", "failed")):
-                x, y, count = LEFT + SIDE * j, TOP + SIDE * i, counts[i][j]
-                color = RIGHT_COLOR if i == j else WRONG_COLOR
-                square = boxes(axis, [(x, y, SIDE - 2, SIDE - 2)], [color])
+                x, y, count = _LEFT + _SIDE * j, _TOP + _SIDE * i, counts[i][j]
+                color = _RIGHT_COLOR if i == j else _WRONG_COLOR
+                square = boxes(axis, [(x, y, _SIDE - 2, _SIDE - 2)], [color])
                 square.set_alpha(0.08 + 0.55 * count / n)
                 tip(square, [f"{words}, {word}: {count} of {n}"])
-                axis.text(x + SIDE / 2 - 1, y + SIDE / 2, f"{count:,}", ha="center")
-                axis.text(x + SIDE / 2 - 1, y + SIDE / 2 + 14, f"{100 * count / n:.1f} %", ha="center", **small)
+                axis.text(x + _SIDE / 2 - 1, y + _SIDE / 2, f"{count:,}", ha="center")
+                axis.text(x + _SIDE / 2 - 1, y + _SIDE / 2 + 14, f"{100 * count / n:.1f} %", ha="center", **small)
         for j, word in enumerate(("fitted", "failed")):
-            axis.text(LEFT + SIDE * (j + 0.5), TOP - 8, word, ha="center")
+            axis.text(_LEFT + _SIDE * (j + 0.5), _TOP - 8, word, ha="center")
         agreed = (counts[0][0] + counts[1][1]) / n
-        axis.text(LEFT + 2 * SIDE + 8, TOP + SIDE, f"{100 * agreed:.1f} % right", **small)
+        axis.text(_LEFT + 2 * _SIDE + 8, _TOP + _SIDE, f"{100 * agreed:.1f} % right", **small)
 
-    return Panel(f"{method}; n {n:,}", draw, HEIGHT, (0, 0, 0, 0))
+    return Panel(f"{method}; n {n:,}", draw, _HEIGHT, (0, 0, 0, 0))

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 INK, SOFT, RULE = "#1d2430", "#5b6575", "#d9dde4"
 """Of text and lines, of what matters less, and of the grid."""
 SUCCESS = "#cfe3dc"
-SOLID: Any = "-"
-DASHED, DOTTED = (0, (4, 1.5)), (0, (1, 1))
+_SOLID: Any = "-"
+_DASHED, _DOTTED = (0, (4, 1.5)), (0, (1, 1))
 
 
 class Style(NamedTuple):
@@ -22,27 +22,27 @@ class Style(NamedTuple):
 
 
 STYLES = {
-    "none": Style("#d55e00", "o", SOLID),
-    "search": Style("#e7298a", "8", DASHED),
-    "contact": Style("#332288", "p", SOLID),
-    "paper": Style("#0072b2", "s", SOLID),
-    "paper-track": Style("#009e73", "D", SOLID),
-    "last-only": Style("#e69f00", "v", DASHED),
-    "no-history": Style("#cc79a7", "^", DASHED),
-    "no-disappeared": Style("#56b4e9", "P", DASHED),
-    "minimal": Style("#8c6bb1", "X", DOTTED),
-    "snap": Style("#a6761d", "*", DOTTED),
-    "least-squares": Style("#117733", "<", DOTTED),
-    "settle": Style("#882255", ">", DOTTED),
-    "penalty": Style("#88ccee", "d", DOTTED),
+    "none": Style("#d55e00", "o", _SOLID),
+    "search": Style("#e7298a", "8", _DASHED),
+    "contact": Style("#332288", "p", _SOLID),
+    "paper": Style("#0072b2", "s", _SOLID),
+    "paper-track": Style("#009e73", "D", _SOLID),
+    "last-only": Style("#e69f00", "v", _DASHED),
+    "no-history": Style("#cc79a7", "^", _DASHED),
+    "no-disappeared": Style("#56b4e9", "P", _DASHED),
+    "minimal": Style("#8c6bb1", "X", _DOTTED),
+    "snap": Style("#a6761d", "*", _DOTTED),
+    "least-squares": Style("#117733", "<", _DOTTED),
+    "settle": Style("#882255", ">", _DOTTED),
+    "penalty": Style("#88ccee", "d", _DOTTED),
 }
-OTHERS = (Style("#6b6b6b", "h", DOTTED), Style("#ddcc77", "H", DOTTED), Style("#000000", "1", DOTTED))
+OTHERS = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
 RECOGNISED = {
-    "recognised": Style("#009e73", "o", SOLID),
-    "recognised-fixed": Style("#d55e00", "s", DASHED),
-    "recognised-twice": Style("#0072b2", "^", DOTTED),
+    "recognised": Style("#009e73", "o", _SOLID),
+    "recognised-fixed": Style("#d55e00", "s", _DASHED),
+    "recognised-twice": Style("#0072b2", "^", _DOTTED),
 }
-SEEN = Style(SOFT, "o", SOLID)
+SEEN = Style(SOFT, "o", _SOLID)
 """What was observed, before any method."""
 STAGES = {
     "observe": "#999999",
@@ -58,7 +58,7 @@ STAGES = {
     "worker": "#222222",
 }
 """Stage at which a trial failed -> its colour."""
-DARK = {
+_DARK = {
     INK: "#e6e9ee",
     SOFT: "#a5aebb",
     RULE: "#333b47",
@@ -90,9 +90,9 @@ def styles(methods: Sequence[str]) -> dict[str, Style]:
 
 def themed(svg: str) -> str:
     """Colours as custom properties, which a dark page sets to others."""
-    return re.sub(r"(?<=(?:l|e): )#[0-9a-f]{6}", lambda m: f"var(--c{m[0][1:]},{m[0]})" if m[0] in DARK else m[0], svg)
+    return re.sub(r"(?<=(?:l|e): )#[0-9a-f]{6}", lambda m: f"var(--c{m[0][1:]},{m[0]})" if m[0] in _DARK else m[0], svg)
 
 
 def dark_properties() -> str:
     """The custom properties of a dark page."""
-    return "".join(f"--c{light[1:]}:{dark};" for light, dark in DARK.items())
+    return "".join(f"--c{light[1:]}:{dark};" for light, dark in _DARK.items())

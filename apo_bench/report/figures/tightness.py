@@ -13,7 +13,7 @@ from apo_bench.statistics.rate_text import interval, level_label, percent
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.settings import Setting, members, settings
 
-DODGE = 1.03
+_DODGE = 1.03
 """Methods stand this factor from each other at one tightness, so that equal rates do not hide each other."""
 
 
@@ -41,7 +41,7 @@ def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     looks = styles(list(dict.fromkeys(c.method for c in cells)))
     lines = []
     for i, (method, style) in enumerate(looks.items()):
-        dodge = DODGE ** (i - (len(looks) - 1) / 2)
+        dodge = _DODGE ** (i - (len(looks) - 1) / 2)
         for level in sorted({(c.level, c.level_deg) for c in cells if c.method == method}):
             own = [c for c in cells if c.method == method and (c.level, c.level_deg) == level]
             points = [

@@ -10,7 +10,7 @@ from apo_bench.report.figures.sheet import WIDTH, Figure, Panel, Tips
 from apo_bench.report.figures.styles import INK, SOFT
 from apo_bench.statistics.times import Times
 
-LEFT, RIGHT, STEP = 118, 16, 20
+_LEFT, _RIGHT, _STEP = 118, 16, 20
 """Where the axis begins and ends, and from one line to the next, px."""
 
 
@@ -24,15 +24,15 @@ def time_figure(found: Sequence[Times]) -> Figure:
 
 
 def _panel(scenario: str, own: Sequence[Times], most: float) -> Panel:
-    bottom = 14 + STEP * len(own)
+    bottom = 14 + _STEP * len(own)
     height = bottom + 28
 
     def x(seconds: float) -> float:
-        return LEFT + (WIDTH - LEFT - RIGHT) * seconds / most
+        return _LEFT + (WIDTH - _LEFT - _RIGHT) * seconds / most
 
     def draw(axis: Any, tip: Tips) -> None:
         canvas(axis, height)
-        at = [14 + STEP * i for i in range(len(own))]
+        at = [14 + _STEP * i for i in range(len(own))]
         for y, t in zip(at, own, strict=True):
             axis.text(0, y + 4, t.method[:18])
         axis.hlines(at, [x(t.low) for t in own], [x(t.high) for t in own], color=SOFT, linewidth=1.4)

@@ -13,14 +13,14 @@ from apo_bench.report.compare import Comparison
 from apo_bench.report.page.document import page
 from apo_bench.report.tables.table import Table
 
-SECTIONS = {
+_SECTIONS = {
     "verdicts": "Verdicts",
     "changed": "Trials whose verdicts differ",
     "numbers": "Numbers",
     "rates": "Rates",
     "differences": "What is not the same",
 }
-AGREEMENT = (
+_AGREEMENT = (
     "The same trials in both: how often success is the same, with Wilson's interval, and how often stage "
     "and code of a failure are as well. Trials of one seed share their random numbers, so those "
     "intervals are too narrow where disagreements come in bunches; *same in all* counts the seeds with which every "
@@ -28,8 +28,8 @@ AGREEMENT = (
     "that the second lost. The difference of success is the second minus the first, with Tango's interval for pairs "
     "(95 %), over trials too. Trials whose demonstration was not right in either are left out here."
 )
-NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
-CELLS = (
+_NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
+_CELLS = (
     "Rates over all trials of each side; alone and the difference, second minus first, over the trials that they share."
 )
 
@@ -74,14 +74,14 @@ def _page(found: Comparison, tables: Mapping[str, Table]) -> str:
     return page(
         "compare.html",
         title=f"{folders[0].resolve().name} against {folders[1].resolve().name}",
-        sections=SECTIONS,
+        sections=_SECTIONS,
         answer=text.in_words(found),
         folders=folders,
         tables=tables,
         words={
-            "agreement": AGREEMENT,
+            "agreement": _AGREEMENT,
             "changed": f"{count:,} of {found.shared:,} trials{listed}.",
-            "numbers": NUMBERS,
-            "cells": CELLS,
+            "numbers": _NUMBERS,
+            "cells": _CELLS,
         },
     )

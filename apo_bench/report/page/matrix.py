@@ -10,7 +10,7 @@ from apo_bench.statistics.rate_text import interval, percent
 from apo_bench.statistics.rates import Cell, Place
 from apo_bench.statistics.settings import Setting, at, level_of, level_unit, level_words, levels_of
 
-MANY = 12
+_MANY = 12
 """With more settings than this, those of a scenario are folded."""
 
 
@@ -52,7 +52,7 @@ def matrices(
     met: set[int] = set()
     folded: dict[str | None, list[Matrix]] = {}
     for setting, cells in grouped.items():
-        scenario = setting.scenario if len(grouped) > MANY else None
+        scenario = setting.scenario if len(grouped) > _MANY else None
         folded.setdefault(scenario, []).append(_matrix(setting, cells, numbers, met))
     return list(folded.items())
 

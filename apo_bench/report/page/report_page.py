@@ -26,7 +26,7 @@ from apo_bench.statistics.settings import Setting, at, setting_of
 from apo_bench.statistics.summary import Summary
 from apo_bench.statistics.times import Work
 
-SECTIONS = {
+_SECTIONS = {
     "success": "Success",
     "levels": "Success over level",
     "pairs": "Paired differences",
@@ -40,7 +40,7 @@ SECTIONS = {
     "timing": "Timing",
     "run": "What was run",
 }
-SUCCESS = (
+_SUCCESS = (
     "Success, that the finished assembly is right, with Wilson's 95 % interval and the number of trials; below it, "
     "where it is not the same, how many were also made as demonstrated: each contact when and where it was shown. "
     "A cell opens its trials, each with the command that runs it again. `oracle` replays the drawn layout, without "
@@ -48,7 +48,7 @@ SUCCESS = (
     "does not converge counts as failed; success among the trials that were carried out stands below where it differs. "
     "Demonstrations that were not right themselves are left out of every method."
 )
-LEVELS = "Bands are Wilson's 95 % intervals; methods stand a little apart so that equal rates do not hide each other."
+_LEVELS = "Bands are Wilson's 95 % intervals; methods stand a little apart so that equal rates do not hide each other."
 
 
 @final
@@ -91,13 +91,13 @@ def report_page(found: Found) -> str:
     return page(
         "report.html",
         title=f"Sweep {found.name}",
-        sections=SECTIONS,
+        sections=_SECTIONS,
         answer=found.answer,
         older=verdicts.words(found.verdict),
         scope=_scope(found.rows),
         words={
-            "success": f"{_level_meaning(found.rows)} {SUCCESS}",
-            "levels": LEVELS,
+            "success": f"{_level_meaning(found.rows)} {_SUCCESS}",
+            "levels": _LEVELS,
             "half_levels": half_levels.WORDS,
             "pairs": pairs.WORDS,
             "gaps": gaps.WORDS,

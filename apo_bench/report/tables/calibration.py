@@ -20,14 +20,14 @@ WORDS = (
 
 def calibration_table(found: Sequence[Calibration]) -> Table:
     """One line per scenario, noise, relations and method; for people."""
-    return Table(found, COLUMNS, "No method was tried.")
+    return Table(found, _COLUMNS, "No method was tried.")
 
 
 def _ratio(c: Calibration) -> str | None:
     return None if c.fixed_over_clearance is None else f"{c.fixed_over_clearance:.2f}"
 
 
-COLUMNS = (
+_COLUMNS = (
     Column("scenario", "scenario", words=True),
     Column("noise", "noise", words=True),
     Column("relations", "relations", text=lambda c: c.relations if knows_relations(c.method) else "any", words=True),

@@ -17,7 +17,7 @@ WORDS = (
 
 def confusion_table(found: Sequence[Confusion]) -> Table:
     """One line per scenario and method, and one of them all."""
-    return Table(found, COLUMNS)
+    return Table(found, _COLUMNS)
 
 
 def summary(c: Confusion) -> str:
@@ -35,7 +35,7 @@ def _operation(c: Confusion) -> str | None:
     return f"{c.same_operation} of {c.stopped}" if c.stopped else None
 
 
-COLUMNS = (
+_COLUMNS = (
     Column("scenario", "scenario", words=True),
     Column("method", "method", words=True),
     Column("", "n", text=lambda c: c.executed),

@@ -17,10 +17,10 @@ WORDS = (
 
 def gap_table(found: Sequence[Gap]) -> Table:
     """One line per cell."""
-    return Table(found, COLUMNS)
+    return Table(found, _COLUMNS)
 
 
-COLUMNS = (
+_COLUMNS = (
     *place_columns(),
     Column("", "level", text=level_text),
     Column("trials", "n"),

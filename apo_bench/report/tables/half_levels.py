@@ -14,8 +14,8 @@ WORDS = (
     "the last level with success surely over one half to the first surely under it, whatever the curve between them. "
     "The area is mean success over the logarithm of the level, from 0 to 1, of seeds that have a result at every level."
 )
-NONE = "No level varied, so nothing is known of how success falls with it."
-WHERE = place_columns(lambda x: x.setting, levels=False)
+_NONE = "No level varied, so nothing is known of how success falls with it."
+_WHERE = place_columns(lambda x: x.setting, levels=False)
 
 
 def half_table(found: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
@@ -27,7 +27,7 @@ def half_table(found: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
         return None if a is None else f"{a.area:.3f} ({span(a.interval)}), {a.seeds} seeds"
 
     columns = (
-        *WHERE,
+        *_WHERE,
         Column("smallest_level", value=lambda h: h.smallest),
         Column("largest_level", value=lambda h: h.largest),
         Column("trials", "n"),
@@ -39,25 +39,25 @@ def half_table(found: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
         Column("surely_under"),
         Column("", "area (95 %)", text=area),
     )
-    return Table(found, columns, NONE)
+    return Table(found, columns, _NONE)
 
 
 def area_table(areas: Sequence[Area], differences: Sequence[AreaDifference]) -> Table:
     """For files: areas, whose reference is empty, and differences to those of a reference."""
-    return Table([*areas, *differences], AREAS)
+    return Table([*areas, *differences], _AREAS)
 
 
 def area_difference_table(found: Sequence[AreaDifference]) -> Table:
     """For people: one line per method, setting and reference."""
-    return Table(found, AREAS)
+    return Table(found, _AREAS)
 
 
 def _difference(d: Area | AreaDifference) -> str | None:
     return points(d.difference, d.interval) if isinstance(d, AreaDifference) else None
 
 
-AREAS = (
-    *WHERE,
+_AREAS = (
+    *_WHERE,
     Column("reference", "against", lambda a: getattr(a, "reference", None), words=True),
     Column("smallest_level", value=lambda a: min(a.levels)),
     Column("largest_level", value=lambda a: max(a.levels)),

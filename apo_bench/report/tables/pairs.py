@@ -31,7 +31,7 @@ WORDS = (
 
 def pair_table(found: Sequence[Paired]) -> Table:
     """One line per cell, method and reference."""
-    return Table(found, COLUMNS, "No two methods share a cell.")
+    return Table(found, _COLUMNS, "No two methods share a cell.")
 
 
 def _counts(p: Paired) -> str:
@@ -51,7 +51,7 @@ def _free(p: Paired) -> str | None:
     return f"{signed(p.free_mm, 3)}{between}, n {p.planned}"
 
 
-COLUMNS = (
+_COLUMNS = (
     *place_columns(),
     Column("reference", "against", words=True),
     Column("", "level", text=level_text),

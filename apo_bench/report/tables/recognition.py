@@ -18,7 +18,7 @@ NONE = "No method was told relations that were recognised."
 
 def recognition_table(found: Sequence[Recognition]) -> Table:
     """One line per place."""
-    return Table(found, COLUMNS, NONE)
+    return Table(found, _COLUMNS, NONE)
 
 
 def _axis(name: str, called: str = "") -> Column:
@@ -37,7 +37,7 @@ def _percent(x: float | None) -> str | None:
     return None if x is None else f"{100 * x:.2f} %"
 
 
-COLUMNS = (
+_COLUMNS = (
     _axis("scenario")._replace(head="scenario", words=True),
     _axis("noise")._replace(head="noise", text=_noise, words=True),
     _axis("eye"),

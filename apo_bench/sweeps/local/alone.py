@@ -14,10 +14,10 @@ from apo_bench.sweeps.stopping import Check, listening
 
 Say = Callable[..., None]
 """Takes "began" when the time of the trial begins to count, and "row" with the row when it ends."""
-Work = Callable[[Say], Any]
+_Work = Callable[[Say], Any]
 
 
-def run_alone(work: Work, limit_s: float, lost: Callable[[str], Row]) -> Row:
+def run_alone(work: _Work, limit_s: float, lost: Callable[[str], Row]) -> Row:
     """The row of a trial that may take so much wall time.
 
     Args:
@@ -56,5 +56,5 @@ def _row(process: Process, limit_s: float, check: Check) -> Row | str:
     return "time_limit" if message is None or time.monotonic() - began > limit_s else message[1]
 
 
-def _work(work: Work, say: Say, pipe: Any) -> None:
+def _work(work: _Work, say: Say, pipe: Any) -> None:
     work(say)

@@ -14,9 +14,9 @@ from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.stopping import Check, never
 from apo_bench.sweeps.worker import Emit, Worker
 
-TURN_S = 0.5
+_TURN_S = 0.5
 """How often the clock and the signals are looked at while nothing else happens."""
-MOMENT_S = 0.25
+_MOMENT_S = 0.25
 """Between a death and its row: whoever ends all of us at once has ended this process by then."""
 GOING_S = 2.0
 """What a process without work gets to end by itself."""
@@ -53,7 +53,7 @@ def spread(
             for member in members:
                 if member.job is None and dispatch.waiting:
                     member.begin(dispatch.waiting.popleft())
-            _hear(members, dispatch, TURN_S)
+            _hear(members, dispatch, _TURN_S)
             for member in members:
                 if member.job and (member.has_ended or dispatch.is_late(member.job)):
                     member.replace(check)
@@ -112,7 +112,7 @@ class Member:
         assert self.process is not None
         code = "worker_died" if self.has_ended else "time_limit"
         if self.has_ended:
-            time.sleep(MOMENT_S)
+            time.sleep(_MOMENT_S)
         check()
         self.hear()
         job = self.job
@@ -149,7 +149,7 @@ def _end_cleanly(members: Sequence[Member], dispatch: Dispatch) -> None:
             member.process.send(None)
     deadline = time.monotonic() + GRACE_S
     while (left_s := deadline - time.monotonic()) > 0.0 and any(m.job and not m.has_ended for m in members):
-        _hear(members, dispatch, min(TURN_S, left_s))
+        _hear(members, dispatch, min(_TURN_S, left_s))
 
 
 def _work(number: int, lock: EnvironmentLock, say: Any, pipe: Any) -> None:

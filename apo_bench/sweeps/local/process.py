@@ -23,9 +23,9 @@ from apo_bench.io.processes import end_descendants
 from apo_bench.sweeps.messages import Message, checked, last_message
 from apo_bench.sweeps.stopping import SIGNALS, Check
 
-TURN_S = 0.1
+_TURN_S = 0.1
 """How often the clock and the signals are looked at while nothing else happens."""
-CLOSING_S = 0.25
+_CLOSING_S = 0.25
 """Between the end of its pipe and that of a process."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -71,7 +71,7 @@ class Process:
             return self._pipe.recv() if self._is_open and self._pipe.poll() else None
         except (EOFError, OSError):
             self._is_open = False
-            self._process.join(CLOSING_S)
+            self._process.join(_CLOSING_S)
             return None
 
     def wait(self, check: Check, seconds: float = math.inf) -> Message | None:
@@ -89,7 +89,7 @@ class Process:
                 return checked(message)
             if not (is_alive and self._is_open) or time.monotonic() >= deadline:
                 return None
-            connection.wait(self.signs, TURN_S)
+            connection.wait(self.signs, _TURN_S)
 
     def end(self, patience_s: float = 0.0) -> None:
         """Ask it to end; by force, with all that it started, if it does not in that time."""

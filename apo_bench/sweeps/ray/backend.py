@@ -25,14 +25,14 @@ from apo_bench.sweeps.ray.runtime_files import runtime_files
 from apo_bench.sweeps.stopping import Check, never
 from apo_bench.sweeps.worker import Emit
 
-TURN_S = 0.2
+_TURN_S = 0.2
 JOINING_S = 30.0
 """What a cluster gets to answer."""
-STARTING_S = 120.0
+_STARTING_S = 120.0
 """What a cluster on this machine gets to start."""
-TOUCH_S = 5.0
+_TOUCH_S = 5.0
 """What its port gets to open."""
-NO_TOKEN = "InvalidAuthToken"
+_NO_TOKEN = "InvalidAuthToken"
 """In what Ray writes when a cluster wants a token."""
 
 
@@ -55,7 +55,7 @@ def check_ray(address: str | None) -> None:
             "10.0.0.5:6379, or auto, or local."
         )
     try:
-        socket.create_connection((found[1], int(found[2])), timeout=TOUCH_S).close()
+        socket.create_connection((found[1], int(found[2])), timeout=_TOUCH_S).close()
     except (OSError, UnicodeError) as error:
         raise InputError(
             f"no Ray cluster answers at {named} ({error}); start one there with: ray start --head --port={found[2]}"
@@ -127,11 +127,11 @@ def _listen(driver: Process, plan: Plan, joining: _Joining, emit: Emit, check: C
     """Take rows until the last word."""
     while True:
         is_alive = driver.exit_code is None
-        kind, *said = driver.wait(check, TURN_S) or (None,)
+        kind, *said = driver.wait(check, _TURN_S) or (None,)
         if kind == "row":
             emit(*said)
         elif kind == "starting":
-            joining.give(STARTING_S)
+            joining.give(_STARTING_S)
         elif kind == "connected":
             joining.give(math.inf)
         elif kind == "none":
@@ -162,7 +162,7 @@ class _Joining:
         """Raise an `InputError` if there is no hope, or what else to try."""
         if math.isinf(self._seconds):
             return
-        if NO_TOKEN in self._text():
+        if _NO_TOKEN in self._text():
             if self._plan.auth == "disabled":
                 raise _OtherWay(replace(self._plan, auth="token"))
             raise InputError(

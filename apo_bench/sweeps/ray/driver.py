@@ -27,15 +27,15 @@ from apo_bench.sweeps.messages import Message, last_message
 from apo_bench.sweeps.ray.pool import DEATHS, FALSE_STARTS, RayPool
 from apo_bench.sweeps.ray.task import made_task
 
-OBJECT_STORE = 100 * 2**20
+_OBJECT_STORE = 100 * 2**20
 """Bytes, of a cluster that is started here; rows are small."""
-SETTINGS = {
+_SETTINGS = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_OVERRIDE_JOB_RUNTIME_ENV": "1",
 }
 """Ray tells nobody that it runs, hides no GPU from the renderer, and takes our files instead of those of a job."""
-ONE_TRY = {"num_cpus": 1, "max_retries": 0, "_generator_backpressure_num_objects": 1}
+_ONE_TRY = {"num_cpus": 1, "max_retries": 0, "_generator_backpressure_num_objects": 1}
 """Options of tasks; a task goes on when its last message has arrived, so that none is lost with its worker."""
 
 
@@ -64,7 +64,7 @@ def drive(plan: Plan, log: str, say: Callable[..., None], pipe: Any) -> None:
     file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     os.dup2(file, 1)
     os.dup2(file, 2)
-    os.environ.update(SETTINGS | ({} if plan.auth is None else {"RAY_AUTH_MODE": plan.auth}))
+    os.environ.update(_SETTINGS | ({} if plan.auth is None else {"RAY_AUTH_MODE": plan.auth}))
     import ray
 
     last: Message = ("done",)
@@ -117,7 +117,7 @@ def _connect(plan: Plan, say: Callable[..., None]) -> None:
             raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
         cpus = max(plan.workers or 1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
         say("starting")
-        ray.init(address="local", num_cpus=cpus, include_dashboard=False, object_store_memory=OBJECT_STORE, **quiet)
+        ray.init(address="local", num_cpus=cpus, include_dashboard=False, object_store_memory=_OBJECT_STORE, **quiet)
 
 
 def _spread(plan: Plan, say: Callable[..., None], pipe: Any) -> None:
@@ -126,7 +126,7 @@ def _spread(plan: Plan, say: Callable[..., None], pipe: Any) -> None:
     def emit(row: Any, timing: Any) -> None:
         say("row", row, timing)
 
-    task = ray.remote(**ONE_TRY)(made_task())
+    task = ray.remote(**_ONE_TRY)(made_task())
     packed = pickle.dumps(plan.lock)
     dispatch = Dispatch(plan.work, plan.lock, plan.limit_s, emit, deaths=DEATHS, false_starts=FALSE_STARTS)
     pool = RayPool(dispatch, lambda unit: task.remote(packed, unit), plan.workers)

@@ -14,8 +14,8 @@ from typing import Any, final
 
 from apo_bench.sweeps.dispatch import STARTING_S, Dispatch, Job
 
-TURN_S = 0.2
-AHEAD = 32
+_TURN_S = 0.2
+_AHEAD = 32
 """So many tasks wait at the cluster for a free CPU, so that a node that joins has work at once."""
 DEATHS = 2
 """So many workers in a row die of one trial before it is lost: memory may be short for once."""
@@ -63,7 +63,7 @@ class RayPool:
 
         self._fill()
         waited_for = [task.messages for task in self._tasks]
-        ray.wait(waited_for, num_returns=1, timeout=TURN_S)
+        ray.wait(waited_for, num_returns=1, timeout=_TURN_S)
         ready = ray.wait(waited_for, num_returns=len(waited_for), timeout=0)[0]
         self._dispatch.tick()
         for task in list(self._tasks):
@@ -85,7 +85,7 @@ class RayPool:
         """As many tasks as there may be, as long as few of them wait for a CPU."""
         while (
             self._dispatch.waiting
-            and sum(task.worker is None for task in self._tasks) < AHEAD
+            and sum(task.worker is None for task in self._tasks) < _AHEAD
             and (self._workers is None or len(self._tasks) < self._workers)
         ):
             job = self._dispatch.waiting.popleft()

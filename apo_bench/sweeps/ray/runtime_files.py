@@ -14,9 +14,9 @@ from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import Names
 
-NAMED_FILE = re.compile(r"""\bfile\s*=\s*["']([^"']+)["']""")
+_NAMED_FILE = re.compile(r"""\bfile\s*=\s*["']([^"']+)["']""")
 """In MJCF: meshes, textures and what is included."""
-NAMED_FOLDER = re.compile(r"""\b(?:mesh|texture|asset)dir\s*=\s*["']([^"']+)["']""")
+_NAMED_FOLDER = re.compile(r"""\b(?:mesh|texture|asset)dir\s*=\s*["']([^"']+)["']""")
 
 
 def runtime_files(names: Names) -> dict[str, Path]:
@@ -58,6 +58,6 @@ def _installed() -> set[str]:
 def _with_named(mjcf: Path) -> list[Path]:
     """An arm's file, and the files that it names, beside it or in a folder that it names for them."""
     text = mjcf.read_text(encoding="utf-8", errors="replace")
-    folders = [mjcf.parent, *(mjcf.parent / name for name in NAMED_FOLDER.findall(text))]
-    named = (folder / name for folder in folders for name in NAMED_FILE.findall(text))
+    folders = [mjcf.parent, *(mjcf.parent / name for name in _NAMED_FOLDER.findall(text))]
+    named = (folder / name for folder in folders for name in _NAMED_FILE.findall(text))
     return [mjcf, *(path for path in named if path.is_file())]
