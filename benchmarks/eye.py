@@ -70,7 +70,7 @@ def noticed(scene: Scene, shown: Recording, event: Event) -> int:
     stages = (demonstration.start, *placements(demonstration.assembly, demonstration.start, demonstration.goals))
     solids, play = scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm
     count = 0
-    for view, region in zip(shown.watched.finder.views, event.regions, strict=True):
+    for view, region in zip(shown.images.finder.views, event.regions, strict=True):
         for mask, poses in ((region.appeared, demonstration.final), (region.vanished, stages[-2])):
             shapes = [shape_of(physical_boxes(solids[part], play), poses[part]) for part in solids]
             owner = np.concatenate([[part] * len(shape.center) for part, shape in zip(solids, shapes, strict=True)])

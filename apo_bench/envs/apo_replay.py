@@ -163,7 +163,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         )
         self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
         self._trial: int | None = None
-        self._shown: Recording | None = None
+        self._recording: Recording | None = None
         self._seen: Observation | None = None
         self._aim: Plan | None = None
         self._refused: Outcome | None = None
@@ -216,14 +216,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
-        self._trial, shown = self._watch_human(seed)
-        noise = range_sensor(self._scene, shown, self._now.level.mm) if self._eye == RANGE else self._noise
-        self._seen = observe_recording(shown, noise, self._trial)
-        self._shown = replace(shown, watched=None)
+        self._trial, recording = self._watch_human(seed)
+        noise = range_sensor(self._scene, recording, self._now.level.mm) if self._eye == RANGE else self._noise
+        self._seen = observe_recording(recording, noise, self._trial)
+        self._recording = replace(recording, images=None)
         self.aim(self._seen.goals)
         self._refused, self._over = observation_failure(self._seen), False
-        self._poses, self._state = shown.layout.start, None
-        return self._observation(), {"demonstration": shown.demonstration.code}
+        self._poses, self._state = recording.layout.start, None
+        return self._observation(), {"demonstration": recording.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the goals, each moved by its twist.
@@ -232,7 +232,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             ResetNeeded: The episode is over, or there is none.
             InputError: The action is not in the action space.
         """
-        if self._shown is None or self._aim is None or self._over:
+        if self._recording is None or self._aim is None or self._over:
             raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
         twist = np.asarray(action, dtype=np.float64)
         if not self.action_space.contains(twist):
@@ -242,14 +242,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
                 "allowed, as `env.action_space` says."
             )
         self._over = True
-        verdicts, end, said = self._replayed(self._shown, _moved(self._aim, pose.exp(twist)))
+        verdicts, end, predicted = self._replayed(self._recording, _moved(self._aim, pose.exp(twist)))
         info = {
             **verdicts,
             "stage": end.stage,
             "code": end.code,
             "operation": whole(None if end.operation is None else end.operation + 1),
             "sentence": end.sentence,
-            **({} if said is None else {"predicted": predicted_info(said)}),
+            **({} if predicted is None else {"predicted": predicted_info(predicted)}),
         }
         return self._observation(), float(verdicts["is_success"]), True, False, info
 
@@ -298,9 +298,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         """Trial `seed`, or the next one whose demonstration is right."""
         for _ in range(1 if seed is not None else MOST_TRIES):
             trial = int(seed) if seed is not None else self._next_trial()
-            shown = record_demonstration(self._scene, self._now.careless, trial, self._eye)
-            if seed is not None or shown.demonstration.code == "ok":
-                return trial, shown
+            recording = record_demonstration(self._scene, self._now.careless, trial, self._eye)
+            if seed is not None or recording.demonstration.code == "ok":
+                return trial, recording
         raise InputError(
             f"{MOST_TRIES} demonstrations of '{self._scene.scenario.name}' in a row went wrong at carelessness "
             f"{self._now.careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend "
@@ -315,20 +315,20 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         goals = packed(self.seen.goals)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
-    def _replayed(self, shown: Recording, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None]:
+    def _replayed(self, recording: Recording, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None]:
         """The verdicts, where it ended, and what the plan had said."""
         failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
-        if shown.demonstration.code != "ok":
-            return failed, demonstration_failure(shown.demonstration), None
+        if recording.demonstration.code != "ok":
+            return failed, demonstration_failure(recording.demonstration), None
         if self._refused is not None:
             return failed, self._refused, None
-        said = predicted_outcome(plan, self._scene)
-        tried = replay_and_judge(plan, self._scene, shown.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
-        if tried.result.reached.final is not None:
-            self._poses = tried.result.reached.final.poses
-        judged = tried.verdict
+        predicted = predicted_outcome(plan, self._scene)
+        attempt = replay_and_judge(plan, self._scene, recording.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
+        if attempt.result.reached.final is not None:
+            self._poses = attempt.result.reached.final.poses
+        judged = attempt.verdict
         verdicts = (judged.success, judged.as_demonstrated, judged.loose_success)
-        return dict(zip(failed, verdicts, strict=True)), trial_outcome(tried), said
+        return dict(zip(failed, verdicts, strict=True)), trial_outcome(attempt), predicted
 
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""

@@ -30,7 +30,7 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    events, assembly = run.events, run.shown.demonstration.assembly
+    events, assembly = run.events, run.recording.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)

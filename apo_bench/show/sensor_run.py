@@ -35,7 +35,7 @@ class SensorRun:
 
     name: str
     """The name of the scenario."""
-    shown: Recording
+    recording: Recording
     watched: DemonstrationImages
     images: tuple[Array, ...]
     """Measured range images, (views, height, width) each, [m]."""
@@ -53,13 +53,15 @@ def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> Se
     check("careless", careless)
     check("seed", seed)
     scene = build_scene(load_scenario(scenario))
-    shown = record_demonstration(scene, careless, seed, RANGE)
-    if shown.demonstration.code != "ok":
-        raise RuntimeError(f"{demonstration_failure(shown.demonstration).sentence}; try another seed")
-    assert shown.watched is not None
-    eye = range_sensor(scene, shown, level_mm)
+    recording = record_demonstration(scene, careless, seed, RANGE)
+    if recording.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(recording.demonstration).sentence}; try another seed")
+    assert recording.images is not None
+    eye = range_sensor(scene, recording, level_mm)
     images = tuple(eye.sensed(stream(seed, OBSERVATION)))
-    return SensorRun(scene.scenario.name, shown, shown.watched, images, eye.events(shown.demonstration, images))
+    return SensorRun(
+        scene.scenario.name, recording, recording.images, images, eye.events(recording.demonstration, images)
+    )
 
 
 def checked_view(view: int) -> int:
@@ -86,7 +88,7 @@ def sensor_form(run: SensorRun, level_mm: float, seed: int, careless: float) -> 
         "firings_s": [round(t, 3) for t in run.watched.times_s],
         "operations": [
             {"operation": k + 1, "moves": list(operation.moves)} | _one(of.get(k), run, k)
-            for k, operation in enumerate(run.shown.demonstration.assembly.operations)
+            for k, operation in enumerate(run.recording.demonstration.assembly.operations)
         ],
     }
 
@@ -95,7 +97,7 @@ def _one(event: Event | None, run: SensorRun, k: int) -> dict[str, Any]:
     if event is None or event.found is None:
         return {"found": False}
     deviation = np.sqrt(np.diag(event.found.covariance))
-    error = pose.log(pose.inverse(event.found.T) @ run.shown.demonstration.goals[k])
+    error = pose.log(pose.inverse(event.found.T) @ run.recording.demonstration.goals[k])
     packed = pose.pack(event.found.T)
     return {
         "found": True,

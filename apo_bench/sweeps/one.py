@@ -138,24 +138,24 @@ def watched(request: Request) -> Observation:
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
     scene = scene_of(spec, scenario)
-    shown = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-    if shown.demonstration.code != "ok":
-        raise RuntimeError(f"{demonstration_failure(shown.demonstration).sentence}; try another seed")
-    return look(spec, scene, shown)
+    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    if recording.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(recording.demonstration).sentence}; try another seed")
+    return look(spec, scene, recording)
 
 
-def look(spec: TrialSettings, scene: Scene, shown: Recording) -> Observation:
+def look(spec: TrialSettings, scene: Scene, recording: Recording) -> Observation:
     """The demonstration of a trial through its eye."""
-    return observe_recording(shown, noise_of(spec, scene, shown), spec.seed, spec.salt)
+    return observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
 
 
 def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
-    shown = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
-        write_form(observation_form(look(spec, scene, shown), name), request.save_observation)
+        write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    return row_of(spec, scene, shown, content, method=method, watch=film)
+    return row_of(spec, scene, recording, content, method=method, watch=film)
 
 
 def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:

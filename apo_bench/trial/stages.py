@@ -42,7 +42,7 @@ class Recording:
 
     layout: Layout
     demonstration: Demonstration
-    watched: DemonstrationImages | None = None
+    images: DemonstrationImages | None = None
     """What the range finder recorded of it; None if only poses are asked for."""
 
 
@@ -72,11 +72,11 @@ def record_demonstration(
 
 def range_sensor(scene: Scene, recording: Recording, level_mm: float) -> RangeSensor:
     """The range finder that recorded a demonstration, as a noise model; `level_mm` is the noise of a ray."""
-    assert recording.watched is not None, "record the demonstration with eye='range'"
+    assert recording.images is not None, "record the demonstration with eye='range'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
-    watched = recording.watched
-    return RangeSensor(watched.finder, watched.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
+    camera = recording.images
+    return RangeSensor(camera.finder, camera.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
 
 
 def observe_recording(recording: Recording, noise: Noise, seed: int, salt: Salt | None = None) -> Observation:

@@ -133,8 +133,8 @@ def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
     assert one.covariance.tobytes() == again.covariance.tobytes()
     assert (one.goals != two.goals).any()
     assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
-    fresh = record_demonstration(scene("stick_in_tower"), 1.0, 3, "range").watched
-    known = watched("stick_in_tower").watched
+    fresh = record_demonstration(scene("stick_in_tower"), 1.0, 3, "range").images
+    known = watched("stick_in_tower").images
     assert fresh is not None
     assert known is not None
     assert fresh.times_s == known.times_s
