@@ -112,7 +112,7 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
 
     Args:
         goals: (n, 4, 4), consistent with every contact, such as corrected goals, world frame, [m].
-        dropped: Relations, R1, R2, .., that are left out; so are walls, which leave a part free between them.
+        dropped: Relations, R1, R2, .., that are left out; so are inequalities, which leave a part free between them.
 
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.

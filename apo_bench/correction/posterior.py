@@ -120,6 +120,6 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
 
 
 def _equal(observation: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
-    """The contacts that were equations, (c,): neither walls nor left out."""
+    """The contacts that were equations, (c,): neither inequalities nor left out."""
     low, high = observation.assembly.intervals(observation.play_m).T
     return np.asarray(low == high) & observation.assembly.without(dropped)

@@ -1,4 +1,4 @@
-"""What one observation asks of a solver: its equations, its walls, its noise; solved with all contacts or some."""
+"""What one observation asks of a solver: equations, inequalities, noise; solved with all contacts or some."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Problem:
     compact: CompactEquations
     """The equations of `system` in compact form, three per contact."""
     exact: NDArray[np.bool_]
-    """(c,): contacts that are equations; the others are walls."""
+    """(c,): contacts that are equations; the others are inequalities."""
     inequalities: Inequalities
     L: Array
     """(n, 6, 6)."""
@@ -53,14 +53,14 @@ class Problem:
     def solve(self, kept: NDArray[np.bool_], found: NearestGoals | None = None) -> tuple[NearestGoals, Consistency]:
         """The nearest goals by the contacts that are `kept`, (c,), and the test of their correction.
 
-        Of walls, those that are touched count like equations: given which they are, the squared length is chi-square
+        Active inequalities count like equations: given which they are, the squared length is chi-square
         distributed with that many degrees of freedom more (Shapiro, "Towards a unified theory of inequality constrained
-        testing", 1988), if the truth touches them too, and shorter otherwise.
+        testing", 1988), if they are active at the truth too, and shorter otherwise.
 
         Contacts that contradict each other have no nearest goals; those that share the contradiction out are returned.
 
         Args:
-            found: The nearest goals without walls, if they are known already.
+            found: The nearest goals without inequalities, if they are known already.
         """
         chosen = kept & self.exact
         part, slack_m = self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
@@ -101,7 +101,7 @@ class Problem:
         return self.observation.assembly.without(dropped)
 
     def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
-        """The largest |e| of what is kept, [m]; of walls, by how much they are overstepped."""
+        """The largest |e| of what is kept, [m]; or how far an inequality is violated."""
         return violation(self.system, self.exact, self.inequalities, goals, kept)
 
 

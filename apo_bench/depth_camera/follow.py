@@ -70,7 +70,7 @@ def follow_demonstration(
 
     An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
     what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
-    this eye where it was. Of operations in a row that move the same parts only where the last one ended is known: a
+    this sensor where it was. Of operations in a row that move the same parts only where the last one ended is known: a
     pause of the hand looks the same as the end of an operation, so the others are not seen.
     """
     assembly, believed = expected.assembly, dict(expected.start)

@@ -1,4 +1,4 @@
-"""The range finder as an eye: from the true range images of a demonstration to an observation of it."""
+"""The range finder as a sensor of poses: from the true range images of a demonstration to an observation of it."""
 
 from __future__ import annotations
 

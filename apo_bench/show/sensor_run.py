@@ -57,10 +57,10 @@ def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> Se
     if recording.demonstration.code != "ok":
         raise RuntimeError(f"{demonstration_failure(recording.demonstration).sentence}; try another seed")
     assert recording.images is not None
-    eye = range_sensor(scene, recording, level_mm)
-    images = tuple(eye.sensed(stream(seed, OBSERVATION)))
+    sensor = range_sensor(scene, recording, level_mm)
+    images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
     return SensorRun(
-        scene.scenario.name, recording, recording.images, images, eye.events(recording.demonstration, images)
+        scene.scenario.name, recording, recording.images, images, sensor.events(recording.demonstration, images)
     )
 
 

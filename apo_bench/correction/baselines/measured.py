@@ -40,7 +40,7 @@ def goals_as_given(observation: Observation, goals: Array, sentence: str) -> Cor
 
 
 def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()) -> float:
-    """The largest |e| at goals (n, 4, 4) of what is asked of the contacts, [m]; of walls, how far one is overstepped.
+    """The largest |e| at goals (n, 4, 4) of what is asked of the contacts, [m]; or how far an inequality is violated.
 
     Args:
         dropped: Relations, or single contacts, that do not count.

@@ -1,7 +1,7 @@
-"""Contacts with play, as walls: each vertex may be anywhere between two distances from its plane.
+"""Contacts with play, as inequality constraints: a vertex may be anywhere between two distances from its plane.
 
 Equations of exact and centred contacts are solved first, which settles their rank. After that every turn solves a
-quadratic program: the shortest z among all that satisfy the linearised equations and stay between the linearised walls.
+quadratic program: the shortest z among all that satisfy the linearised equations and inequalities.
 Redundant equations would make the active-set solver cycle, so z is written as the shortest solution of the equations
 plus a combination of their free directions; only that is the unknown of the program.
 """
@@ -24,18 +24,18 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
 
 _BLIND = 1e-7
-"""Part of the largest row below which a wall does not depend on the free directions."""
+"""Part of the largest row below which an inequality does not depend on the free directions."""
 _EXACT = 1e-10
-"""How far the program may overstep a wall, in standard deviations."""
+"""How far the program may violate an inequality, in standard deviations."""
 _TURNS = 200
 _SETTLED = 60
 """The turn as which the equations are damped: they hold already."""
 _SLOWEST, _GROWS = 1.0 / 64.0, 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
 _TOUCH_M = 1e-9
-"""A vertex nearer to its wall touches it."""
+"""An inequality is active if a vertex is nearer to its bound."""
 _HARD, _SOFT = 0, 8
-"""What DAQP calls a wall, and one that may be overstepped."""
+"""What DAQP calls an inequality, and one that may be violated."""
 
 
 @final
@@ -53,12 +53,12 @@ class Inequalities:
         return len(self.low)
 
     def among(self, contacts: NDArray[np.bool_]) -> Inequalities:
-        """The walls of some of the contacts that have any."""
+        """The inequalities of some of the contacts that have any."""
         rows = contacts[self.system.contact]
         return Inequalities(self.system.among(contacts), self.low[rows], self.high[rows])
 
     def overstepped(self, goals: Array) -> float:
-        """By how much the worst vertex is beyond its walls at the goals, [m]; 0 if none is."""
+        """By how much the worst vertex is beyond its bounds at the goals, [m]; 0 if none is."""
         e = self.system.residual(goals)
         return float(np.maximum(self.low - e, e - self.high).max(initial=0.0))
 
@@ -66,12 +66,12 @@ class Inequalities:
 def violation(
     system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, goals: Array, kept: NDArray[np.bool_]
 ) -> float:
-    """The largest |e| of the equations that are `kept`, (c,), [m]; of walls, by how much they are overstepped."""
+    """The largest |e| of the equations that are `kept`, (c,), [m]; or how far an inequality is violated."""
     return max(largest(system.gaps(goals)[kept & exact]), inequalities.among(kept[~exact]).overstepped(goals))
 
 
 def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
-    """What is demanded of each contact: shifted planes, (c,) whether it is an equation, and the walls of the others."""
+    """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
     plane = np.array(system.plane)
@@ -87,15 +87,15 @@ def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equa
 def nearest_between(
     system: CompactEquations, inequalities: Inequalities, observed: Array, L: Array, start: NearestGoals
 ) -> NearestGoals:
-    """The nearest goals that satisfy the equations and stay between the walls.
+    """The nearest goals that satisfy the equations and the inequalities.
 
     Args:
         seen: (n, 4, 4), world frame, [m].
         L: (n, 6, 6), L L^t the covariance of the body twists.
-        start: The nearest goals without walls.
+        start: The nearest goals without inequalities.
 
     Returns:
-        Not at rest if there is no room between the walls.
+        Not at rest if the inequalities leave no room.
 
     Raises:
         InputError: Too many operations for a dense program.
@@ -132,7 +132,7 @@ def nearest_between(
 
 
 def active_rank(Jt: Array, inequalities: Inequalities, found: NearestGoals) -> int:
-    """How many directions the walls that are touched fix beyond the equations.
+    """How many directions the active inequalities fix beyond the equations.
 
     Args:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
@@ -144,7 +144,7 @@ def active_rank(Jt: Array, inequalities: Inequalities, found: NearestGoals) -> i
 
 
 def _paced(pace: float, step: Array, last: Array) -> float:
-    """The part of a step to make: all of it, but less where walls in turn make steps go to and fro.
+    """The part of a step to make: all of it, but less where inequalities in turn make steps go to and fro.
 
     If making the part p of the step before left r of it, making p / (1 - r) would have left nothing (secant rule).
     """
@@ -158,8 +158,8 @@ def _paced(pace: float, step: Array, last: Array) -> float:
 def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, bool]:
     """The shortest u with low <= J free u <= high, and whether there is one (DAQP: Arnstrom, Bemporad, Axehill, 2022).
 
-    Far from a solution linearised walls can leave no room where the walls themselves do; then the walls are overstepped
-    by as little as can be.
+    Far from a solution linearised inequalities can leave no room where the inequalities themselves do; then they are
+    violated by as little as can be.
     """
     import daqp
 
