@@ -24,34 +24,23 @@ PAGE = HERE / "reference" / "noise-models.md"
 PICTURE = "../pictures/noise_{}.png"
 LEVEL = Level(1.0, 1.0)
 INTRODUCTION = """
-A noise model is a function `noise(assembly, shown, rng) -> Observation`: from what was shown, without error, and
-chance, it makes what was seen: goals, the covariance that the camera states of each, and whether the operation was
-seen at all. `--noise` takes the names below, `package.module:name`, and in Python the function or class itself; a
-class is made with the level. A plain function `(goals, rng) -> goals` will do if it says how large its errors are, in
-attributes:
+`--noise` takes the names below. [Your own noise](../guide/noise.md) says how to write another one.
 
-    def high(goals, rng):
-        goals[:, 2, 3] += 0.002 * rng.random(len(goals))
-        return goals
-
-    high.deviation_mm, high.deviation_deg = 1.5, 0.1
-
-No level reaches such a function, nor an object that is made already: its errors are the same at every level, 0 too.
-
-In the formulas T is the pose of a part in the world, exp(xi) the displacement of a twist (x, y, z, rx, ry, rz) in the
-part's own frame, e are independent standard normal numbers, and L is the level: in mm for positions, in degrees for
-turns. Levels only scale the same draws, so one seed gives comparable errors at all of them, and at level 0 the models
-below see everything exactly as it was shown. What is stated also holds the mean square of the human's carelessness,
-where the scenario has any, and at least 0.05 mm and 0.05 deg.
+A noise model makes an observation of the true poses: the pose of each operation with an error, the covariance that the
+camera states, and whether the operation was seen. In the formulas T is the pose of a part in the world, exp(xi) the
+displacement of a twist (x, y, z, rx, ry, rz) in the part's own frame, e are independent standard normal numbers, and L
+is the [level](words.md#level): in mm for positions, in degrees for turns. Levels only scale the same random numbers, so
+one seed gives comparable errors at all of them. At level 0 the models below see everything exactly. The stated
+covariance also holds the mean square of the person's error, where the scenario has one, and at least 0.05 mm and 0.05
+degrees.
 
 `tests/observation/test_laws.py` and, for what is measured, `tests/observation/test_measured_noise.py` hold all of them
 to the same laws: over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice
 of the world frame; what was not seen is never carried out; what was seen reaches the robot bit for bit.
 
-Pictures show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part,
-and as a line the Gaussian with the covariance that was stated; densities are logarithmic, and the outermost bins hold
-all that is beyond. `apo-bench noise card NAME` prints a card with its histogram in text, `--level` and `--out` draw
-others.
+Pictures show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part.
+The line is the Gaussian with the stated covariance. Densities are logarithmic, and the outermost bins hold all that is
+beyond. `apo-bench noise card NAME` prints a card with its histogram in text, `--level` and `--out` draw others.
 """
 
 TRIALS = 200

@@ -103,6 +103,16 @@ def test_each_reason_not_to_run_a_command_is_of_a_command() -> None:
     assert [how for how in PARSED_ONLY if not any(re.match(how, " ".join(line.words)) for line in LINES)] == []
 
 
+def test_targets_of_make_and_scripts_that_pages_name_are_there() -> None:
+    text = "\n".join(page.read_text(encoding="utf-8") for page in (*PAGES, ROOT / "CONTRIBUTING.md"))
+    targets = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert targets is not None
+    assert set(re.findall(r"(?:^|`)make ([a-z]+)", text, re.MULTILINE)) <= set(targets.group(1).split())
+    scripts = set(re.findall(r"python ((?:benchmarks|docs)/\w+\.py)", text))
+    assert len(scripts) > 5
+    assert [script for script in scripts if not (ROOT / script).exists()] == []
+
+
 def test_the_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
 
