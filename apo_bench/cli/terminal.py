@@ -14,7 +14,7 @@ from apo_bench.records import verdicts
 from apo_bench.records.row import FreedSet, Predicted, Row
 from apo_bench.records.settings import RANGE
 from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.confusion import summary
+from apo_bench.report.tables.confusion import prediction_summary
 from apo_bench.report.tables.table import Column
 from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario
@@ -75,8 +75,8 @@ def print_report(made: Report) -> None:
         console.print(clean(text))
 
     if made.verdict != verdicts.SUCCESS:
-        say(verdicts.words(made.verdict))
-    say(summary(made.confusions[-1]))
+        say(verdicts.verdict_warning(made.verdict))
+    say(prediction_summary(made.confusions[-1]))
     if made.no_pictures:
         drawn = "1 failure was" if made.pictures == 1 else f"{made.pictures} failures were"
         say(f"{drawn} drawn. Not drawn: {'; '.join(made.no_pictures)}.")
@@ -101,7 +101,7 @@ def print_comparison(found: Comparison) -> None:
 
 def print_prediction(rows: Iterable[Row]) -> None:
     """In one line, how often plans predicted what happened."""
-    _console().print(summary(confusions(rows)[-1]))
+    _console().print(prediction_summary(confusions(rows)[-1]))
 
 
 def _add(table: Table, *cells: str) -> None:

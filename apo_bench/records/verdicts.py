@@ -60,6 +60,6 @@ def by_verdict(rows: Sequence[Row], verdict: str) -> Sequence[Row]:
     return rows if verdict == SUCCESS else [row | {"success": row["as_demonstrated"]} for row in rows]
 
 
-def words(verdict: str) -> str:
+def verdict_warning(verdict: str) -> str:
     """What is to be said of it at the top; empty where success is success."""
     return "" if verdict == SUCCESS else _WORDS.format(row=ROW)

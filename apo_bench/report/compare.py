@@ -18,7 +18,7 @@ from apo_bench.records.settings import ROW, SETTINGS
 from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
-from apo_bench.statistics.settings import at
+from apo_bench.statistics.settings import cell_place
 
 RUN = "run.json can be read"
 ENDING = ("success", "failure_stage", "failure_code")
@@ -178,7 +178,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         alone=(len(ours) - len(both), len(theirs) - len(both)),
         agreements=agreements(pairs),
         changed=tuple(pair for pair in sorted(pairs, key=_place_and_seed) if pair[0]["success"] != pair[1]["success"]),
-        numbers=numbers(pairs),
+        numbers=number_changes(pairs),
         identical=sum(_identical(a, b) for a, b in pairs),
         cells=_cells(sides[0], sides[1], pairs),
     )
@@ -206,7 +206,7 @@ def agreements(pairs: Iterable[tuple[Row, Row]]) -> tuple[Agreement, ...]:
     return (*(_agreement(name, groups[name]) for name in sorted(groups)), _agreement(ALL, everything))
 
 
-def numbers(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
+def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
     """One per number that is in any row."""
     found = []
     for name in NUMBERS:
@@ -269,7 +269,7 @@ def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
 
 def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[Pair, ...]:
     """Cells by place, whatever the fidelity; sorted as `tally` sorts."""
-    ours, theirs = ({_anywhere(at(cell)): cell for cell in tally(side.rows)} for side in (first, second))
+    ours, theirs = ({_anywhere(cell_place(cell)): cell for cell in tally(side.rows)} for side in (first, second))
     verdicts: dict[Place, list[tuple[Any, Any]]] = {}
     for a, b in pairs:
         place = place_of(a)

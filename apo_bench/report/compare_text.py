@@ -12,12 +12,12 @@ from apo_bench.records.report_rows import NUMBERS
 from apo_bench.records.row import Row
 from apo_bench.report.compare import Agreement, Comparison, Pair, Side
 from apo_bench.report.page.trials import verdict, why
-from apo_bench.report.run_facts import limits_of, scenario_files, words
+from apo_bench.report.run_facts import limits_of, scenario_files, value_words
 from apo_bench.report.tables.saying import level_text, percents, points
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Cell, Place, Rate, place_of
-from apo_bench.statistics.settings import at, setting_of
+from apo_bench.statistics.settings import cell_place, setting_of
 
 _SCHEMA = "apo-bench/comparison/1"
 MOST = 2000
@@ -64,7 +64,7 @@ def number_table(found: Comparison) -> Table:
     return Table(found.numbers, columns)
 
 
-def pair_table(found: Comparison) -> Table:
+def rate_pair_table(found: Comparison) -> Table:
     """Rates of both, cell by cell."""
     columns = (
         *(c._replace(words=True) for c in _where(_place_of_pair)),
@@ -95,12 +95,12 @@ def changed_table(found: Comparison) -> Table:
 
 def in_words(found: Comparison) -> str:
     """The whole in some sentences."""
-    older = verdicts.words(found.first.verdict)
+    older = verdicts.verdict_warning(found.first.verdict)
     total = found.agreements[-1]
     low, high = total.same.interval
     return (
         f"{found.shared:,} trials are in both ({found.alone[0]:,} in the first alone, {found.alone[1]:,} in the second "
-        f"alone). Verdicts agree in {total.same.successes:,} of {total.same.trials:,}: {share(total.same.rate)} "
+        f"alone). Verdicts agree in {total.same.successes:,} of {total.same.trials:,}: {percent_text(total.same.rate)} "
         f"(95 %: {100 * low:.2f} to {100 * high:.2f} %, as if every trial were one of its own; in "
         f"{total.same_everywhere.successes:,} of {total.same_everywhere.trials:,} seeds all of them agree). "
         f"{found.identical:,} trials are the same to the last digit.{f' {older}' * bool(older)}"
@@ -125,7 +125,7 @@ def comparison_form(found: Comparison) -> dict[str, Any]:
     }
 
 
-def share(rate: float | None) -> str:
+def percent_text(rate: float | None) -> str:
     """`99.25 %`."""
     return "–" if rate is None else f"{100 * rate:.2f} %"
 
@@ -148,11 +148,11 @@ def _place_of_pair(pair: Pair) -> Place:
     """Whatever the fidelity."""
     one = pair.first or pair.second
     assert one is not None
-    return at(one)._replace(fidelity="full")
+    return cell_place(one)._replace(fidelity="full")
 
 
 def _counted(r: Rate) -> str:
-    return f"{r.successes} ({share(r.rate)})"
+    return f"{r.successes} ({percent_text(r.rate)})"
 
 
 def _rate(cell: Cell | None) -> str | None:
@@ -160,7 +160,7 @@ def _rate(cell: Cell | None) -> str | None:
 
 
 def _value(x: Any) -> str:
-    return "not said" if x is None else words(x)
+    return "not said" if x is None else value_words(x)
 
 
 def _command(row: Row, side: Side) -> str:

@@ -15,7 +15,7 @@ _MANY = 20
 """A table of more lines is folded."""
 
 
-class Facts(NamedTuple):
+class FactTable(NamedTuple):
     """A table of what is said about a run."""
 
     name: str
@@ -36,27 +36,30 @@ def limits_of(run: Mapping[str, Any]) -> Limits:
     return Limits(None if trial_s is None else float(trial_s), float(corrector_s))
 
 
-def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[Facts]:
+def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[FactTable]:
     """Tables of the specification and the versions.
 
     Args:
         rows: What the rows themselves say, by what it is called.
     """
     plain = {k: v for k, v in run.items() if not isinstance(v, (dict, list)) and k != "command"}
-    made = [Facts("", _table("rows", rows), False), *([Facts("", _table("run", plain), False)] if plain else [])]
+    made = [
+        FactTable("", _table("rows", rows), False),
+        *([FactTable("", _table("run", plain), False)] if plain else []),
+    ]
     for key, values in run.items():
         name = key.replace("_", " ")
         if isinstance(values, dict) and values:
-            made.append(Facts(name, _table(name, values), len(values) > _MANY))
+            made.append(FactTable(name, _table(name, values), len(values) > _MANY))
         elif isinstance(values, list) and values:
-            made.append(Facts(name, _side_by_side(name, values), False))
+            made.append(FactTable(name, _side_by_side(name, values), False))
     return made
 
 
 def _table(name: str, values: Mapping[str, Any]) -> Table:
     columns = (
         Column("", name, text=lambda item: item[0], words=True),
-        Column("", "value", text=lambda item: words(item[1]), words=True),
+        Column("", "value", text=lambda item: value_words(item[1]), words=True),
     )
     return Table(list(values.items()), columns)
 
@@ -66,14 +69,14 @@ def _side_by_side(name: str, values: Sequence[Any]) -> Table:
     given = [value if isinstance(value, dict) else {"": value} for value in values]
 
     def entry(one: Mapping[str, Any], number: int) -> Column:
-        return Column("", str(number), text=lambda key: words(one[key]) if key in one else None, words=True)
+        return Column("", str(number), text=lambda key: value_words(one[key]) if key in one else None, words=True)
 
     columns = [Column("", name, text=lambda key: key, words=True)]
     columns += [entry(one, i) for i, one in enumerate(given, start=1)]
     return Table(list(dict.fromkeys(key for one in given for key in one)), columns)
 
 
-def words(value: Any) -> str:
+def value_words(value: Any) -> str:
     """A value as a person reads it: lists with commas, the rest as JSON."""
     if isinstance(value, str):
         said = value

@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.statistics.bounded import mean_interval
-from apo_bench.statistics.curve import Curve, Setting
+from apo_bench.statistics.curve import Curve, CurveSetting
 from apo_bench.statistics.paired import REFERENCES
 from apo_bench.statistics.rates import Interval
 
@@ -26,7 +26,7 @@ from apo_bench.statistics.rates import Interval
 class Area:
     """Mean success over the logarithm of the level."""
 
-    setting: Setting
+    setting: CurveSetting
     levels: tuple[float, ...]
     seeds: int
     """Those that have a result at every level."""
@@ -41,7 +41,7 @@ class Area:
 class AreaDifference:
     """The area of a method minus that of another one, seed by seed."""
 
-    setting: Setting
+    setting: CurveSetting
     """Of the method."""
     reference: str
     levels: tuple[float, ...]

@@ -15,7 +15,7 @@ from apo_bench.records.settings import RANGE
 from apo_bench.statistics.rates import Place, by_place, order
 
 
-class Setting(NamedTuple):
+class CurveSetting(NamedTuple):
     """What the trials of a curve have in common: all but level and seed."""
 
     scenario: str
@@ -27,7 +27,7 @@ class Setting(NamedTuple):
     grasp: str = "friction"
     fidelity: str = "full"
 
-    def reference(self, method: str) -> Setting:
+    def reference(self, method: str) -> CurveSetting:
         """The setting that this one is compared with: `none` asks for no relations."""
         other = self._replace(method=method)
         return other if knows_relations(method) else other._replace(relations="given")
@@ -38,7 +38,7 @@ class Setting(NamedTuple):
 class Curve:
     """The results of one setting, one row per seed and one column per level."""
 
-    setting: Setting
+    setting: CurveSetting
     levels: Array
     """(k,), rising, in mm (and the same number of degrees where poses are drawn)."""
     seeds: tuple[int, ...]
@@ -58,7 +58,7 @@ def curves(rows: Iterable[Row]) -> tuple[Curve, ...]:
     Raises:
         InputError: A trial is there twice.
     """
-    groups: dict[Setting, dict[float, dict[int, bool]]] = {}
+    groups: dict[CurveSetting, dict[float, dict[int, bool]]] = {}
     cells = by_place(rows)
     for place in sorted(cells, key=order):
         results = {seed: row["success"] for seed, row in cells[place].items() if row["success"] is not None}
@@ -67,16 +67,16 @@ def curves(rows: Iterable[Row]) -> tuple[Curve, ...]:
             and not knows_truth(place.method)
             and place.level_deg == (0.0 if place.noise == RANGE else place.level)
         ):
-            groups.setdefault(setting_of(place), {})[place.level] = results
+            groups.setdefault(curve_setting(place), {})[place.level] = results
     return tuple(_curve(setting, found) for setting, found in groups.items() if len(found) > 1)
 
 
-def setting_of(place: Place) -> Setting:
+def curve_setting(place: Place) -> CurveSetting:
     """The setting of a cell."""
-    return Setting(*(getattr(place, name) for name in Setting._fields))
+    return CurveSetting(*(getattr(place, name) for name in CurveSetting._fields))
 
 
-def _curve(setting: Setting, found: Mapping[float, Mapping[int, bool]]) -> Curve:
+def _curve(setting: CurveSetting, found: Mapping[float, Mapping[int, bool]]) -> Curve:
     levels = np.array(sorted(found))
     seeds = tuple(sorted(set().union(*found.values())))
     columns = [[float(found[level].get(seed, np.nan)) for seed in seeds] for level in levels.tolist()]

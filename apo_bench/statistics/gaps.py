@@ -25,7 +25,7 @@ class Quantiles(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class Gap:
+class GapSummary:
     """Of the trials of a cell that had a plan."""
 
     place: Place
@@ -34,7 +34,7 @@ class Gap:
     planned: Quantiles
 
 
-def gaps(rows: Iterable[Row]) -> tuple[Gap, ...]:
+def gaps(rows: Iterable[Row]) -> tuple[GapSummary, ...]:
     """One per cell of a method that corrects, sorted as `tally` sorts."""
     groups: dict[Place, list[tuple[float, float]]] = {}
     for row in rows:
@@ -45,6 +45,6 @@ def gaps(rows: Iterable[Row]) -> tuple[Gap, ...]:
     return tuple(_gap(place, groups[place]) for place in sorted(groups, key=order))
 
 
-def _gap(place: Place, both: Sequence[tuple[float, float]]) -> Gap:
+def _gap(place: Place, both: Sequence[tuple[float, float]]) -> GapSummary:
     seen, planned = (Quantiles(*map(float, q)) for q in np.percentile(np.array(both), _CUTS, axis=0).T)
-    return Gap(place, len(both), seen, planned)
+    return GapSummary(place, len(both), seen, planned)

@@ -19,7 +19,7 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.statistics.bounded import threshold
-from apo_bench.statistics.curve import Curve, Setting
+from apo_bench.statistics.curve import Curve, CurveSetting
 from apo_bench.statistics.falling import profile
 from apo_bench.statistics.rates import CONFIDENCE
 
@@ -32,7 +32,7 @@ _LIKELIEST = 0.05
 class HalfLevel:
     """Where success is one half; levels in mm, as in rows."""
 
-    setting: Setting
+    setting: CurveSetting
     smallest: float
     """Of the levels tried that are above 0."""
     largest: float

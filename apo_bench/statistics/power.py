@@ -29,7 +29,7 @@ _SPREAD = 9.0
 
 @final
 @dataclass(frozen=True)
-class Evidence:
+class PowerEvidence:
     """What so many trials of each method, at the same seeds, can show."""
 
     trials: int
@@ -144,14 +144,14 @@ def margin_power(pairs: int, margin: float, win: float = 0.0, lose: float = 0.0)
     return float(np.sum(np.where(fits & rejects, weight, 0.0)))
 
 
-def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> Evidence:
-    """What so many trials can show; see `Evidence`."""
+def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerEvidence:
+    """What so many trials can show; see `PowerEvidence`."""
     if not 1 <= trials <= _MOST:
         raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error, z2 = _error(comparisons), _z() ** 2
     discordant = int(np.ceil(1 - np.log2(error) - 1e-9))
-    return Evidence(
+    return PowerEvidence(
         trials=trials,
         half_width_50=wilson_half_width(0.5, trials),
         half_width_90=wilson_half_width(0.9, trials),

@@ -14,7 +14,7 @@ ALL = "all"
 """Stands for every scenario."""
 
 
-class Place(NamedTuple):
+class ObservationPlace(NamedTuple):
     """What the observations that are counted together have in common."""
 
     scenario: str
@@ -31,7 +31,7 @@ class Place(NamedTuple):
 class Recognition:
     """Contacts of the observations that differ in nothing but the seed."""
 
-    place: Place
+    place: ObservationPlace
     demonstrations: int
     complete: int
     """Demonstrations of which every contact was recognised, and no other."""
@@ -64,26 +64,26 @@ def recognitions(rows: Iterable[Row]) -> tuple[Recognition, ...]:
 
     Methods of one seed were told the same, so each observation counts once.
     """
-    seen: dict[tuple[Any, ...], tuple[Place, Row]] = {}
+    seen: dict[tuple[Any, ...], tuple[ObservationPlace, Row]] = {}
     for row in rows:
         if row["relations"] in RECOGNISED and row["contacts_right"] is not None and row["level"] is not None:
-            place = Place(*(look_up(row, name) for name in Place._fields))
+            place = ObservationPlace(*(look_up(row, name) for name in ObservationPlace._fields))
             seen.setdefault((place, row["seed"], row["clearance_mm"]), (place, row))
     several = len({place.scenario for place, _ in seen.values()}) > 1
-    groups: dict[Place, list[Row]] = {}
+    groups: dict[ObservationPlace, list[Row]] = {}
     for place, row in seen.values():
         for where in (place, place._replace(scenario=ALL)) if several else (place,):
             groups.setdefault(where, []).append(row)
     return tuple(_counted(place, groups[place]) for place in sorted(groups, key=_order))
 
 
-def _counted(place: Place, rows: Sequence[Row]) -> Recognition:
+def _counted(place: ObservationPlace, rows: Sequence[Row]) -> Recognition:
     right, missed, false = (sum(look_up(row, f"contacts_{of}") for row in rows) for of in ("right", "missed", "false"))
     complete = sum(row["contacts_missed"] == row["contacts_false"] == 0 for row in rows)
     return Recognition(place, len(rows), complete, right, missed, false)
 
 
-def _order(place: Place) -> tuple[Any, ...]:
+def _order(place: ObservationPlace) -> tuple[Any, ...]:
     """All scenarios last; the ways of recognising in their own order."""
     kind = RECOGNISED.index(place.relations)
     return (place.scenario == ALL, place.scenario, place.noise, place.eye, kind, place.careless, *place[-2:])

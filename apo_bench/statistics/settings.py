@@ -56,7 +56,7 @@ class Setting(NamedTuple):
         return said
 
 
-def at(item: Any) -> Place:
+def cell_place(item: Any) -> Place:
     """The place of a cell; of anything that has one, that."""
     place = getattr(item, "place", None)
     return place if place is not None else Place(*(getattr(item, name) for name in Place._fields))
@@ -64,7 +64,7 @@ def at(item: Any) -> Place:
 
 def settings(cells: Iterable[Any]) -> list[Setting]:
     """Those that hold the cells, sorted by scenario first; the oracle alone makes one only if nothing else is there."""
-    places = [at(cell) for cell in cells]
+    places = [cell_place(cell) for cell in cells]
     found = {setting_of(p) for p in places if knows_relations(p.method)}
     told_right = {s._replace(relations="given") for s in found}
     found |= {setting_of(p) for p in places if as_seen(p.method) and setting_of(p) not in told_right}
@@ -77,19 +77,19 @@ def members(found: Sequence[Setting], items: Iterable[Item]) -> dict[Setting, li
     """The cells, or whatever has a place, of every setting, in their order; of several oracles the one most tried."""
     near: dict[tuple[Any, ...], list[Item]] = {}
     for item in items:
-        near.setdefault(_site(at(item)), []).append(item)
-    grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(at(item))] for s in found}
+        near.setdefault(_site(cell_place(item)), []).append(item)
+    grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(cell_place(item))] for s in found}
     return {s: _one_ceiling(inside) for s, inside in grouped.items()}
 
 
 def levels_of(items: Iterable[Any]) -> list[tuple[float, float]]:
     """Levels in mm and degrees of all but the oracle, sorted."""
-    return sorted({level_of(item) for item in items if not knows_truth(at(item).method)})
+    return sorted({level_of(item) for item in items if not knows_truth(cell_place(item).method)})
 
 
 def level_of(item: Any) -> tuple[float, float]:
     """In mm and degrees."""
-    place = at(item)
+    place = cell_place(item)
     return place.level, place.level_deg
 
 
@@ -113,6 +113,6 @@ def _site(x: Place | Setting) -> tuple[Any, ...]:
 
 
 def _one_ceiling(inside: list[Item]) -> list[Item]:
-    ceilings = [item for item in inside if at(item).method == "oracle"]
+    ceilings = [item for item in inside if cell_place(item).method == "oracle"]
     best = max(ceilings, key=lambda item: getattr(item, "trials", 0), default=None)
-    return [item for item in inside if item is best or at(item).method != "oracle"]
+    return [item for item in inside if item is best or cell_place(item).method != "oracle"]

@@ -27,7 +27,7 @@ from apo_bench.scenario.starts import in_the_air
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.local.alone import Say, run_alone
-from apo_bench.sweeps.worker import lost, row_of
+from apo_bench.sweeps.worker import lost, trial_row
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
@@ -155,7 +155,7 @@ def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, fil
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
-    return row_of(spec, scene, recording, content, method=method, watch=film)
+    return trial_row(spec, scene, recording, content, method=method, watch=film)
 
 
 def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:

@@ -82,7 +82,7 @@ class Worker:
             if key not in demonstrations:
                 demonstrations[key] = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
             shown = time.perf_counter()
-            row = row_of(spec, scene, demonstrations[key], content, method=method, cache=cache)
+            row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
             ended = time.perf_counter()
             yield "row", row, timing(row, compile_s, shown - start, ended - shown, {"worker": self._number})
 
@@ -107,7 +107,7 @@ class Worker:
         return self._scenes[key]
 
 
-def row_of(spec: TrialSettings, scene: Scene, recording: Recording, content: str, **more: Any) -> Row:
+def trial_row(spec: TrialSettings, scene: Scene, recording: Recording, content: str, **more: Any) -> Row:
     """The row of a trial, also of one whose corrector misbehaved.
 
     What code of somebody's own returned may be what no row can hold; that is its failure too.

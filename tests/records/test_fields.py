@@ -79,7 +79,7 @@ def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pyte
     right = run_trial(SPEC, scene, recording=shown)
     monkeypatch.setattr(worker, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
     mine = TrialSettings("block_on_block", method="mine:correct")
-    row = worker.row_of(mine, scene, shown, "0")
+    row = worker.trial_row(mine, scene, shown, "0")
     assert (row["failure_stage"], row["failure_code"]) == ("correct", "raised")
     assert "returned what no row can hold (field p_value:" in row["sentence"]
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from apo_bench.statistics.area import area, area_differences, areas, reach, weights
 from apo_bench.statistics.bounded import mean_interval
-from apo_bench.statistics.curve import Curve, Setting
+from apo_bench.statistics.curve import Curve, CurveSetting
 from tests.statistics.test_half_level import HERE
 
 LEVELS = np.array([0.0, 0.1, 0.4, 1.0, 4.0])
@@ -98,6 +98,6 @@ def test_seeds_not_seen_differ_by_one_level_at_least_and_no_more_than_those_that
 
 def test_settings_keep_their_order() -> None:
     assert [a.setting for a in areas([drawn(1, m) for m in ("none", "contact")])] == [
-        Setting(*HERE[:5], "none"),
-        Setting(*HERE[:5], "contact"),
+        CurveSetting(*HERE[:5], "none"),
+        CurveSetting(*HERE[:5], "contact"),
     ]

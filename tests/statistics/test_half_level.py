@@ -10,13 +10,13 @@ from scipy.special import expit, ndtri, xlogy
 from scipy.stats import binomtest
 
 from apo_bench.statistics.bounded import threshold
-from apo_bench.statistics.curve import Curve, Setting, curves
+from apo_bench.statistics.curve import Curve, CurveSetting, curves
 from apo_bench.statistics.falling import OTHERS, curve, misfit, profile, variation
 from apo_bench.statistics.half_level import HalfLevel, half_level, half_levels, sure
 from tests.statistics.test_rates import row
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-HERE = Setting("stick_in_tower", 0.25, "isotropic", "given", 1.0, "contact")
+HERE = CurveSetting("stick_in_tower", 0.25, "isotropic", "given", 1.0, "contact")
 
 
 def made(rates: tuple[float, ...], levels: tuple[float, ...] = LEVELS, seeds: int = 100) -> HalfLevel:

@@ -19,7 +19,7 @@ from apo_bench.report.figures.levels import success_figure
 from apo_bench.report.figures.sheet import draw
 from apo_bench.report.figures.styles import OTHERS, STYLES
 from apo_bench.report.report import report
-from apo_bench.report.tables.confusion import summary
+from apo_bench.report.tables.confusion import prediction_summary
 from apo_bench.statistics.confusion import Confusion, confusions
 from apo_bench.statistics.effort import Effort, efforts
 from apo_bench.statistics.rates import Rate, place_of, tally, wilson
@@ -185,7 +185,7 @@ def test_predictions_are_counted_against_physics() -> None:
     assert (ceiling.method, ceiling.agreement, measured.scenario) == ("oracle", 1.0, "stick_on_castles")
     assert (everything.scenario, everything.method, everything.executed) == ("all", "all", 8)
     assert everything.agreement == 6 / 8
-    assert summary(everything) == (
+    assert prediction_summary(everything) == (
         "Predicted: 75.0 % of 8 executed trials ended as predicted (counted by as_demonstrated); failures that were "
         "not predicted: 1, warnings that were wrong: 1."
     )
@@ -209,7 +209,7 @@ def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | N
 def test_without_an_executed_trial_nothing_agrees() -> None:
     (_, everything) = confusions([row(success=None)])
     assert (everything.agreement, everything.excluded) == (None, 1)
-    assert "nothing" in summary(everything)
+    assert "nothing" in prediction_summary(everything)
 
 
 def test_a_cell_whose_demonstrations_all_failed_has_no_rate() -> None:

@@ -18,7 +18,7 @@ from apo_bench.report.figures.styles import styles
 from apo_bench.report.figures.tightness import tightness_figure
 from apo_bench.report.figures.times import time_figure
 from apo_bench.statistics.confusion import Confusion
-from apo_bench.statistics.gaps import Gap
+from apo_bench.statistics.gaps import GapSummary
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.recognition import Recognition
 from apo_bench.statistics.settings import Setting, members
@@ -29,7 +29,7 @@ from apo_bench.statistics.times import Times
 def figures(
     found: Summary,
     grouped: Mapping[Setting, Sequence[Cell]],
-    gaps: Sequence[Gap],
+    gaps: Sequence[GapSummary],
     confusions: Sequence[Confusion],
     recognitions: Sequence[Recognition],
     times: Sequence[Times],

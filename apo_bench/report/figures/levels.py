@@ -8,15 +8,24 @@ from typing import TypeVar
 
 from apo_bench.records.method import knows_truth
 from apo_bench.records.settings import RANGE
-from apo_bench.report.figures.lines import Axis, Line, Point, Rule, dodges, entries, levels_axis, line_panel
+from apo_bench.report.figures.lines import Axis, MethodLine, Point, Rule, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import RECOGNISED, SEEN, Style, styles
-from apo_bench.statistics.gaps import Gap, Quantiles
+from apo_bench.statistics.gaps import GapSummary, Quantiles
 from apo_bench.statistics.paired import Paired
 from apo_bench.statistics.rate_text import interval, percent
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.recognition import ALL, Recognition
-from apo_bench.statistics.settings import Setting, at, level_of, level_unit, level_words, levels_of, members, settings
+from apo_bench.statistics.settings import (
+    Setting,
+    cell_place,
+    level_of,
+    level_unit,
+    level_words,
+    levels_of,
+    members,
+    settings,
+)
 
 Item = TypeVar("Item")
 SHARES = tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100))
@@ -43,7 +52,7 @@ def difference_figure(pairs: Mapping[Setting, Sequence[Paired]], reference: str,
     return Figure(f"Difference of success to {reference}, same seeds", panels, entries(shown))
 
 
-def gap_figure(gaps: Mapping[Setting, Sequence[Gap]], looks: Mapping[str, Style]) -> Figure:
+def gap_figure(gaps: Mapping[Setting, Sequence[GapSummary]], looks: Mapping[str, Style]) -> Figure:
     """Gaps as seen and as planned: a panel per setting in which a method corrected."""
     shown = {m: look for m, look in looks.items() if any(g.place.method == m for own in gaps.values() for g in own)}
     panels = [_gaps(setting, own, shown) for setting, own in gaps.items() if own]
@@ -111,11 +120,11 @@ def _differences(setting: Setting, pairs: Sequence[Paired], looks: Mapping[str, 
     return line_panel(title, _levels(setting, pairs), y, _lines(setting, pairs, looks, point, tip), Rule(0.0))
 
 
-def _gaps(setting: Setting, found: Sequence[Gap], looks: Mapping[str, Style]) -> Panel:
+def _gaps(setting: Setting, found: Sequence[GapSummary], looks: Mapping[str, Style]) -> Panel:
     def point(q: Quantiles) -> tuple[float, float, float]:
         return max(q.median, FLOOR_MM), max(q.low, FLOOR_MM), max(q.high, FLOOR_MM)
 
-    def tip(g: Gap) -> str:
+    def tip(g: GapSummary) -> str:
         return f"as planned: median {g.planned.median:.3f} mm, 95 % below {g.planned.high:.3f} mm, n {g.trials}"
 
     planned = _lines(setting, found, looks, lambda g: point(g.planned), tip)
@@ -130,7 +139,7 @@ def _gaps(setting: Setting, found: Sequence[Gap], looks: Mapping[str, Style]) ->
     ticks = [(10.0**k, _power(k)) for k in range(low, high + 1, max(1, (high - low) // 4))]
     y = Axis("gap [mm]", 10.0**low, 10.0**high, ticks, logarithmic=True)
     title = f"{setting.title()}; {counted([g.trials for g in found])}"
-    return line_panel(title, _levels(setting, found), y, [Line("as seen", SEEN, seen), *planned])
+    return line_panel(title, _levels(setting, found), y, [MethodLine("as seen", SEEN, seen), *planned])
 
 
 def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
@@ -145,7 +154,7 @@ def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
             where = levels.index((r.place.level, r.place.level_deg)) + dodge
             if r.place.relations == kind and share is not None:
                 points.append(Point(where, share, share, share, percent(share)))
-        lines.append(Line(kind, RECOGNISED[kind], points))
+        lines.append(MethodLine(kind, RECOGNISED[kind], points))
     least = min((p.value for line in lines for p in line.points), default=0.0)
     low = 0.0 if least < 0.6 else 0.6 if least < 0.9 else 0.9
     ticks = [(low + (1 - low) * k / 4, f"{100 * (low + (1 - low) * k / 4):g} %") for k in range(5)]
@@ -163,10 +172,10 @@ def _lines(
     looks: Mapping[str, Style],
     point: Callable[[Item], tuple[float, float, float]],
     tip: Callable[[Item], str],
-) -> list[Line]:
+) -> list[MethodLine]:
     """A line per method, by a value with its interval and a sentence of each item."""
     levels = levels_of(items)
-    by_method = {m: [item for item in items if at(item).method == m] for m in looks}
+    by_method = {m: [item for item in items if cell_place(item).method == m] for m in looks}
     drawn = {m: own for m, own in by_method.items() if own}
     lines = []
     for (method, own), dodge in zip(drawn.items(), dodges(len(drawn)), strict=True):
@@ -175,7 +184,7 @@ def _lines(
             level = level_of(item)
             said = f"level {level_words(level, setting.noise)}: {tip(item)}"
             points.append(Point(levels.index(level) + dodge, *point(item), said))
-        lines.append(Line(method, looks[method], points))
+        lines.append(MethodLine(method, looks[method], points))
     return lines
 
 

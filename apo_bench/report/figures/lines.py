@@ -23,7 +23,7 @@ class Point(NamedTuple):
     tip: str
 
 
-class Line(NamedTuple):
+class MethodLine(NamedTuple):
     """The points of a method, from left to right."""
 
     name: str
@@ -49,7 +49,7 @@ class Rule(NamedTuple):
     tip: str = ""
 
 
-def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[Line], rule: Rule | None = None) -> Panel:
+def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[MethodLine], rule: Rule | None = None) -> Panel:
     """Lines with bands; a line of one point has a bar instead."""
 
     def draw(axis: Any, tip: Tips) -> None:
@@ -108,7 +108,7 @@ def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
     axis.set(xlabel=x.label, ylabel=y.label)
 
 
-def _band(axis: Any, line: Line) -> None:
+def _band(axis: Any, line: MethodLine) -> None:
     if len(line.points) == 1:
         (p,) = line.points
         axis.vlines(p.x, p.low, p.high, color=line.style.color, linewidth=1.4, alpha=0.6)
@@ -117,7 +117,7 @@ def _band(axis: Any, line: Line) -> None:
         axis.fill_between(at, low, high, color=line.style.color, alpha=0.13, linewidth=0)
 
 
-def _marks(axis: Any, line: Line) -> Any:
+def _marks(axis: Any, line: MethodLine) -> Any:
     at, values = [p.x for p in line.points], [p.value for p in line.points]
     color, marker, dashes = line.style
     axis.plot(at, values, color=color, linestyle=dashes, linewidth=1.7, clip_on=False)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from apo_bench.records.method import knows_truth
 from apo_bench.report.figures.levels import SHARES, methods_of
-from apo_bench.report.figures.lines import Axis, Line, Point, entries, line_panel
+from apo_bench.report.figures.lines import Axis, MethodLine, Point, entries, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import styles
 from apo_bench.statistics.rate_text import interval, level_label, percent
@@ -54,7 +54,7 @@ def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
                 )
                 for c in sorted(own, key=lambda c: c.clearance_mm)
             ]
-            lines.append(Line(method, style, points))
+            lines.append(MethodLine(method, style, points))
     found = sorted({c.tightness for c in cells if c.tightness})
     ticks = [(t, f"{t:g}") for t in found]
     x = Axis("clearance per side over level [mm per mm]", found[0] / 1.3, found[-1] * 1.3, ticks, logarithmic=True)

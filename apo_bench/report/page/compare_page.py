@@ -50,7 +50,7 @@ def write_comparison(found: Comparison, folder: Path) -> Written:
     tables = {
         "agreement": text.agreement_table(found),
         "numbers": text.number_table(found),
-        "cells": text.pair_table(found),
+        "cells": text.rate_pair_table(found),
         "changed": text.changed_table(found),
         "differences": text.difference_table(found),
     }

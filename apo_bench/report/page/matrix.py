@@ -8,7 +8,7 @@ from typing import NamedTuple
 from apo_bench.records.method import knows_truth
 from apo_bench.statistics.rate_text import interval, percent
 from apo_bench.statistics.rates import Cell, Place
-from apo_bench.statistics.settings import Setting, at, level_of, level_unit, level_words, levels_of
+from apo_bench.statistics.settings import Setting, cell_place, level_of, level_unit, level_words, levels_of
 
 _MANY = 12
 """With more settings than this, those of a scenario are folded."""
@@ -64,10 +64,10 @@ def _matrix(setting: Setting, cells: Sequence[Cell], numbers: Mapping[Place, int
         own = {level_of(c): c for c in cells if c.method == method}
         if knows_truth(method):
             (best,) = own.values()
-            lines.append((method, [_button(best, setting, numbers[at(best)], met, max(1, len(levels)))]))
+            lines.append((method, [_button(best, setting, numbers[cell_place(best)], met, max(1, len(levels)))]))
         else:
             found = [own.get(level) for level in levels]
-            lines.append((method, [c and _button(c, setting, numbers[at(c)], met) for c in found]))
+            lines.append((method, [c and _button(c, setting, numbers[cell_place(c)], met) for c in found]))
     corner = f"method, {level_unit(setting.noise)}" if levels else "method"
     return Matrix(setting.title(), corner, [level_words(x, setting.noise) for x in levels] or ["any"], lines)
 

@@ -17,12 +17,12 @@ from apo_bench.report.failures import FailurePicture
 from apo_bench.report.figures.sheet import Drawing
 from apo_bench.report.page.document import page
 from apo_bench.report.page.matrix import matrices
-from apo_bench.report.page.trials import packed, trials, why
+from apo_bench.report.page.trials import packed_json, trials, why
 from apo_bench.report.run_facts import limits_of, run_facts
 from apo_bench.report.tables import calibration, confusion, effort, gaps, half_levels, pairs, recognition
 from apo_bench.report.tables.table import Table
 from apo_bench.statistics.rates import Cell, place_of
-from apo_bench.statistics.settings import Setting, at, setting_of
+from apo_bench.statistics.settings import Setting, cell_place, setting_of
 from apo_bench.statistics.summary import Summary
 from apo_bench.statistics.times import Work
 
@@ -82,7 +82,7 @@ class Found:
 def report_page(found: Found) -> str:
     """The page, as HTML."""
     cells, limits = found.summary.cells, limits_of(found.run)
-    numbers = {at(cell): i for i, cell in enumerate(cells)}
+    numbers = {cell_place(cell): i for i, cell in enumerate(cells)}
     pictured = {}
     for k, picture in enumerate(found.pictures):
         place = place_of(picture.row)
@@ -93,7 +93,7 @@ def report_page(found: Found) -> str:
         title=f"Sweep {found.name}",
         sections=_SECTIONS,
         answer=found.answer,
-        older=verdicts.words(found.verdict),
+        older=verdicts.verdict_warning(found.verdict),
         scope=_scope(found.rows),
         words={
             "success": f"{_level_meaning(found.rows)} {_SUCCESS}",
@@ -123,7 +123,7 @@ def report_page(found: Found) -> str:
         command_line=found.run.get("command"),
         no_run="" if found.run else "There is no run.json beside the rows, so versions and command are not known.",
         beside=found.beside,
-        trials=packed(trials(found.rows, cells, found.files, pictured, limits)),
+        trials=packed_json(trials(found.rows, cells, found.files, pictured, limits)),
     )
 
 
@@ -162,7 +162,7 @@ def _still(cells: Sequence[Cell]) -> str:
     levels: dict[Setting, set[float]] = {}
     for c in cells:
         if not knows_truth(c.method):
-            levels.setdefault(setting_of(at(c)), set()).add(c.level)
+            levels.setdefault(setting_of(cell_place(c)), set()).add(c.level)
     if any(len(own) > 1 for own in levels.values()):
         return ""
     here = sorted({f"{level:g}" for own in levels.values() for level in own})

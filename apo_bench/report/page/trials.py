@@ -16,7 +16,7 @@ from apo_bench.records.report_rows import NUMBERS
 from apo_bench.records.row import Row, look_up
 from apo_bench.records.settings import SETTINGS
 from apo_bench.statistics.rates import Cell, by_place
-from apo_bench.statistics.settings import at
+from apo_bench.statistics.settings import cell_place
 
 FAILED, RIGHT, LOOSE, EXCLUDED = "failed", "right", "loosely right", "excluded"
 OTHERWISE = "right, not as demonstrated"
@@ -46,7 +46,7 @@ def trials(
     ends = []
     commands: dict[tuple[Any, ...], str] = {}
     for cell in cells:
-        seeds = groups[at(cell)]
+        seeds = groups[cell_place(cell)]
         for seed in sorted(seeds):
             row = seeds[seed]
             asked = (*(look_up(row, name) for name in ASKED), row.get("failure_stage") == "worker")
@@ -74,7 +74,7 @@ def trials(
     }
 
 
-def packed(values: Mapping[str, Any]) -> Markup:
+def packed_json(values: Mapping[str, Any]) -> Markup:
     """As base64 of gzip of JSON: letters that mean nothing in HTML; the same bytes for the same values."""
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
     return Markup(base64.b64encode(gzip.compress(text, compresslevel=6, mtime=0)).decode())

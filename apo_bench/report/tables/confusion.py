@@ -20,7 +20,7 @@ def confusion_table(found: Sequence[Confusion]) -> Table:
     return Table(found, _COLUMNS)
 
 
-def summary(c: Confusion) -> str:
+def prediction_summary(c: Confusion) -> str:
     """`Predicted: 96.3 % of 134 executed trials ended as predicted (counted by as_demonstrated); failures ...`"""
     if c.agreement is None:
         return "Predicted: nothing, since no trial was executed."

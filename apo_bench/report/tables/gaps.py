@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from apo_bench.report.tables.saying import level_text, millimetres, place_columns
 from apo_bench.report.tables.table import Column, Table
-from apo_bench.statistics.gaps import Gap
+from apo_bench.statistics.gaps import GapSummary
 
 WORDS = (
     "The largest distance of any face from the one it should touch, as it was seen and as the method planned it: "
@@ -15,7 +15,7 @@ WORDS = (
 )
 
 
-def gap_table(found: Sequence[Gap]) -> Table:
+def gap_table(found: Sequence[GapSummary]) -> Table:
     """One line per cell."""
     return Table(found, _COLUMNS)
 

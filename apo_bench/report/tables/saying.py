@@ -9,7 +9,7 @@ from apo_bench.records.method import knows_truth
 from apo_bench.report.tables.table import Column
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Interval, Place, Rate
-from apo_bench.statistics.settings import at, setting_of
+from apo_bench.statistics.settings import cell_place, setting_of
 
 
 def millimetres(x: float | None) -> str | None:
@@ -53,7 +53,7 @@ def percents(interval: Interval, digits: int = 1) -> str:
     return f"{100 * interval.low:.{digits}f} to {100 * interval.high:.{digits}f} %"
 
 
-def place_columns(of: Callable[[Any], Any] = at, levels: bool = True) -> tuple[Column, ...]:
+def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) -> tuple[Column, ...]:
     """Where something was measured: for people scenario, conditions and method, for files every axis by itself.
 
     Args:
@@ -76,7 +76,7 @@ def place_columns(of: Callable[[Any], Any] = at, levels: bool = True) -> tuple[C
 
 def level_text(x: Any) -> str:
     """`0.5`, or `0.5 mm, 1 deg`, of anything that has a place; `any` of the oracle, which meets none."""
-    place = x if isinstance(x, Place) else at(x)
+    place = x if isinstance(x, Place) else cell_place(x)
     return "any" if knows_truth(place.method) else level_label(place.level, place.level_deg, place.noise)
 
 

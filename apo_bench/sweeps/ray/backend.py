@@ -20,7 +20,7 @@ from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
 from apo_bench.sweeps.local.process import Process
-from apo_bench.sweeps.ray.driver import Plan, drive
+from apo_bench.sweeps.ray.driver import ClusterPlan, drive
 from apo_bench.sweeps.ray.runtime_files import runtime_files
 from apo_bench.sweeps.stopping import Check, never
 from apo_bench.sweeps.worker import Emit
@@ -87,7 +87,7 @@ def spread(
     check_ray(address)
     auth = None if address == "local" or os.environ.get("RAY_AUTH_MODE") == "disabled" else "disabled"
     files = {} if lock.names is None else runtime_files(lock.names)
-    plan = Plan(tuple(work), lock, files, address, workers, limit_s, auth)
+    plan = ClusterPlan(tuple(work), lock, files, address, workers, limit_s, auth)
     while True:
         try:
             _drive(plan, emit, check)
@@ -104,12 +104,12 @@ class _OtherWay(Exception):
     none never hears of its tasks.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: ClusterPlan) -> None:
         super().__init__()
         self.plan = plan
 
 
-def _drive(plan: Plan, emit: Emit, check: Check) -> None:
+def _drive(plan: ClusterPlan, emit: Emit, check: Check) -> None:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "ray.log"
         driver, patience_s = Process(drive, plan, str(log)), 0.0
@@ -123,7 +123,7 @@ def _drive(plan: Plan, emit: Emit, check: Check) -> None:
             driver.end(patience_s)
 
 
-def _listen(driver: Process, plan: Plan, joining: _Joining, emit: Emit, check: Check) -> None:
+def _listen(driver: Process, plan: ClusterPlan, joining: _Joining, emit: Emit, check: Check) -> None:
     """Take rows until the last word."""
     while True:
         is_alive = driver.exit_code is None
@@ -150,7 +150,7 @@ def _listen(driver: Process, plan: Plan, joining: _Joining, emit: Emit, check: C
 class _Joining:
     """Watches a process that may wait for a cluster for ever, and for one that does not let it in."""
 
-    def __init__(self, plan: Plan, log: Path) -> None:
+    def __init__(self, plan: ClusterPlan, log: Path) -> None:
         self._plan, self._log = plan, log
         self.give(JOINING_S)
 

@@ -41,7 +41,7 @@ _ONE_TRY = {"num_cpus": 1, "max_retries": 0, "_generator_backpressure_num_object
 
 @final
 @dataclass(frozen=True)
-class Plan:
+class ClusterPlan:
     """What the sweep wants of the cluster."""
 
     work: Sequence[Unit]
@@ -55,7 +55,7 @@ class Plan:
     """What RAY_AUTH_MODE is for Ray: `disabled`, `token` to show that of this machine's user, or None to leave it."""
 
 
-def drive(plan: Plan, log: str, say: Callable[..., None], pipe: Any) -> None:
+def drive(plan: ClusterPlan, log: str, say: Callable[..., None], pipe: Any) -> None:
     """The work of the process: connect, spread the work, say one last word.
 
     Says "starting" if it starts a cluster, "connected", "row" with row and timing, and last "none" where no cluster
@@ -87,7 +87,7 @@ class _NoCluster(Exception):
     """None runs on this machine."""
 
 
-def _connect(plan: Plan, say: Callable[..., None]) -> None:
+def _connect(plan: ClusterPlan, say: Callable[..., None]) -> None:
     """Join the cluster that was named, or the one that runs here, or start one for the time of the sweep.
 
     Raises:
@@ -120,7 +120,7 @@ def _connect(plan: Plan, say: Callable[..., None]) -> None:
         ray.init(address="local", num_cpus=cpus, include_dashboard=False, object_store_memory=_OBJECT_STORE, **quiet)
 
 
-def _spread(plan: Plan, say: Callable[..., None], pipe: Any) -> None:
+def _spread(plan: ClusterPlan, say: Callable[..., None], pipe: Any) -> None:
     import ray
 
     def emit(row: Any, timing: Any) -> None:
