@@ -14,7 +14,7 @@ from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.run_folder import read_rows
-from apo_bench.records.settings import ROW
+from apo_bench.records.settings import ROW, SETTINGS
 from apo_bench.records.verdicts import AS_DEMONSTRATED, MEANING, SUCCESS, by_verdict, verdict_of
 from apo_bench.report.compare import compare
 from apo_bench.report.report import report
@@ -49,7 +49,8 @@ def test_an_old_success_is_read_as_as_demonstrated(kept: Path) -> None:
     assert {r["success"] for r in rows} == {None}
     said = {name: value for name, value in raw[0].items() if name != "success"}
     today = {"success": None, "as_demonstrated": raw[0]["success"]}
-    assert rows[0] == dict.fromkeys(ROW_FIELDS) | said | today
+    usual = {info.column: info.default for info in SETTINGS.values()}
+    assert rows[0] == dict.fromkeys(ROW_FIELDS) | usual | said | today
     assert [r["success"] for r in by_verdict(rows, verdict_of(rows, kept))] == [r["success"] for r in raw]
 
 

@@ -11,6 +11,7 @@ import pytest
 from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.run_folder import read_rows
+from apo_bench.records.settings import SETTINGS
 from apo_bench.report.report import report
 from apo_bench.report.tables.calibration import calibration_table
 from apo_bench.statistics.calibration import calibrations
@@ -56,7 +57,8 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
 
 
 def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:
-    unsaid = {**UNKNOWN, **UNCOUNTED, "eye": "noise", "fidelity": "full", "arm": "six_axis", "timestep_s": 0.001}
+    usual = {info.column: info.default for info in SETTINGS.values() if not info.key}
+    unsaid = {**UNKNOWN, **UNCOUNTED, **usual}
     old = {k: v for k, v in row().items() if k not in unsaid} | {"schema": "apo-bench/row/2"}
     new = row() | {"seed": 1, "schema": "apo-bench/row/3"}
     folder = write(tmp_path / "old", [old, new])
