@@ -76,7 +76,7 @@ def test_names_of_a_module_that_is_a_package_now_are_found_in_it() -> None:
     with pytest.warns(DeprecationWarning, match=r"topology\.Assembly now"):
         from apo_bench.assembly import Assembly
     assert Assembly is apo_bench.Assembly
-    with pytest.warns(DeprecationWarning, match=r"json_forms\.read_json_observation now"):
+    with pytest.warns(DeprecationWarning, match=r"json_reading\.read_json_observation now"):
         from apo_bench.files import read_observation as read_json
     assert inspect.isfunction(read_json)
     with pytest.raises(ImportError, match="nonsense"):
