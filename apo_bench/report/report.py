@@ -171,7 +171,8 @@ def _written(folder: Path, rows: Sequence[Row], verdict: str, found: Summary, fa
 def _remove_older(folder: Path) -> None:
     """What an earlier report wrote and this one may not: nothing beside the page shall be of other rows."""
     for path in (*(folder / TABLES).glob("*"), *(folder / FIGURES).glob("*")):
-        if path.stem in OURS or (path.name.startswith("difference_to_") and path.suffix == ".svg"):
+        ours = path.stem in OURS or path.stem.startswith("difference_to_")
+        if ours and path.suffix in (".csv", ".parquet", ".svg", ".png"):
             path.unlink()
 
 

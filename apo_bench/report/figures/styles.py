@@ -89,8 +89,12 @@ def styles(methods: Sequence[str]) -> dict[str, Style]:
 
 
 def themed(svg: str) -> str:
-    """Colours as custom properties, which a dark page sets to others."""
-    return re.sub(r"(?<=(?:l|e): )#[0-9a-f]{6}", lambda m: f"var(--c{m[0][1:]},{m[0]})" if m[0] in _DARK else m[0], svg)
+    """Colours of styles as custom properties, which a dark page sets to others."""
+    return re.sub(r' style="[^"<>]*"', lambda style: re.sub("#[0-9a-f]{6}", _property, style[0]), svg)
+
+
+def _property(color: re.Match[str]) -> str:
+    return f"var(--c{color[0][1:]},{color[0]})" if color[0] in _DARK else color[0]
 
 
 def dark_properties() -> str:
