@@ -174,7 +174,7 @@ def _stated(deviation_mm: float, deviation_deg: float) -> str:
 
 
 def _print_tables(tables: list[Any]) -> None:
-    """As wide as the terminal, and wide enough to keep lines whole where there is none."""
+    """Print tables as wide as the terminal, or wide enough to keep lines whole where there is none."""
     import sys
 
     from rich.console import Console

@@ -59,7 +59,7 @@ def recognise(
 
 
 def _print(table: Any) -> None:
-    """As wide as it is."""
+    """Print a table as wide as it is."""
     from rich.console import Console
 
     console = Console(width=max(140, Console().width), highlight=False, markup=False)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from apo_bench.sweeps.grid import SweepSpec
 
 _KILLED = 128
-"""And the number of the signal: the exit code of a process that one has ended."""
+"""Added to the number of a signal: the exit code of a process that it has ended."""
 
 
 class Interrupted(Exception):

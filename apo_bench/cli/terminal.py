@@ -193,6 +193,6 @@ def _result(row: Row) -> str:
 
 
 def _console() -> Console:
-    """As wide as the terminal, and wide enough to keep lines whole where there is none."""
+    """A console as wide as the terminal, or wide enough to keep lines whole where there is none."""
     narrowest = 110 if sys.stdout.isatty() else 160
     return Console(width=max(narrowest, Console().width), highlight=False, markup=False)

@@ -12,7 +12,7 @@ def asked(settings: TrialSettings, scenario: str) -> dict[str, Any]:
     """The settings as they stand in a row.
 
     Args:
-        scenario: Its name.
+        scenario: The name of the scenario.
     """
     said = {info.column: getattr(settings, name) for name, info in SETTINGS.items()}
     return said | {"scenario": scenario, "salt": None if settings.salt is None else settings.salt.hash}

@@ -25,6 +25,6 @@ def trial_key(trial: TrialSettings, scenario: str) -> Key:
     """The key of a trial.
 
     Args:
-        scenario: Its name.
+        scenario: The name of the scenario.
     """
     return row_key(asked(trial, scenario))

@@ -27,7 +27,7 @@ def replay_command(row: Mapping[str, Any], files: Files | None = None, limits: L
 
 
 def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
-    """The same without the seed: what the trials of a cell have in common."""
+    """A replay command without its seed: what the trials of a cell have in common."""
     given = str((files or {}).get(row["scenario"], row["scenario"]))
     given = f"./{given}" if given.startswith("-") else given
     return shlex.join(["apo-bench", "replay", given, *_options(as_usual(row), limits)])

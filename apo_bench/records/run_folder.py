@@ -145,7 +145,7 @@ def read_rows(folder: str | Path) -> list[Row]:
 
 
 def each_row(folder: str | Path) -> Iterator[Row]:
-    """The same, one after the other, so that a reader need not hold them all."""
+    """The rows of a folder one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
     if not path.exists():
         raise InputError(

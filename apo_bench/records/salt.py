@@ -62,7 +62,7 @@ def salt_of_sweep(path: str | Path, folder: str | Path) -> Salt:
     """The salt of a file, which is made if it is not there and the folder of the sweep holds no trial yet.
 
     Raises:
-        InputError: As `read_salt`, or the file cannot be made.
+        InputError: The file is no salt, cannot be read, or cannot be made.
     """
     if os.path.lexists(path):
         return read_salt(path)

@@ -46,7 +46,7 @@ class SettingInfo:
     """Whether a scene is compiled for it."""
     name: str = ""
     kind: Any = None
-    """Its type, with the range that it may have."""
+    """The type of the setting, with the range that it may have."""
     default: Any = None
 
     @property

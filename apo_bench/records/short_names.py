@@ -26,7 +26,7 @@ CORRECTORS = MappingProxyType(
         "cadquery": "apo_bench.correction.baselines.cadquery_adapter:cadquery",
     }
 )
-"""Those that need an observation and nothing else."""
+"""The correctors that need an observation and nothing else."""
 SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.settling:settle"})
 """Correctors that need a simulator; `correct` does not know them, a trial does."""
 METHODS = ("oracle", "none", *CORRECTORS, *SIMULATED)

@@ -108,7 +108,7 @@ def in_words(found: Comparison) -> str:
 
 
 def comparison_form(found: Comparison) -> dict[str, Any]:
-    """As JSON holds it."""
+    """A comparison as JSON holds it."""
     return {
         "schema": _SCHEMA,
         "first": str(found.first.folder),

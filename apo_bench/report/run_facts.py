@@ -29,7 +29,7 @@ def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
 
 
 def limits_of(run: Mapping[str, Any]) -> Limits:
-    """Those that a sweep had when it was last started; the usual ones where it does not say."""
+    """The limits that a sweep had when it was last started; the usual ones where it does not say."""
     said = run.get("limits") or {}
     trial_s = said.get("trial_s", USUAL_LIMITS.trial_s)
     corrector_s = said.get("corrector_s") or USUAL_LIMITS.corrector_s

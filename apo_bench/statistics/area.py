@@ -29,7 +29,7 @@ class Area:
     setting: CurveSetting
     levels: tuple[float, ...]
     seeds: int
-    """Those that have a result at every level."""
+    """The seeds that have a result at every level."""
     area: float | None
     """The mean over seeds; None without one."""
     interval: Interval
@@ -45,9 +45,9 @@ class AreaDifference:
     """Of the method."""
     reference: str
     levels: tuple[float, ...]
-    """Those that both have."""
+    """The levels that both have."""
     seeds: int
-    """Those that have a result of both at every level."""
+    """The seeds that have a result of both at every level."""
     difference: float | None
     interval: Interval
     """At 95 %."""

@@ -42,7 +42,7 @@ class Paired:
     p: float | None
     """McNemar's exact p-value; None without a pair."""
     p_adjusted: float | None
-    """The same, adjusted for all comparisons that were made together."""
+    """The p-value, adjusted for all comparisons that were made together."""
     planned: int
     """Seeds at which both had a plan."""
     free_mm: float | None

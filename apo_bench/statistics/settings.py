@@ -63,7 +63,7 @@ def cell_place(item: Any) -> Place:
 
 
 def settings(cells: Iterable[Any]) -> list[Setting]:
-    """Those that hold the cells, sorted by scenario first; the oracle alone makes one only if nothing else is there."""
+    """The settings of cells, sorted by scenario first; the oracle alone makes one only if nothing else is there."""
     places = [cell_place(cell) for cell in cells]
     found = {setting_of(p) for p in places if knows_relations(p.method)}
     told_right = {s._replace(relations="given") for s in found}

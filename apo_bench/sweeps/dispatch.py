@@ -66,7 +66,7 @@ class Job:
     """A unit of work, and how far it is."""
 
     trials: list[TrialSettings]
-    """Those without a row; the first may be under way."""
+    """The trials without a row; the first may be under way."""
     since: float | None = None
     """When the trial under way began; None where none is."""
     heard: float = math.inf

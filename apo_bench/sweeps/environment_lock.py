@@ -28,7 +28,7 @@ _PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
 )
-"""Those whose version may show in a row."""
+"""The packages whose version may show in a row."""
 
 
 @final
@@ -38,7 +38,7 @@ class Names:
 
     arm: str
     scenarios: tuple[str, ...]
-    """As they were given."""
+    """The scenarios as they were given."""
     methods: tuple[str, ...]
     relations: tuple[str, ...]
     noises: Mapping[str, float]

@@ -113,7 +113,7 @@ def trial_row(spec: TrialSettings, scene: Scene, recording: Recording, content: 
     What code of somebody's own returned may be what no row can hold; that is its failure too.
 
     Args:
-        more: As `run_trial` takes it.
+        more: Further arguments of `run_trial`.
 
     Raises:
         InputError: The request cannot be honoured.

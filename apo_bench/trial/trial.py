@@ -104,7 +104,7 @@ def run_measured(
 
     Args:
         text: The content of the file, for the hash.
-        method: As in `run_trial`.
+        method: The method, as in `run_trial`.
 
     Raises:
         InputError: The method is `oracle`, which would need the truth.

@@ -73,7 +73,7 @@ def recognition_figure(found: Sequence[Recognition]) -> Figure:
 
 
 def methods_of(cells: Sequence[Cell]) -> list[str]:
-    """Those that have a colour, as a reader looks for them."""
+    """The methods that have a colour, in the order in which a reader looks for them."""
     return [m for m in dict.fromkeys(c.method for c in cells) if not knows_truth(m)]
 
 

@@ -111,7 +111,7 @@ def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[_Box, str, st
 
 
 def _in_order(found: Iterable[str]) -> list[str]:
-    """As a trial goes through them; any other at the end."""
+    """Stages in the order in which a trial goes through them; any other at the end."""
     return sorted(set(found), key=lambda stage: (STAGES.index(stage) if stage in STAGES else len(STAGES), stage))
 
 

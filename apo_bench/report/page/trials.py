@@ -75,7 +75,7 @@ def trials(
 
 
 def packed_json(values: Mapping[str, Any]) -> Markup:
-    """As base64 of gzip of JSON: letters that mean nothing in HTML; the same bytes for the same values."""
+    """Values as base64 of gzip of JSON: letters that mean nothing in HTML; equal bytes for equal values."""
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
     return Markup(base64.b64encode(gzip.compress(text, compresslevel=6, mtime=0)).decode())
 
@@ -105,7 +105,7 @@ def predicted(said: Mapping[str, Any] | None) -> str:
 
 
 def rounded(x: Any, decimals: int) -> float | int | None:
-    """As it is shown; the script writes the zeros at the end."""
+    """A number as it is shown; the script writes the zeros at the end."""
     if x is None or isinstance(x, int):
         return x
     near = round(float(x), decimals)

@@ -79,7 +79,7 @@ class Table:
         return made
 
     def markdown(self) -> list[str]:
-        """As lines of Markdown, or the sentence where there is none."""
+        """The table as lines of Markdown, or the sentence where there is none."""
         if not self.items:
             return [self.empty]
         heads = [column.head for column in self.shown]

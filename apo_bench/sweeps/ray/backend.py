@@ -76,7 +76,7 @@ def spread(
 
     Args:
         workers: None stands for as many as the cluster takes.
-        address: As in `check_ray`.
+        address: The address of the cluster, as in `check_ray`.
 
     Raises:
         InputError: No such cluster, or one whose nodes cannot work as this machine does.

@@ -82,7 +82,7 @@ class RayPool:
                 self._cancel(task)
 
     def _fill(self) -> None:
-        """As many tasks as there may be, as long as few of them wait for a CPU."""
+        """Start as many tasks as there may be, as long as few of them wait for a CPU."""
         while (
             self._dispatch.waiting
             and sum(task.worker is None for task in self._tasks) < _AHEAD
