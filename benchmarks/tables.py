@@ -38,7 +38,7 @@ def main() -> None:
     plain = [cell for cell in cells if (cell.noise, cell.relations) == ("isotropic", "given")]
     known = [row for row in rows if row["p_value"] is not None or row["planned_error_free_mm"] is not None]
     lines = [
-        "# Results",
+        "# Tables of earlier sweeps",
         "",
         f"{len(rows)} trials, written by `python benchmarks/tables.py` from `benchmarks/results/rows.jsonl.gz`. Strict "
         "success, friction grasp, 0.25 mm clearance per side, careless humans (carelessness 1), MuJoCo 3.17.0, 1 ms. A "
