@@ -10,10 +10,8 @@ from typing import Any
 
 from apo_bench.records.run_folder import read_rows
 from apo_bench.records.verdicts import by_verdict, verdict_of
-from apo_bench.report.tables.calibration import WORDS as CALIBRATION
-from apo_bench.report.tables.calibration import calibration_table
-from apo_bench.report.tables.confusion import WORDS as CONFUSION
-from apo_bench.report.tables.confusion import confusion_table
+from apo_bench.report.tables.calibration import CALIBRATION_NOTE, calibration_table
+from apo_bench.report.tables.confusion import CONFUSION_NOTE, confusion_table
 from apo_bench.statistics.calibration import calibrations
 from apo_bench.statistics.confusion import confusions
 from apo_bench.statistics.paired import paired
@@ -115,13 +113,13 @@ def main() -> None:
         "",
         "## Calibration",
         "",
-        CALIBRATION,
+        CALIBRATION_NOTE,
         "",
         *calibration_table([c for c in calibrations(known) if c.method.startswith("contact")]).markdown(),
         "",
         "## Prediction and physics",
         "",
-        CONFUSION,
+        CONFUSION_NOTE,
         "",
         *confusion_table(confusions(rows)).markdown(),
     ]

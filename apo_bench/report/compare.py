@@ -16,6 +16,7 @@ from apo_bench.records.run_file import read_run
 from apo_bench.records.salt import one_salt, with_salt
 from apo_bench.records.settings import ROW, SETTINGS
 from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
+from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
 from apo_bench.statistics.settings import cell_place
@@ -24,8 +25,6 @@ RUN = "run.json can be read"
 ENDING = ("success", "failure_stage", "failure_code")
 _ENDED = itemgetter(*ENDING)
 _TOLD = itemgetter(*ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
-ALL = "all"
-"""Stands for every scenario."""
 
 
 class Side(NamedTuple):

@@ -10,7 +10,7 @@ from apo_bench.records.settings import RANGE, USUAL
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Place, rank_relations
 
-Item = TypeVar("Item")
+_Item = TypeVar("_Item")
 
 
 class Setting(NamedTuple):
@@ -73,9 +73,9 @@ def settings(cells: Iterable[Any]) -> list[Setting]:
     return sorted(found, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
 
 
-def members(found: Sequence[Setting], items: Iterable[Item]) -> dict[Setting, list[Item]]:
+def members(found: Sequence[Setting], items: Iterable[_Item]) -> dict[Setting, list[_Item]]:
     """The cells, or whatever has a place, of every setting, in their order; of several oracles the one most tried."""
-    near: dict[tuple[Any, ...], list[Item]] = {}
+    near: dict[tuple[Any, ...], list[_Item]] = {}
     for item in items:
         near.setdefault(_site(cell_place(item)), []).append(item)
     grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(cell_place(item))] for s in found}
@@ -112,7 +112,7 @@ def _site(x: Place | Setting) -> tuple[Any, ...]:
     return x.scenario, x.clearance_mm, x.grasp, x.fidelity
 
 
-def _one_ceiling(inside: list[Item]) -> list[Item]:
+def _one_ceiling(inside: list[_Item]) -> list[_Item]:
     ceilings = [item for item in inside if cell_place(item).method == "oracle"]
     best = max(ceilings, key=lambda item: getattr(item, "trials", 0), default=None)
     return [item for item in inside if item is best or cell_place(item).method != "oracle"]

@@ -17,7 +17,7 @@ from apo_bench.errors import InputError
 from apo_bench.records.settings import ROW
 from apo_bench.report.figures.levels import success_figure
 from apo_bench.report.figures.sheet import draw
-from apo_bench.report.figures.styles import OTHERS, STYLES
+from apo_bench.report.figures.styles import OWN_STYLES, STYLES
 from apo_bench.report.report import report
 from apo_bench.report.tables.confusion import prediction_summary
 from apo_bench.statistics.confusion import Confusion, confusions
@@ -297,7 +297,7 @@ def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) ->
 
 
 def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
-    every = [*STYLES.values(), *OTHERS]
+    every = [*STYLES.values(), *OWN_STYLES]
     assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
     methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
     drawn = draw(success_figure(tally([row(method) for method in methods])))

@@ -18,7 +18,8 @@ from apo_bench.report.figures.sheet import draw
 from apo_bench.report.tables.recognition import NONE, recognition_table
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.statistics.recognition import ALL, recognitions
+from apo_bench.statistics.confusion import ALL
+from apo_bench.statistics.recognition import recognitions
 from apo_bench.trial.stages import Recording, record_demonstration
 from apo_bench.trial.trial import run_trial
 from tests import pages

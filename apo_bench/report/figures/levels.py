@@ -10,12 +10,13 @@ from apo_bench.records.method import knows_truth
 from apo_bench.records.settings import RANGE
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, Rule, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
-from apo_bench.report.figures.styles import RECOGNISED, SEEN, Style, styles
+from apo_bench.report.figures.styles import RECOGNITION_STYLES, SEEN, Style, styles
+from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.gaps import GapSummary, Quantiles
 from apo_bench.statistics.paired import Paired
 from apo_bench.statistics.rate_text import interval, percent
 from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.recognition import ALL, Recognition
+from apo_bench.statistics.recognition import Recognition
 from apo_bench.statistics.settings import (
     Setting,
     cell_place,
@@ -27,7 +28,7 @@ from apo_bench.statistics.settings import (
     settings,
 )
 
-Item = TypeVar("Item")
+_Item = TypeVar("_Item")
 SHARES = tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100))
 STEPS = (1, 2, 5, 10, 20, 25, 50, 100)
 FLOOR_MM = 1e-3
@@ -68,7 +69,7 @@ def recognition_figure(found: Sequence[Recognition]) -> Figure:
         here = [r for r in shown if (r.place.noise, r.place.eye, r.place.careless) == row]
         where = f"{'range finder' if row[1] == RANGE else row[0]}, carelessness {row[2]:g}"
         panels += [_recognised(f"{name}; {where}", here, what) for what, name in RECOGNITION.items()]
-    kinds = {kind: style for kind, style in RECOGNISED.items() if any(r.place.relations == kind for r in found)}
+    kinds = {kind: style for kind, style in RECOGNITION_STYLES.items() if any(r.place.relations == kind for r in found)}
     return Figure("Recognised contacts over level", panels, entries(kinds))
 
 
@@ -145,7 +146,7 @@ def _gaps(setting: Setting, found: Sequence[GapSummary], looks: Mapping[str, Sty
 def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
     levels = sorted({(r.place.level, r.place.level_deg) for r in here})
     noise = RANGE if all(r.place.eye == RANGE for r in here) else ""
-    kinds = [kind for kind in RECOGNISED if any(r.place.relations == kind for r in here)]
+    kinds = [kind for kind in RECOGNITION_STYLES if any(r.place.relations == kind for r in here)]
     lines = []
     for kind, dodge in zip(kinds, dodges(len(kinds)), strict=True):
         points = []
@@ -154,7 +155,7 @@ def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
             where = levels.index((r.place.level, r.place.level_deg)) + dodge
             if r.place.relations == kind and share is not None:
                 points.append(Point(where, share, share, share, percent(share)))
-        lines.append(MethodLine(kind, RECOGNISED[kind], points))
+        lines.append(MethodLine(kind, RECOGNITION_STYLES[kind], points))
     least = min((p.value for line in lines for p in line.points), default=0.0)
     low = 0.0 if least < 0.6 else 0.6 if least < 0.9 else 0.9
     ticks = [(low + (1 - low) * k / 4, f"{100 * (low + (1 - low) * k / 4):g} %") for k in range(5)]
@@ -168,10 +169,10 @@ def _levels(setting: Setting, items: Sequence[object]) -> Axis:
 
 def _lines(
     setting: Setting,
-    items: Sequence[Item],
+    items: Sequence[_Item],
     looks: Mapping[str, Style],
-    point: Callable[[Item], tuple[float, float, float]],
-    tip: Callable[[Item], str],
+    point: Callable[[_Item], tuple[float, float, float]],
+    tip: Callable[[_Item], str],
 ) -> list[MethodLine]:
     """A line per method, by a value with its interval and a sentence of each item."""
     levels = levels_of(items)

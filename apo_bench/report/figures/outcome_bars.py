@@ -11,8 +11,7 @@ from matplotlib.collections import PolyCollection
 from apo_bench.records.method import knows_truth
 from apo_bench.records.outcomes import STAGES
 from apo_bench.report.figures.sheet import SAMPLE, WIDTH, Entry, Figure, Panel, Tips
-from apo_bench.report.figures.styles import SOFT, SUCCESS
-from apo_bench.report.figures.styles import STAGES as COLORS
+from apo_bench.report.figures.styles import SOFT, STAGE_COLORS, SUCCESS
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.settings import Setting, level_of, level_words
@@ -42,7 +41,7 @@ def stages_of(cell: Cell) -> Counter[str]:
 
 def color_of(ending: str) -> str:
     """Of `success` or a stage."""
-    return SUCCESS if ending == "success" else COLORS.get(ending, COLORS["observe"])
+    return SUCCESS if ending == "success" else STAGE_COLORS.get(ending, STAGE_COLORS["observe"])
 
 
 def canvas(axis: Any, height: float) -> None:

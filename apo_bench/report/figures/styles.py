@@ -36,15 +36,15 @@ STYLES = {
     "settle": Style("#882255", ">", _DOTTED),
     "penalty": Style("#88ccee", "d", _DOTTED),
 }
-OTHERS = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
-RECOGNISED = {
+OWN_STYLES = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
+RECOGNITION_STYLES = {
     "recognised": Style("#009e73", "o", _SOLID),
     "recognised-fixed": Style("#d55e00", "s", _DASHED),
     "recognised-twice": Style("#0072b2", "^", _DOTTED),
 }
 SEEN = Style(SOFT, "o", _SOLID)
 """What was observed, before any method."""
-STAGES = {
+STAGE_COLORS = {
     "observe": "#999999",
     "correct": "#aa4499",
     "plan": "#ddaa33",
@@ -85,7 +85,7 @@ _DARK = {
 def styles(methods: Sequence[str]) -> dict[str, Style]:
     """One each; a method of one's own takes the next that is left."""
     own = [method for method in methods if method not in STYLES]
-    return {m: STYLES[m] if m in STYLES else OTHERS[own.index(m) % len(OTHERS)] for m in methods}
+    return {m: STYLES[m] if m in STYLES else OWN_STYLES[own.index(m) % len(OWN_STYLES)] for m in methods}
 
 
 def themed(svg: str) -> str:

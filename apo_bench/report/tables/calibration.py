@@ -9,7 +9,7 @@ from apo_bench.report.tables.saying import millimetres
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.calibration import Calibration
 
-WORDS = (
+CALIBRATION_NOTE = (
     "Over every level, carelessness and clearance. *Covered* is how often the truth lies in the 95 % region that a "
     "correction states. Errors are root mean squares of the planned goals, in directions that the contacts fix, also "
     "over the clearance, and in those that they leave free. A test *fails* where the stated noise does not explain the "

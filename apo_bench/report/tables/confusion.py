@@ -8,7 +8,7 @@ from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.confusion import Confusion
 from apo_bench.statistics.rate_text import percent
 
-WORDS = (
+CONFUSION_NOTE = (
     "Before it is carried out a plan says whether it will *fit* or *fail*; then physics decides: *fitted* is made as "
     "demonstrated. An operation is right where the robot stopped at the one that was predicted. A method that gave no "
     "plan has nothing executed."

@@ -8,7 +8,7 @@ from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.effort import Effort
 from apo_bench.statistics.times import Times, Work
 
-WORDS = (
+EFFORT_NOTE = (
     "Of trials that were right: the operations that were undone and done again, the simulated time, and how far a part "
     "that was in place was pushed at most."
 )

@@ -8,7 +8,7 @@ from apo_bench.report.tables.saying import level_text, millimetres, place_column
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.gaps import GapSummary
 
-WORDS = (
+GAP_NOTE = (
     "The largest distance of any face from the one it should touch, as it was seen and as the method planned it: "
     "medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below 0.001 mm is "
     "drawn there. `none` plans what was seen."

@@ -9,7 +9,7 @@ from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.area import Area, AreaDifference
 from apo_bench.statistics.half_level import HalfLevel
 
-WORDS = (
+HALF_LEVEL_NOTE = (
     "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* is from "
     "the last level with success surely over one half to the first surely under it, whatever the curve between them. "
     "The area is mean success over the logarithm of the level, from 0 to 1, of seeds that have a result at every level."

@@ -17,7 +17,7 @@ from apo_bench.report.tables.saying import (
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.paired import Paired
 
-WORDS = (
+PAIR_NOTE = (
     "Over the same seeds: at how many of them both methods were right, one alone, or neither; the difference of their "
     "success rates in points with Tango's score interval for paired proportions; McNemar's exact p-value, and in "
     "brackets the same adjusted for all comparisons of the sweep (Holm); *recovered*, the share of the seeds at which "

@@ -9,7 +9,7 @@ from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.recognition import Recognition
 
-WORDS = (
+RECOGNITION_NOTE = (
     "Contacts that were recognised, against those of the scenario: how many demonstrations had all right and none too "
     "many; how many of the recognised contacts are right (precision), and of the right ones were recognised (recall)."
 )
