@@ -9,7 +9,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.assembly.goals import Observation
 from apo_bench.cli.arguments import check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
@@ -106,39 +106,43 @@ def correct(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     with redirect_output(as_json):
-        made = correct_named(seen, with_simulated(corrector))
-    found = _explained(seen, made)
+        correction = correct_named(seen, with_simulated(corrector))
+    found = _explained(seen, correction)
     if as_json:
-        typer.echo(json.dumps(correction_form(loaded.name, method, seen, made, found, assumed), allow_nan=False))
+        typer.echo(json.dumps(correction_form(loaded.name, method, seen, correction, found, assumed), allow_nan=False))
     else:
         typer.echo(f"{loaded.name} from {observation}, corrected by {method}\n")
-        lines = correction_lines(seen, made, found)
+        lines = correction_lines(seen, correction, found)
         if assumed:
             lines.append(("noise", f"{_stated(deviation_mm, deviation_deg)}, assumed where the file states none"))
         width = max(len(name) for name, _ in lines)
         typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in lines))
-        _print_tables([pose_table(seen, made)] if made.ok else [])
-        if made.test is not None and made.test.suspects:
-            _print_tables([suspect_table(made.test)])
-    if not made.ok:
+        _print_tables([pose_table(seen, correction)] if correction.ok else [])
+        if correction.test is not None and correction.test.suspects:
+            _print_tables([suspect_table(correction.test)])
+    if not correction.ok:
         if out is not None:
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
         raise typer.Exit(_NO_RESULT)
     if out is not None:
-        _write(out, scenario, loaded.name, seen, made)
+        _write(out, scenario, loaded.name, seen, correction)
         if not as_json:
             typer.echo(f"Wrote {out}")
 
 
-def _explained(seen: Observation, made: Correction) -> Any:
+def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
     from apo_bench.correction.baselines.measured import gap_of
     from apo_bench.correction.explanation import explain as explained
     from apo_bench.correction.posterior import LARGEST_POSTERIOR
 
-    if not made.ok or 6 * len(made.goals) > LARGEST_POSTERIOR or gap_of(seen, made.goals, made.dropped) > _EXACT_M:
+    if (
+        not correction.ok
+        or 6 * len(correction.goals) > LARGEST_POSTERIOR
+        or gap_of(observation, correction.goals, correction.dropped) > _EXACT_M
+    ):
         return None
-    return explained(seen, made.goals, made.dropped)
+    return explained(observation, correction.goals, correction.dropped)
 
 
 def _corrector(method: str, doubt: str | None) -> Any:
@@ -154,12 +158,11 @@ def _corrector(method: str, doubt: str | None) -> Any:
     return method
 
 
-def _write(out: Path, scenario: str, name: str, seen: Observation, made: Correction) -> None:
+def _write(out: Path, scenario: str, name: str, observation: Observation, correction: Correction) -> None:
     from apo_bench.files.csv_form import table
     from apo_bench.files.json_forms import plan_form, write_form
 
-    targets = {} if made.targets is None else {"targets": made.targets}
-    plan = Plan(seen.assembly, seen.start, made.goals, made.schedule, **targets)
+    plan = correction.plan(observation)
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
         return

@@ -64,13 +64,13 @@ def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) 
     from apo_bench.trial.methods import with_simulated
     from apo_bench.trial.plan_warning import plan_warning
 
-    made = correct_named(looked, with_simulated(method))
-    if not made.ok:
+    correction = correct_named(looked, with_simulated(method))
+    if not correction.ok:
         raise RuntimeError(
-            f"{method} did not correct what was seen: {made.sentence.rstrip('.')}; --seen draws what was seen."
+            f"{method} did not correct what was seen: {correction.sentence.rstrip('.')}; --seen draws what was seen."
         )
-    warning = plan_warning(scenario, made.plan(looked), made)
-    return belief_panel(f"corrected by {method}", looked, made.goals, step, warning)
+    warning = plan_warning(scenario, correction.plan(looked), correction)
+    return belief_panel(f"corrected by {method}", looked, correction.goals, step, warning)
 
 
 def _check_seen(looked: Observation, step: int) -> None:

@@ -30,7 +30,7 @@ class CorrectorMisbehaved(InputError):
     """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
 
 
-def correct(seen: Observation, corrector: Any = "contact") -> Correction:
+def correct(observation: Observation, corrector: Any = "contact") -> Correction:
     """What the corrector makes of an observation.
 
     Args:
@@ -41,11 +41,11 @@ def correct(seen: Observation, corrector: Any = "contact") -> Correction:
         InputError: There is no such corrector, or the observation makes no sense.
         CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
     """
-    check_observations((seen,))
+    check_observations((observation,))
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     try:
-        return _admitted(chosen(seen), seen, chosen, name)
+        return _admitted(chosen(observation), observation, chosen, name)
     except InputError as error:
         if _ours(chosen) or isinstance(error, CorrectorMisbehaved):
             raise

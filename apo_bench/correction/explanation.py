@@ -107,7 +107,7 @@ class Explanation:
     spectral_gap: float
 
 
-def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> Explanation:
+def explain(observation: Observation, goals: Array, dropped: Collection[str] = ()) -> Explanation:
     """What the contacts determine at goals that satisfy them, and how uncertain these are after what was seen.
 
     Args:
@@ -117,12 +117,12 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
     """
-    n, assembly = len(goals), seen.assembly
+    n, assembly = len(goals), observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    asked = problem(replace(seen, goals=goals), nearest_goals)
+    asked = problem(replace(observation, goals=goals), nearest_goals)
     kept = asked.exact & asked.without(tuple(dropped))
-    B = right_jacobian(pose.log(pose.inverse(seen.goals) @ goals)) @ asked.L
+    B = right_jacobian(pose.log(pose.inverse(observation.goals) @ goals)) @ asked.L
     Jt = asked.compact.gathered(asked.compact.blocks(goals, B)[1])
     every, relations = relation_holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
     known = freedom(relations.Jt)
@@ -151,7 +151,7 @@ def explain(seen: Observation, goals: Array, dropped: Collection[str] = ()) -> E
         assembly=assembly,
         goals=goals,
         operations=tuple(found),
-        parts=_standing(assembly, seen.start, goals, B, known.free),
+        parts=_standing(assembly, observation.start, goals, B, known.free),
         rank=known.rank,
         freedom=known.free.shape[1],
         redundant=known.redundant - 3 * int(np.count_nonzero(~kept)),

@@ -57,33 +57,36 @@ class Recognised:
     """One for each contact, in the order of `assembly.relations()`."""
 
 
-def recognise(seen: Observation, rules: Rules = RULES_BY_NOISE, *, first_seen: Array | None = None) -> Recognised:
+def recognise(
+    observation: Observation, rules: Rules = RULES_BY_NOISE, *, first_seen: Array | None = None
+) -> Recognised:
     """Find the face contacts of every operation; those that the observation came with are not looked at.
 
     Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
     contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
 
     Args:
-        rules: `NOISE` or `FIXED` of `apo_bench.recognition.thresholds`, or your own.
-        first_seen: (n, 4, 4), the goals that the evidence calls seen, where those of `seen` were corrected already.
+        rules: `RULES_BY_NOISE` or `FIXED_RULES` of `apo_bench.recognition.thresholds`, or your own.
+        first_seen: (n, 4, 4), the goals that the evidence calls seen, where those of the observation were corrected
+            already.
 
     Raises:
         InputError: Something else was given.
     """
-    for given, wanted in ((seen, Observation), (rules, Rules)):
+    for given, wanted in ((observation, Observation), (rules, Rules)):
         if not isinstance(given, wanted):
             raise InputError(
                 f"{kind(given)} was given to recognise; an Observation is allowed (read_observation reads one from a "
                 "file), and as rules NOISE, FIXED or Rules(...) of apo_bench.recognition.thresholds."
             )
-    bare = tuple(replace(operation, contacts=()) for operation in seen.assembly.operations)
-    assembly = replace(seen.assembly, operations=bare, gaps={})
-    seen = replace(seen, assembly=assembly)
-    belief, evidence = initial_belief(seen), list[Evidence]()
+    bare = tuple(replace(operation, contacts=()) for operation in observation.assembly.operations)
+    assembly = replace(observation.assembly, operations=bare, gaps={})
+    observation = replace(observation, assembly=assembly)
+    belief, evidence = initial_belief(observation), list[Evidence]()
     as_seen = belief if first_seen is None else replace(belief, goals=first_seen)
     known = set(assembly.fixed)
     for k, operation in enumerate(bare):
-        around = _Around(seen, rules, k, tuple(p for p in assembly.solids if p in known - set(operation.moves)))
+        around = _Around(observation, rules, k, tuple(p for p in assembly.solids if p in known - set(operation.moves)))
         found = around.fixed(belief) if rules.fixed else around.likeliest(belief)
         belief = found.belief
         evidence += around.evidence(found, as_seen.standing(k))

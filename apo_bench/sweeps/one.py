@@ -159,11 +159,11 @@ def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, fil
 
 
 def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
-    seen = read_stated(path, scene.scenario)
-    aloft = in_the_air(seen.assembly, seen.start, MEASURED_AIR_M)
+    observation = read_stated(path, scene.scenario)
+    aloft = in_the_air(observation.assembly, observation.start, MEASURED_AIR_M)
     if aloft is not None:
         raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-    return run_measured(spec, scene, seen, read_text(path, "observation file"), method=method, watch=film)
+    return run_measured(spec, scene, observation, read_text(path, "observation file"), method=method, watch=film)
 
 
 def _spec(request: Request, clearance_mm: float) -> TrialSettings:

@@ -179,7 +179,7 @@ def timing(
     }
 
 
-def _raise(error: Exception, seen: Observation) -> None:
+def _raise(error: Exception, observation: Observation) -> None:
     raise error
 
 
