@@ -27,8 +27,7 @@ from apo_bench.cli import replay_command as cli_replay
 from apo_bench.cli import report as cli_report
 from apo_bench.cli import show as cli_show
 from apo_bench.cli import sweep_command as cli_sweep
-from apo_bench.cli.arguments import check_writable
-from apo_bench.cli.replay_command import NO_RESULT
+from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import Interrupted
 from apo_bench.errors import InputError

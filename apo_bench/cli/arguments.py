@@ -9,6 +9,9 @@ from typing import Any
 from apo_bench.errors import InputError
 from apo_bench.io.writing import check_target
 
+NO_RESULT = 1
+"""The exit code of a command that ended without the result it was asked for."""
+
 
 def numbers(text: str, option: str) -> tuple[float, ...]:
     """`0,0.5,1` as numbers; whether they are allowed is checked where they are used."""

@@ -10,12 +10,11 @@ import typer
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
-from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
 
-_NO_RESULT = 1
 _EXACT_M = 1e-9
 """Contacts that hold this well are a solution, at which a rank can be read off."""
 _DOUBTS = ("apply", "warn", "refuse", "drop")
@@ -123,7 +122,7 @@ def correct(
     if not correction.ok:
         if out is not None:
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
-        raise typer.Exit(_NO_RESULT)
+        raise typer.Exit(NO_RESULT)
     if out is not None:
         _write(out, scenario, loaded.name, seen, correction)
         if not as_json:

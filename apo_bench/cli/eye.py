@@ -8,10 +8,8 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
-
-NO_RESULT = 1
 
 
 def register(app: typer.Typer) -> None:

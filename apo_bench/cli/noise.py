@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.errors import InputError
 
-_NO_RESULT = 1
 _HELP = "Noise models: list, cards, fits to measured poses."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
 noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=_HELP)
@@ -63,7 +62,7 @@ def card(
         return
     if not len(drawn.errors):
         typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
-        raise typer.Exit(_NO_RESULT)
+        raise typer.Exit(NO_RESULT)
     try:
         draw_histogram(drawn, out)
     except OSError as error:

@@ -8,13 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import CorrectorLimit, ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import interrupted
 from apo_bench.io.output import redirect_output
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
-
-NO_RESULT = 1
 
 
 def register(app: typer.Typer) -> None:

@@ -16,7 +16,7 @@ from apo_bench.records.key import KEY
 from apo_bench.records.outcomes import CODES, STAGES
 from apo_bench.records.settings import (
     LARGEST_SEED,
-    Carelessness,
+    CarelessnessValue,
     ClearanceMm,
     Eye,
     Fidelity,
@@ -70,7 +70,7 @@ class Row(TypedDict, total=False):
     """Standard deviation of the positions seen, per axis [mm]; with the eye `range`, of one ray. Null if measured."""
     level_deg: NoiseLevel | None
     """Standard deviation of the angles seen, per axis [deg]; zero with the eye `range`. Null if measured."""
-    careless: Carelessness | None
+    careless: CarelessnessValue | None
     """How far the human deviates: 0 is a careful one, 1 the scenario's. Null if measured."""
     clearance_mm: ClearanceMm
     """Room per side between parts that fit into one another [mm]."""

@@ -38,7 +38,7 @@ LONGEST_NAME = 5000
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 NoiseLevel = Annotated[float, Meta(ge=0.0, le=50.0)]
 """[mm] or [degrees]: five times the largest is still inside the room."""
-Carelessness = Annotated[float, Meta(ge=0.0, le=10.0)]
+CarelessnessValue = Annotated[float, Meta(ge=0.0, le=10.0)]
 ClearanceMm = Annotated[float, Meta(ge=0.0, le=5.0)]
 Seed = Annotated[int, Meta(ge=0, le=LARGEST_SEED)]
 TimestepS = Annotated[float, Meta(gt=0.0, le=1.0)]
@@ -81,7 +81,7 @@ class TrialSettings:
         metadata=about("Only the degrees", called="level in degrees", meaning=_PER_AXIS, usual="the level", key=True),
     )
     """Standard deviation of the angles seen, per axis [deg]; zero with the eye `range`."""
-    careless: Carelessness = field(
+    careless: CarelessnessValue = field(
         default=1.0,
         metadata=about(
             "Carelessness of the human: 0 is a careful one, 1 the scenario's",

@@ -316,7 +316,9 @@ class Nodes:
         monkeypatch.setitem(sys.modules, "ray", self)
         monkeypatch.setitem(sys.modules, "ray.exceptions", SimpleNamespace(**names))
         work, lock = lock_of(replace(spec, trials=1))
-        self.dispatch = Dispatch(work, lock, 60.0, self.emit, deaths=pool.DEATHS, false_starts=pool.FALSE_STARTS)
+        self.dispatch = Dispatch(
+            work, lock, 60.0, self.emit, deaths=pool.DEATHS, false_starts=pool.FALSE_STARTS_OF_TASKS
+        )
         self.pool = pool.RayPool(self.dispatch, self.start, workers=1)
 
     def start(self, unit: bytes) -> Messages:
@@ -372,7 +374,7 @@ def test_each_trial_has_one_row_whatever_becomes_of_nodes_and_workers(
 
 def test_workers_that_never_begin_end_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
     ray = Nodes(monkeypatch, [[Gone("no room")]] * 9)
-    ray.turns(pool.FALSE_STARTS - 1)
+    ray.turns(pool.FALSE_STARTS_OF_TASKS - 1)
     with pytest.raises(RuntimeError, match="end before they have begun a trial: no room"):
         ray.turns(1)
     assert not ray.rows

@@ -24,7 +24,7 @@ from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.pool import GRACE_S
 from apo_bench.sweeps.local.process import THREADS
 from apo_bench.sweeps.messages import Message, last_message
-from apo_bench.sweeps.ray.pool import DEATHS, FALSE_STARTS, RayPool
+from apo_bench.sweeps.ray.pool import DEATHS, FALSE_STARTS_OF_TASKS, RayPool
 from apo_bench.sweeps.ray.task import made_task
 
 _OBJECT_STORE = 100 * 2**20
@@ -128,7 +128,7 @@ def _spread(plan: ClusterPlan, say: Callable[..., None], pipe: Any) -> None:
 
     task = ray.remote(**_ONE_TRY)(made_task())
     packed = pickle.dumps(plan.lock)
-    dispatch = Dispatch(plan.work, plan.lock, plan.limit_s, emit, deaths=DEATHS, false_starts=FALSE_STARTS)
+    dispatch = Dispatch(plan.work, plan.lock, plan.limit_s, emit, deaths=DEATHS, false_starts=FALSE_STARTS_OF_TASKS)
     pool = RayPool(dispatch, lambda unit: task.remote(packed, unit), plan.workers)
     deadline = float("inf")
     while pool.is_busy and time.monotonic() < deadline:

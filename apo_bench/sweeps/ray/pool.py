@@ -19,7 +19,7 @@ _AHEAD = 32
 """So many tasks wait at the cluster for a free CPU, so that a node that joins has work at once."""
 DEATHS = 2
 """So many workers in a row die of one trial before it is lost: memory may be short for once."""
-FALSE_STARTS = 5
+FALSE_STARTS_OF_TASKS = 5
 
 
 @final
