@@ -37,7 +37,7 @@ _EXPORTS = MappingProxyType(
         "ReplayResult": "apo_bench.assembly.reached",
         "Scenario": "apo_bench.scenario.scenario",
         "Scene": "apo_bench.simulation.scene.scene",
-        "SweepSpec": "apo_bench.sweeps.grid",
+        "SweepSettings": "apo_bench.sweeps.grid",
         "TrialSettings": "apo_bench.records.settings",
         "Verdict": "apo_bench.judging.verdict",
         "build_scene": "apo_bench.simulation.scene.scene",

@@ -30,7 +30,7 @@ from apo_bench.simulation.scene.render import camera_view as camera_view
 from apo_bench.simulation.scene.render import picture as picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
-from apo_bench.sweeps.grid import SweepSpec as SweepSpec
+from apo_bench.sweeps.grid import SweepSettings as SweepSettings
 from apo_bench.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.trial.trial import run_trial as run_trial
 

@@ -58,6 +58,7 @@ MODULES = MappingProxyType(
 """Old path -> new path, both within `apo_bench`; empty for a package that is gone."""
 NAMES = MappingProxyType(
     {
+        "benchmark.grid": {"SweepSpec": "SweepSettings"},
         "benchmark.spec": {"TrialSpec": "TrialSettings"},
         "benchmark.sweep": {"sweep": "run_sweep"},
         "correction.equations": {"gap": "largest_gap"},

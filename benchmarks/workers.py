@@ -17,7 +17,7 @@ from pathlib import Path
 from apo_bench.records.row import Row
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import environment_lock, names_of
-from apo_bench.sweeps.grid import SweepSpec, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.worker import Timing
 
@@ -44,7 +44,7 @@ def main() -> None:
 
 def rows_per_second(workers: int, trials: int) -> float:
     """Of trials at fidelity contact, from the second seed on."""
-    grid = SweepSpec(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
+    grid = SweepSettings(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
     loaded, arm = load_all([grid]), find_arm(grid.arm).mjcf
     lock = environment_lock(names_of([grid]), loaded, arm)
     ended: list[tuple[float, int]] = []

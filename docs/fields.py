@@ -34,7 +34,7 @@ SETTINGS_HEAD = """# Settings of a trial
 
 With the same code and the same files these settings determine the row of a trial. In Python they are the fields of
 `TrialSettings`; `apo-bench replay` takes them as options. A sweep varies those that have an axis: a field of
-`SweepSpec`, a key of a sweep file and an option of `apo-bench sweep`. `--level L` stands for
+`SweepSettings`, a key of a sweep file and an option of `apo-bench sweep`. `--level L` stands for
 `--level-mm L --level-deg L`; its axis is `levels`.
 """
 ROW_HEAD = f"""# Columns of a row

@@ -18,7 +18,7 @@ from apo_bench.records.asked import in_python
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
 
 if TYPE_CHECKING:
-    from apo_bench.sweeps.grid import SweepSpec
+    from apo_bench.sweeps.grid import SweepSettings
 
 _KILLED = 128
 """Added to the number of a signal: the exit code of a process that it has ended."""
@@ -104,9 +104,9 @@ def sweep(
     )
 
 
-def _grids(scenarios: list[str], said: Mapping[str, Any]) -> tuple[SweepSpec, ...]:
+def _grids(scenarios: list[str], said: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
-    from apo_bench.sweeps.grid import AXES, SweepSpec
+    from apo_bench.sweeps.grid import AXES, SweepSettings
     from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
     axes = {axis_option(info): info for info in AXES}
@@ -115,7 +115,7 @@ def _grids(scenarios: list[str], said: Mapping[str, Any]) -> tuple[SweepSpec, ..
     files = [name for name in scenarios if is_sweep_file(name)]
     if not files:
         several: dict[str, Any] = {info.axis: read_axis(info, text) for info, text in given.items()}
-        return (SweepSpec(tuple(scenarios), **several, **in_python(others)),)
+        return (SweepSettings(tuple(scenarios), **several, **in_python(others)),)
     if len(scenarios) > 1:
         raise InputError(
             f"the sweep file {files[0]} was given together with {len(scenarios) - 1} more; name scenarios in the file, "

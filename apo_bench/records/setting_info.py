@@ -35,7 +35,7 @@ class SettingInfo:
     key: bool = False
     """Whether it tells the trials of one sweep apart."""
     axis: str = ""
-    """Field of `SweepSpec` and key of a sweep file, if a sweep has several of it."""
+    """Field of `SweepSettings` and key of a sweep file, if a sweep has several of it."""
     axis_option: str = ""
     """Of `apo-bench sweep`; that of one trial if empty."""
     swept: tuple[Any, ...] = ()

@@ -44,7 +44,7 @@ _Level = float | tuple[float, float]
 
 @final
 @dataclass(frozen=True)
-class SweepSpec:
+class SweepSettings:
     """What a sweep varies; it runs every combination, with the same seeds in every cell."""
 
     scenarios: tuple[str, ...]
@@ -108,7 +108,7 @@ class Unit:
     trials: tuple[TrialSettings, ...]
 
 
-def check_grids(grids: Sequence[SweepSpec]) -> None:
+def check_grids(grids: Sequence[SweepSettings]) -> None:
     """Raise an `InputError` unless there is a grid, all have the same arm, time step and fidelity, and they are not
     larger than can be held."""
     if not grids:
@@ -125,7 +125,7 @@ def check_grids(grids: Sequence[SweepSpec]) -> None:
         )
 
 
-def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
+def load_all(grids: Sequence[SweepSettings]) -> Mapping[str, Scenario]:
     """Every scenario of a sweep by what was given for it.
 
     Raises:
@@ -141,7 +141,7 @@ def load_all(grids: Sequence[SweepSpec]) -> Mapping[str, Scenario]:
     return loaded
 
 
-def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario], salt: Salt | None = None) -> Iterator[Unit]:
+def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: Salt | None = None) -> Iterator[Unit]:
     """All the work of a sweep, each trial once, seeds first, so that every cell of an interrupted sweep is about
     equally full.
 
@@ -155,12 +155,12 @@ def units(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario], salt: Salt
             yield from _units(those, given, scenario, seed, salt)
 
 
-def described(grids: Sequence[SweepSpec], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
+def described(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
     """The grids as they stand in `run.json`, with scenarios by name and clearances filled in."""
     return [_described(grid, loaded) for grid in grids]
 
 
-def _per_seed(grid: SweepSpec) -> int:
+def _per_seed(grid: SweepSettings) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
     ways = sum(len(_ways(eye, grid.noises)) for eye in grid.eyes)
     told = sum(
@@ -175,7 +175,9 @@ def _per_seed(grid: SweepSpec) -> int:
     )
 
 
-def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int, salt: Salt | None) -> Iterator[Unit]:
+def _units(
+    grids: Sequence[SweepSettings], given: str, scenario: Scenario, seed: int, salt: Salt | None
+) -> Iterator[Unit]:
     """The trials of a scenario and a seed, by what they share."""
     together: dict[tuple[float, float, str], dict[TrialSettings, None]] = {}
     for grid in grids:
@@ -185,7 +187,9 @@ def _units(grids: Sequence[SweepSpec], given: str, scenario: Scenario, seed: int
     return (Unit(tuple(trials)) for trials in together.values())
 
 
-def _trials(grid: SweepSpec, given: str, clearance_mm: float, seed: int, salt: Salt | None) -> Iterator[TrialSettings]:
+def _trials(
+    grid: SweepSettings, given: str, clearance_mm: float, seed: int, salt: Salt | None
+) -> Iterator[TrialSettings]:
     same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
     same |= {"scenario": given, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
 
@@ -213,7 +217,7 @@ def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:
     return [(eye, RANGE)] if eye == RANGE else [(eye, noise) for noise in noises]
 
 
-def _described(grid: SweepSpec, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
+def _described(grid: SweepSettings, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
     values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
     own = {loaded[given].name: loaded[given].clearance_mm for given in grid.scenarios}
     clearances = {name: list(grid.clearances_mm or (clearance,)) for name, clearance in own.items()}

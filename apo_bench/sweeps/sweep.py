@@ -21,7 +21,7 @@ from apo_bench.simulation.scene.arm import Arm, find_arm
 from apo_bench.simulation.scene.physics import physics
 from apo_bench.sweeps.dispatch import Executor, check_limit
 from apo_bench.sweeps.environment_lock import EnvironmentLock, Names, environment_lock, names_of
-from apo_bench.sweeps.grid import SweepSpec, Unit, check_grids, described, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, Unit, check_grids, described, load_all, units
 from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.stopping import Check, listening
@@ -34,7 +34,7 @@ _BACKENDS = ("local", "ray")
 
 
 def run_sweep(
-    grids: SweepSpec | Sequence[SweepSpec],
+    grids: SweepSettings | Sequence[SweepSettings],
     out: str | Path,
     *,
     workers: int | None = None,
@@ -71,7 +71,7 @@ def run_sweep(
         RuntimeError: A trial could not be run, or a row could not be written.
         KeyboardInterrupt: After Ctrl-C or a signal, when the rows of the trials that had ended were written.
     """
-    grids = (grids,) if isinstance(grids, SweepSpec) else tuple(grids)
+    grids = (grids,) if isinstance(grids, SweepSettings) else tuple(grids)
     _check_spread(workers, limit_s, backend, address)
     here = workers is None and backend == "local"
     check_grids(grids)
@@ -145,7 +145,9 @@ def _check_spread(workers: int | None, limit_s: float, backend: str, address: st
         check_ray(address)
 
 
-def _checked(names: Names, grids: Sequence[SweepSpec], corrector_limit_s: float) -> tuple[Mapping[str, Scenario], Arm]:
+def _checked(
+    names: Names, grids: Sequence[SweepSettings], corrector_limit_s: float
+) -> tuple[Mapping[str, Scenario], Arm]:
     """Everything that has a name, found before a folder is made or a process started."""
     loaded = load_all(grids)
     names.check(corrector_limit_s)

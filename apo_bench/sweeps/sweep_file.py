@@ -24,7 +24,7 @@ from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
 from apo_bench.records.asked import in_python
 from apo_bench.records.settings import LEVEL, SETTINGS
-from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSpec
+from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSettings
 
 _SEVERAL = {info.axis: info for info in AXES}
 """Keys whose values are lists."""
@@ -47,7 +47,7 @@ def is_sweep_file(given: str) -> bool:
     return "scenarios" in keys or not {"parts", "operations"} & set(keys)
 
 
-def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> tuple[SweepSpec, ...]:
+def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> tuple[SweepSettings, ...]:
     """The grids of a sweep file: the top one, and one for each `[[also]]`.
 
     Args:
@@ -72,9 +72,9 @@ def _tables(node: JsonNode) -> Sequence[JsonNode]:
     return _few(node.items("also"), node)
 
 
-def _grid(name: str, said: Mapping[str, Any]) -> SweepSpec:
+def _grid(name: str, said: Mapping[str, Any]) -> SweepSettings:
     try:
-        return SweepSpec(**in_python(said))
+        return SweepSettings(**in_python(said))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 

@@ -143,12 +143,12 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from apo_bench.correction.correctors import correct
     from apo_bench.envs.corrected import Corrected
     from apo_bench.records.settings import METHOD, TrialSettings
-    from apo_bench.sweeps.grid import SweepSpec
+    from apo_bench.sweeps.grid import SweepSettings
 
     commands = [signature(command).parameters["method"].default for command in (correct_command, show)]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
     assert {*commands, *doors, TrialSettings("").method} == {METHOD}
-    assert METHOD in SweepSpec(("stick_in_tower",)).methods
+    assert METHOD in SweepSettings(("stick_in_tower",)).methods
     assert f"default: {METHOD}." in trial_options("method")[0].annotation.__metadata__[0].help
 
 

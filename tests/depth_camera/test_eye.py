@@ -29,7 +29,7 @@ from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.tv import Change, TvCamera
-from apo_bench.sweeps.grid import SweepSpec
+from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.trial.stages import OBSERVATION, Recording, observe_recording, range_sensor, record_demonstration, stream
 from apo_bench.trial.trial import run_trial
 from tests import pages
@@ -293,16 +293,16 @@ def test_noise_models_are_refused_where_only_the_range_finder_looks(
     assert "was given together with the eye 'range', which draws no pose noise" in capsys.readouterr().err
     assert not out.exists()
     with pytest.raises(InputError, match="draws no pose noise"):
-        SweepSpec(("block_on_block",), eyes=("range",), noises=tuple(noise.split(",")))
+        SweepSettings(("block_on_block",), eyes=("range",), noises=tuple(noise.split(",")))
     with pytest.raises(InputError, match="draws no pose noise"):
         gymnasium.make("APOReplay-v0", eye="range", noise=noise.split(",")[0])
 
 
 def test_what_draws_noise_depends_on_the_eyes() -> None:
-    assert SweepSpec(("block_on_block",), eyes=("range",)).noises == ()
-    assert SweepSpec(("block_on_block",)).noises == ("isotropic",)
-    assert SweepSpec(("block_on_block",), eyes=("range", "noise")).noises == ("isotropic",)
-    assert SweepSpec(("block_on_block",), eyes=("range", "noise"), noises=("camera",)).noises == ("camera",)
+    assert SweepSettings(("block_on_block",), eyes=("range",)).noises == ()
+    assert SweepSettings(("block_on_block",)).noises == ("isotropic",)
+    assert SweepSettings(("block_on_block",), eyes=("range", "noise")).noises == ("isotropic",)
+    assert SweepSettings(("block_on_block",), eyes=("range", "noise"), noises=("camera",)).noises == ("camera",)
     with pytest.raises(InputError, match="draws no pose noise"):
         TrialSettings("block_on_block", eye="range", noise="camera")
 

@@ -7,7 +7,7 @@ from apo_bench.records.method import checked_method, knows_relations, knows_trut
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.statistics.rates import rank
-from apo_bench.sweeps.grid import SweepSpec, units
+from apo_bench.sweeps.grid import SweepSettings, units
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_a_wrong_name_is_refused(name, said):
 
 def test_one_method_has_one_name():
     assert TrialSettings("stick_in_tower", method="none+search").method == "search"
-    assert SweepSpec(("stick_in_tower",), methods=("search", "none+search", "none")).methods == ("search", "none")
+    assert SweepSettings(("stick_in_tower",), methods=("search", "none+search", "none")).methods == ("search", "none")
 
 
 def test_what_a_method_meets_is_that_of_its_plan():
@@ -58,7 +58,7 @@ def test_what_a_method_meets_is_that_of_its_plan():
 
 
 def test_an_oracle_that_searches_runs_once_per_seed():
-    grid = SweepSpec(
+    grid = SweepSettings(
         ("stick_in_tower",), (0.0, 1.0), methods=("oracle+search", "search"), trials=1, relations=("missed",)
     )
     trials = [t for unit in units([grid], {"stick_in_tower": load_scenario("stick_in_tower")}) for t in unit.trials]

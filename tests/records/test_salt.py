@@ -27,7 +27,7 @@ from apo_bench.report.report import report
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.statistics.rates import tally
-from apo_bench.sweeps.grid import SweepSpec, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.stages import ARM, OBSERVATION, observe_recording, record_demonstration, stream
@@ -39,7 +39,7 @@ HEX = "8d217488cd5974580ccd50092e6d071ae625d86a6e19b8fc95ab5f4914f76f02"
 """What a salt may look like; the same in every process, so that workers collect the same tests."""
 HOPELESS = 40.0
 """A level [mm, degrees] at which plans are refused before the arm moves, so that a trial costs little."""
-GRID = SweepSpec(("block_on_block",), (HOPELESS,), (0.0,), ("none", "paper"), trials=2, seed=3, grasps=("weld",))
+GRID = SweepSettings(("block_on_block",), (HOPELESS,), (0.0,), ("none", "paper"), trials=2, seed=3, grasps=("weld",))
 
 
 def state(seed: int, which: int, salt: Salt | None = None) -> Any:

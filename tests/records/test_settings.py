@@ -22,7 +22,7 @@ from apo_bench.records.row import REQUIRED, ROW_FIELDS, look_up
 from apo_bench.records.run_folder import read_rows
 from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
 from apo_bench.report.compare import compare
-from apo_bench.sweeps.grid import SweepSpec
+from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep_file import KEYS
 from apo_bench.trial.trial import run_trial
 
@@ -42,7 +42,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
-    here = {field.name for field in fields(SweepSpec)}
+    here = {field.name for field in fields(SweepSettings)}
     for name, info in SETTINGS.items():
         level, alone = name.startswith("level_"), name in ("seed", "salt")
         assert bool(info.axis) + info.shared + level + alone == 1

@@ -28,7 +28,7 @@ from apo_bench.report.run_facts import limits_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
 from apo_bench.sweeps.local import pool
 from apo_bench.sweeps.local.pool import FALSE_STARTS, spread
 from apo_bench.sweeps.stopping import Stopped, listening
@@ -94,9 +94,9 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     sys.modules.pop("unruly", None)
 
 
-def grid(*methods: str, scenarios: tuple[str, ...] = ("block_on_block",), **more: Any) -> SweepSpec:
+def grid(*methods: str, scenarios: tuple[str, ...] = ("block_on_block",), **more: Any) -> SweepSettings:
     """Trials that end before the arm moves, but for its own."""
-    return SweepSpec(scenarios, (1.0,), (0.0,), tuple(f"unruly:{m}" for m in methods), **{"trials": 1} | more)
+    return SweepSettings(scenarios, (1.0,), (0.0,), tuple(f"unruly:{m}" for m in methods), **{"trials": 1} | more)
 
 
 def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]]:

@@ -30,13 +30,13 @@ from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps import dispatch
 from apo_bench.sweeps.dispatch import Dispatch
 from apo_bench.sweeps.environment_lock import EnvironmentLock, environment_lock, names_of
-from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
 from apo_bench.sweeps.ray import backend as on_ray
 from apo_bench.sweeps.ray import pool, task
 from apo_bench.sweeps.ray.runtime_files import runtime_files
 from apo_bench.sweeps.sweep import run_sweep
 
-SPEC = SweepSpec(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
+SPEC = SweepSettings(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
 CODE = """
 import os, time
@@ -107,7 +107,7 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
         time.sleep(0.1)
 
 
-def lock_of(spec: SweepSpec) -> tuple[tuple[Unit, ...], EnvironmentLock]:
+def lock_of(spec: SweepSettings) -> tuple[tuple[Unit, ...], EnvironmentLock]:
     loaded = load_all([spec])
     return tuple(units([spec], loaded)), environment_lock(names_of([spec]), loaded, find_arm(spec.arm).mjcf)
 
@@ -310,7 +310,7 @@ class Messages:
 class Nodes:
     """Stands for Ray: `tasks` says what each next task answers."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, tasks: list[list[Any]], spec: SweepSpec = SPEC) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, tasks: list[list[Any]], spec: SweepSettings = SPEC) -> None:
         self.tasks, self.taken, self.cancelled, self.rows = list(tasks), list[int](), 0, list[Any]()
         names = {"NodeDiedError": NodeGone, "ObjectLostError": NodeGone, "RayError": Gone, "RayTaskError": KeyError}
         monkeypatch.setitem(sys.modules, "ray", self)

@@ -30,12 +30,12 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps import worker
-from apo_bench.sweeps.grid import SweepSpec, Unit, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.row import result
 
 METHODS = ("oracle", "none", "paper")
-SPEC = SweepSpec(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)
+SPEC = SweepSettings(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)
 ROWS = 3 * (1 + 2 * 2)
 LOAD = functools.cache(load_scenario)
 
@@ -75,7 +75,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
 def test_the_grid_is_every_combination_once() -> None:
     two = ("stick_in_tower", "stick_on_castles")
-    spec = SweepSpec(two, (0, 1, 1), (0, 1), METHODS, clearances_mm=(0.25, 0.5), trials=2)
+    spec = SweepSettings(two, (0, 1, 1), (0, 1), METHODS, clearances_mm=(0.25, 0.5), trials=2)
     loaded = load_all([spec])
     keys = [trial_key(t, loaded[t.scenario].name) for unit in units([spec], loaded) for t in unit.trials]
     assert len(set(keys)) == len(keys) == 2 * 2 * 2 * (1 + 2 * 2 * 2)
@@ -128,7 +128,7 @@ def test_a_stop_is_heard_while_the_work_is_laid_out(
 
 
 def test_by_default_the_ceiling_the_raw_the_papers_way_and_contact_are_compared() -> None:
-    assert SweepSpec(("stick_in_tower",)).methods == ("oracle", "none", "paper", "contact")
+    assert SweepSettings(("stick_in_tower",)).methods == ("oracle", "none", "paper", "contact")
     for method in CORRECTORS:
         assert replace(SPEC, methods=(method,)).methods == (method,)
 

@@ -10,7 +10,7 @@ from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from apo_bench.records.key import trial_key
 from apo_bench.resources import folder
-from apo_bench.sweeps.grid import SweepSpec, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
@@ -48,7 +48,7 @@ def written(folder: Path, text: str | bytes) -> Path:
 
 def test_every_key_is_read_and_further_grids_replace_what_they_name(tmp_path: Path) -> None:
     top, oracle, far = read_sweep(written(tmp_path, WHOLE))
-    assert top == SweepSpec(
+    assert top == SweepSettings(
         scenarios=("stick_in_tower", "stick_on_castles"),
         levels=(0.0, 1.0, (2.0, 0.5)),
         careless=(1.0,),
@@ -66,7 +66,7 @@ def test_every_key_is_read_and_further_grids_replace_what_they_name(tmp_path: Pa
 
 
 def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
-    assert read_sweep(written(tmp_path, 'scenarios = ["pocket_table"]')) == (SweepSpec(("pocket_table",)),)
+    assert read_sweep(written(tmp_path, 'scenarios = ["pocket_table"]')) == (SweepSettings(("pocket_table",)),)
 
 
 def test_settings_of_the_command_line_replace_those_of_every_grid(tmp_path: Path) -> None:
@@ -75,9 +75,9 @@ def test_settings_of_the_command_line_replace_those_of_every_grid(tmp_path: Path
 
 
 def test_trials_of_all_grids_are_united_each_once() -> None:
-    first = SweepSpec(("stick_in_tower",), (0, 1), (0, 1), ("oracle", "none", "paper"), trials=2, seed=5)
-    again = SweepSpec(("stick_in_tower",), (1, (1, 1), -0.0), (1,), ("oracle", "paper"), trials=3, seed=5)
-    other = SweepSpec(("block_on_block",), ((2, 1),), (1,), ("none",), trials=1, seed=6)
+    first = SweepSettings(("stick_in_tower",), (0, 1), (0, 1), ("oracle", "none", "paper"), trials=2, seed=5)
+    again = SweepSettings(("stick_in_tower",), (1, (1, 1), -0.0), (1,), ("oracle", "paper"), trials=3, seed=5)
+    other = SweepSettings(("block_on_block",), ((2, 1),), (1,), ("none",), trials=1, seed=6)
     loaded = load_all([first, again, other])
     trials = [t for unit in units([first, again, other], loaded) for t in unit.trials]
     keys = [trial_key(t, loaded[t.scenario].name) for t in trials]
@@ -89,7 +89,7 @@ def test_trials_of_all_grids_are_united_each_once() -> None:
 
 def test_numbers_are_spelled_as_flags_spell_them() -> None:
     """Rows are compared byte by byte: 2 and 2.0, 0.0 and -0.0 are the same number."""
-    spec = SweepSpec(("block_on_block",), (2, -0.0), (0,), ("none",), clearances_mm=(1,), trials=1)
+    spec = SweepSettings(("block_on_block",), (2, -0.0), (0,), ("none",), clearances_mm=(1,), trials=1)
     said = [
         (t.level_mm, t.level_deg, t.careless, t.clearance_mm) for u in units([spec], load_all([spec])) for t in u.trials
     ]
@@ -214,8 +214,8 @@ def test_files_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_grids_of_one_sweep_have_one_arm_and_fidelity() -> None:
-    first = SweepSpec(("block_on_block",))
+    first = SweepSettings(("block_on_block",))
     with pytest.raises(InputError, match="fidelity of a sweep is full and contact; run a sweep for each"):
-        run_sweep([first, SweepSpec(("block_on_block",), fidelity="contact")], "/no/such/folder")
+        run_sweep([first, SweepSettings(("block_on_block",), fidelity="contact")], "/no/such/folder")
     with pytest.raises(InputError, match="no grid was given"):
         run_sweep([], "/no/such/folder")

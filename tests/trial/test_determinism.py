@@ -17,7 +17,7 @@ from apo_bench.records.run_folder import read_rows
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.sweeps.grid import SweepSpec
+from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import record_demonstration
 from apo_bench.trial.trial import run_trial
@@ -63,7 +63,7 @@ def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> 
 
 def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
     """Here, and in 1, 2 and 4 processes: the same lines, byte for byte."""
-    spec = SweepSpec(("stick_on_castles",), (HOPELESS,), (1.0,), ("none", "paper"), trials=4, grasps=("weld",))
+    spec = SweepSettings(("stick_on_castles",), (HOPELESS,), (1.0,), ("none", "paper"), trials=4, grasps=("weld",))
     written = {}
     for workers in (None, 1, 2, 4):
         folder = tmp_path / str(workers)
@@ -76,7 +76,7 @@ def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
-    spec = SweepSpec(("stick_in_tower", "stick_on_castles"), levels=(0.5,), careless=(1.0,), trials=1, seed=21)
+    spec = SweepSettings(("stick_in_tower", "stick_on_castles"), levels=(0.5,), careless=(1.0,), trials=1, seed=21)
     one = run_sweep(spec, tmp_path / "one", workers=1)
     two = run_sweep(spec, tmp_path / "two", workers=2)
     assert by_seed_and_method(one) == by_seed_and_method(two)
