@@ -100,10 +100,10 @@ def test_a_correction_can_be_pickled() -> None:
 
 @pytest.mark.parametrize("name", [*NOISES, "megapose-lmo"])
 def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
-    assert env._shown is not None
+    assert env._recording is not None
     noise = make_noise(name, Level(1.0, 1.0))
     here, there = (
-        model(env.assembly, env._shown.demonstration, np.random.default_rng(1))
+        model(env.assembly, env._recording.demonstration, np.random.default_rng(1))
         for model in (noise, pickle.loads(pickle.dumps(noise)))
     )
     np.testing.assert_array_equal(here.goals, there.goals)
