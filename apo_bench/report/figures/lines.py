@@ -96,16 +96,19 @@ def _sample(style: Style) -> Callable[[Any], None]:
 
 
 def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
-    for name, one in (("x", x), ("y", y)):
-        if one.logarithmic:
-            axis.set(**{f"{name}scale": "log"})
-            getattr(axis, f"{name}axis").set_ticks([], minor=True)
-    axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
-    crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
-    for side, ticks, size in ((axis.xaxis, x.ticks, 8 if crowded else 10), (axis.yaxis, y.ticks, 10)):
-        side.set_ticks([at for at, _ in ticks], [label for _, label in ticks], fontsize=size)
+    """Grid, labels and names; ticks of matplotlib would take half of the time."""
+    axis.set_axis_off()
+    scales = {f"{name}scale": "log" for name, one in (("x", x), ("y", y)) if one.logarithmic}
+    axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high), **scales)
     axis.hlines([at for at, _ in y.ticks], x.low, x.high, color=RULE, linewidth=1, zorder=0)
-    axis.set(xlabel=x.label, ylabel=y.label)
+    crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
+    below, beside = axis.get_xaxis_transform(), axis.get_yaxis_transform()
+    for at, label in x.ticks:
+        axis.text(at, -0.03, label, ha="center", va="top", fontsize=8 if crowded else 10, transform=below)
+    for at, label in y.ticks:
+        axis.text(-0.015, at, label, ha="right", va="center", transform=beside)
+    axis.text(0.5, -0.2, x.label, ha="center", va="bottom", transform=axis.transAxes)
+    axis.text(-0.15, 0.5, y.label, ha="center", va="center", rotation=90, transform=axis.transAxes)
 
 
 def _band(axis: Any, line: MethodLine) -> None:
@@ -114,7 +117,7 @@ def _band(axis: Any, line: MethodLine) -> None:
         axis.vlines(p.x, p.low, p.high, color=line.style.color, linewidth=1.4, alpha=0.6)
     elif line.points:
         at, low, high = ([getattr(p, name) for p in line.points] for name in ("x", "low", "high"))
-        axis.fill_between(at, low, high, color=line.style.color, alpha=0.13, linewidth=0)
+        axis.fill([*at, *at[::-1]], [*low, *high[::-1]], color=line.style.color, alpha=0.13, linewidth=0)
 
 
 def _marks(axis: Any, line: MethodLine) -> Any:
