@@ -12,11 +12,11 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.assembly.touching import TouchedContact, corners, touched_contacts
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
 from apo_bench.insertion.line import Attach, Preference
 from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
 from apo_bench.insertion.screw import Screw, screw_state
 from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space, snap_normals
-from apo_bench.insertion.swept import Posed, exit_distance, is_way_free
 
 _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""

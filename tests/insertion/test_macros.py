@@ -14,12 +14,12 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.swept import Posed, exit_distance, is_way_free, overlap_intervals
 from apo_bench.insertion.arrival import Arrival, arrive
 from apo_bench.insertion.line import Preference
 from apo_bench.insertion.macros import Chain, Way, chain, departure
 from apo_bench.insertion.peeling import peel
 from apo_bench.insertion.states import State
-from apo_bench.insertion.swept import Posed, exit_distance, is_way_free, overlap_intervals
 from tests import scenes
 
 X, Y, Z = np.eye(3)
