@@ -26,10 +26,10 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr, ndtri
 
-from apo_bench.statistics.area import reach, weights
-from apo_bench.statistics.bounded import surprise, threshold
-from apo_bench.statistics.falling import profile
-from apo_bench.statistics.half_level import sure
+from apo_bench.statistics.levels.area import reach, weights
+from apo_bench.statistics.levels.bounded import surprise, threshold
+from apo_bench.statistics.levels.falling import profile
+from apo_bench.statistics.levels.half_level import sure
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import wilson
 

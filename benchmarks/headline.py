@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.records.method import as_seen
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.compare import compare
 from apo_bench.report.figures.levels import success_figure
 from apo_bench.report.figures.sheet import draw

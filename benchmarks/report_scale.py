@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.records.report_rows import NUMBERS
+from apo_bench.records.run.report_rows import NUMBERS
 from apo_bench.records.settings import ROW
 from apo_bench.report.report import report
 

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records.run_folder import read_rows
-from apo_bench.records.verdicts import by_verdict, verdict_of
+from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.verdicts import by_verdict, verdict_of
 from apo_bench.report.tables.calibration import CALIBRATION_NOTE, calibration_table
 from apo_bench.report.tables.confusion import CONFUSION_NOTE, confusion_table
 from apo_bench.statistics.calibration import calibrations

@@ -18,8 +18,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.records.replay_command import replay_command
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.statistics.rates import rank
 

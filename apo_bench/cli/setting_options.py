@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from apo_bench.cli.arguments import numbers, path_given, words
-from apo_bench.records.replay_command import milli, number
+from apo_bench.records.run.replay_command import milli, number
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import LEVEL, SETTINGS
 

@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from apo_bench.io.plain_text import clean
-from apo_bench.records import verdicts
 from apo_bench.records.row import FreedSet, Predicted, Row
+from apo_bench.records.run import verdicts
 from apo_bench.records.settings import RANGE
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.confusion import prediction_summary

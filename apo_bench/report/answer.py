@@ -9,8 +9,8 @@ import numpy as np
 
 from apo_bench.records.method import knows_relations, knows_truth
 from apo_bench.records.row import Row, look_up
-from apo_bench.statistics.bounded import mean_interval
-from apo_bench.statistics.half_level import HalfLevel
+from apo_bench.statistics.levels.bounded import mean_interval
+from apo_bench.statistics.levels.half_level import HalfLevel
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Interval, Place, rank, wilson

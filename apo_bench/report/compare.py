@@ -10,12 +10,12 @@ from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError
 from apo_bench.records.key import Key, row_key
-from apo_bench.records.report_rows import NUMBERS, report_rows
 from apo_bench.records.row import Row
-from apo_bench.records.run_file import read_run
+from apo_bench.records.run.report_rows import NUMBERS, report_rows
+from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.records.salt import one_salt, with_salt
 from apo_bench.records.settings import ROW, SETTINGS
-from apo_bench.records.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally

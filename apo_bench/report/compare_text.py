@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from apo_bench.records import verdicts
 from apo_bench.records.key import KEY, row_key
-from apo_bench.records.replay_command import replay_command
-from apo_bench.records.report_rows import NUMBERS
 from apo_bench.records.row import Row
+from apo_bench.records.run import verdicts
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.report_rows import NUMBERS
 from apo_bench.report.compare import Agreement, Comparison, Pair, Side
 from apo_bench.report.page.trials import verdict, why
 from apo_bench.report.run_facts import limits_of, scenario_files, value_words

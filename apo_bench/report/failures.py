@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from apo_bench.records.own_code import left_out, own_code
-from apo_bench.records.replay_command import Files
 from apo_bench.records.row import Row
+from apo_bench.records.run.own_code import left_out, own_code
+from apo_bench.records.run.replay_command import Files
 from apo_bench.records.salt import Salt
 from apo_bench.statistics.rates import NOT_EXECUTED, rank
 

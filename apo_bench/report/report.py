@@ -10,12 +10,12 @@ from typing import NamedTuple
 from apo_bench.errors import InputError
 from apo_bench.io.parquet import write_columns
 from apo_bench.io.writing import check_folders, check_target, to_write
-from apo_bench.records.report_rows import COLUMNS as KEPT
-from apo_bench.records.report_rows import report_rows
 from apo_bench.records.row import Row
-from apo_bench.records.run_file import read_run
+from apo_bench.records.run.report_rows import COLUMNS as KEPT
+from apo_bench.records.run.report_rows import report_rows
+from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.verdicts import by_verdict, verdict_of
 from apo_bench.records.salt import check_one, one_salt, read_salt
-from apo_bench.records.verdicts import by_verdict, verdict_of
 from apo_bench.report.answer import answer
 from apo_bench.report.failures import Draw, Failures
 from apo_bench.report.figures.every import figures

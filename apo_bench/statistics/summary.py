@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import final
 
 from apo_bench.records.row import Row
-from apo_bench.statistics.area import Area, AreaDifference, area_differences, areas
-from apo_bench.statistics.curve import curves
-from apo_bench.statistics.half_level import HalfLevel, half_levels
+from apo_bench.statistics.levels.area import Area, AreaDifference, area_differences, areas
+from apo_bench.statistics.levels.curve import curves
+from apo_bench.statistics.levels.half_level import HalfLevel, half_levels
 from apo_bench.statistics.paired import REFERENCES, Paired, paired
 from apo_bench.statistics.rates import Cell, tally
 

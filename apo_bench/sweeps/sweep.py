@@ -11,8 +11,8 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.records.key import trial_key
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, Limits
 from apo_bench.records.row import Row
-from apo_bench.records.run_file import run_record
-from apo_bench.records.run_folder import RunFolder
+from apo_bench.records.run.run_file import run_record
+from apo_bench.records.run.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
 from apo_bench.records.settings import METHOD
 from apo_bench.scenario.file import scenario_names

@@ -14,11 +14,11 @@ from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
-from apo_bench.records.checked import unwritable
 from apo_bench.records.key import KEY, row_key
 from apo_bench.records.method import parsed
 from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import Row
+from apo_bench.records.run.checked import unwritable
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache

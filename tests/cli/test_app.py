@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from apo_bench.cli import app as cli
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.settings import ROW
 from apo_bench.scenario.file import load_scenario, scenario_names
 

@@ -11,9 +11,9 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import clean
-from apo_bench.records.report_rows import report_rows
-from apo_bench.records.run_file import read_run
-from apo_bench.records.verdicts import AS_DEMONSTRATED, verdict_of
+from apo_bench.records.run.report_rows import report_rows
+from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.verdicts import AS_DEMONSTRATED, verdict_of
 from apo_bench.report import report as reports
 from apo_bench.report.compare import compare
 from apo_bench.report.compare_text import comparison_form

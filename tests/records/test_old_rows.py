@@ -13,9 +13,9 @@ import pytest
 from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.run.verdicts import AS_DEMONSTRATED, MEANING, SUCCESS, by_verdict, verdict_of
 from apo_bench.records.settings import ROW, SETTINGS
-from apo_bench.records.verdicts import AS_DEMONSTRATED, MEANING, SUCCESS, by_verdict, verdict_of
 from apo_bench.report.compare import compare
 from apo_bench.report.report import report
 from tests import pages

@@ -21,10 +21,10 @@ import pytest
 
 from apo_bench.assembly.reached import Outcome
 from apo_bench.errors import InputError
-from apo_bench.records import run_folder
 from apo_bench.records.key import KEY
-from apo_bench.records.run_file import run_record
-from apo_bench.records.run_folder import RunFolder, read_rows
+from apo_bench.records.run import run_folder
+from apo_bench.records.run.run_file import run_record
+from apo_bench.records.run.run_folder import RunFolder, read_rows
 from apo_bench.records.settings import ROW
 from apo_bench.sweeps.environment_lock import versions
 from apo_bench.trial.code_version import code_files

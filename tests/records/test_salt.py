@@ -19,7 +19,7 @@ from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import salt as module
-from apo_bench.records.replay_command import replay_command
+from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.salt import Salt, make_salt, read_salt, salt_of_sweep
 from apo_bench.records.settings import TrialSettings
 from apo_bench.report.compare import compare

@@ -19,7 +19,7 @@ from apo_bench.errors import InputError
 from apo_bench.records.asked import asked, settings_of
 from apo_bench.records.key import KEY
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, look_up
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
 from apo_bench.report.compare import compare
 from apo_bench.sweeps.grid import SweepSettings

@@ -18,9 +18,9 @@ from apo_bench.cli import app as cli
 from apo_bench.cli.terminal import print_cells, print_report
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import clean
-from apo_bench.records.own_code import own_code
-from apo_bench.records.replay_command import replay_command
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.own_code import own_code
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report import report as reports
 from apo_bench.report.failures import sample
 from apo_bench.report.report import report
@@ -206,7 +206,7 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json.new", "torn.txt"])
 def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
-    from apo_bench.records.run_folder import RunFolder
+    from apo_bench.records.run.run_folder import RunFolder
 
     folder, target = tmp_path / "run", tmp_path / "target"
     folder.mkdir()

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.statistics.area import area, area_differences, areas, reach, weights
-from apo_bench.statistics.bounded import mean_interval
-from apo_bench.statistics.curve import Curve, CurveSetting
+from apo_bench.statistics.levels.area import area, area_differences, areas, reach, weights
+from apo_bench.statistics.levels.bounded import mean_interval
+from apo_bench.statistics.levels.curve import Curve, CurveSetting
 from tests.statistics.test_half_level import HERE
 
 LEVELS = np.array([0.0, 0.1, 0.4, 1.0, 4.0])

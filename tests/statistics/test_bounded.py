@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.emplike.descriptive import DescStat
 
-from apo_bench.statistics.bounded import mean_interval, surprise, threshold
+from apo_bench.statistics.levels.bounded import mean_interval, surprise, threshold
 
 STEPS = st.lists(st.integers(0, 20), min_size=2, max_size=40)
 """Numbers from 0 to 1 in twentieths: such that ties and bounds happen."""

@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.settings import SETTINGS
 from apo_bench.report.report import report
 from apo_bench.report.tables.calibration import calibration_table

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.special import expit, ndtri, xlogy
 from scipy.stats import binomtest
 
-from apo_bench.statistics.bounded import threshold
-from apo_bench.statistics.curve import Curve, CurveSetting, curves
-from apo_bench.statistics.falling import OTHERS, curve, misfit, profile, variation
-from apo_bench.statistics.half_level import HalfLevel, half_level, half_levels, sure
+from apo_bench.statistics.levels.bounded import threshold
+from apo_bench.statistics.levels.curve import Curve, CurveSetting, curves
+from apo_bench.statistics.levels.falling import OTHERS, curve, misfit, profile, variation
+from apo_bench.statistics.levels.half_level import HalfLevel, half_level, half_levels, sure
 from tests.statistics.test_rates import row
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.records.run_folder import read_rows
+from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.records import verdicts
 from apo_bench.records.method import knows_truth
-from apo_bench.records.replay_command import Files, replay_command
 from apo_bench.records.row import Row, look_up
+from apo_bench.records.run import verdicts
+from apo_bench.records.run.replay_command import Files, replay_command
 from apo_bench.records.salt import one_salt
 from apo_bench.records.settings import RANGE
 from apo_bench.report.failures import FailurePicture

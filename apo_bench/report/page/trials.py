@@ -11,9 +11,9 @@ from typing import Any
 from markupsafe import Markup
 
 from apo_bench.records.limits import USUAL_LIMITS, Limits
-from apo_bench.records.replay_command import Files, without_seed
-from apo_bench.records.report_rows import NUMBERS
 from apo_bench.records.row import Row, look_up
+from apo_bench.records.run.replay_command import Files, without_seed
+from apo_bench.records.run.report_rows import NUMBERS
 from apo_bench.records.settings import SETTINGS
 from apo_bench.statistics.rates import Cell, by_place
 from apo_bench.statistics.settings import cell_place

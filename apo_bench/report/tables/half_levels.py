@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from apo_bench.report.tables.saying import interval_columns, place_columns, points, span
 from apo_bench.report.tables.table import Column, Table
-from apo_bench.statistics.area import Area, AreaDifference
-from apo_bench.statistics.half_level import HalfLevel
+from apo_bench.statistics.levels.area import Area, AreaDifference
+from apo_bench.statistics.levels.half_level import HalfLevel
 
 HALF_LEVEL_NOTE = (
     "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* is from "

@@ -19,10 +19,10 @@ from apo_bench.errors import InputError
 from apo_bench.io.kept_file import is_there, put_back
 from apo_bench.io.reading import each_line
 from apo_bench.io.writing import check_target, to_write
-from apo_bench.records.checked import row_of, unwritable
 from apo_bench.records.key import Key, row_key
 from apo_bench.records.row import Row
-from apo_bench.records.run_file import check_same, write_run
+from apo_bench.records.run.checked import row_of, unwritable
+from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.salt import check_one
 from apo_bench.records.settings import ROW
 

@@ -15,8 +15,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.statistics.bounded import mean_interval
-from apo_bench.statistics.curve import Curve, CurveSetting
+from apo_bench.statistics.levels.bounded import mean_interval
+from apo_bench.statistics.levels.curve import Curve, CurveSetting
 from apo_bench.statistics.paired import REFERENCES
 from apo_bench.statistics.rates import Interval
 

@@ -18,9 +18,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.statistics.bounded import threshold
-from apo_bench.statistics.curve import Curve, CurveSetting
-from apo_bench.statistics.falling import profile
+from apo_bench.statistics.levels.bounded import threshold
+from apo_bench.statistics.levels.curve import Curve, CurveSetting
+from apo_bench.statistics.levels.falling import profile
 from apo_bench.statistics.rates import CONFIDENCE
 
 _LIKELIEST = 0.05

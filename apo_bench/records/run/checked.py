@@ -15,10 +15,10 @@ import msgspec
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import CONTROL, clean
 from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
-from apo_bench.records.fields import RUN_FIELDS, TIMING_FIELDS, Said
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
+from apo_bench.records.run.fields import RUN_FIELDS, TIMING_FIELDS, Said
+from apo_bench.records.run.verdicts import MEANING
 from apo_bench.records.settings import RANGE, ROW, SETTINGS, TrialSettings
-from apo_bench.records.verdicts import MEANING
 
 _USUAL: Mapping[str, Any] = MappingProxyType(
     {info.column: info.default for name, info in SETTINGS.items() if not info.key and name not in ("eye", "salt")}

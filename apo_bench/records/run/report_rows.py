@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from apo_bench.records.row import ROW_FIELDS, Predicted, Row
-from apo_bench.records.run_folder import each_row
+from apo_bench.records.run.run_folder import each_row
 
 NUMBERS: Mapping[str, str] = {
     "gap_before_mm": "gap as seen [mm]",

@@ -6,9 +6,9 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-from apo_bench.records.checked import as_usual
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
 from apo_bench.records.method import is_own
+from apo_bench.records.run.checked import as_usual
 from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
 
 _SALT_FILE = "FILE"

@@ -1,0 +1,1 @@
+"""Success over level: curves, the level of half success, the area below."""
