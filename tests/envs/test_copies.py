@@ -111,12 +111,12 @@ def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
 
 def test_a_copy_of_what_a_range_finder_sees_is_small_and_rays_have_a_level() -> None:
     """The depth images of the demonstration, tens of megabytes, are gone when the poses are measured."""
-    env = APOReplay(eye="range", level=1.0)
+    env = APOReplay("block_on_block", eye="range", level=1.0)
     usual = env.reset(seed=SEED)
     pickled = pickle.dumps(env)
     assert len(pickled) < 2e6
     worse = pickle.loads(pickled).reset(seed=SEED, options={"level": 3})
-    assert same(worse, APOReplay(eye="range", level=3).reset(seed=SEED))
+    assert same(worse, APOReplay("block_on_block", eye="range", level=3).reset(seed=SEED))
     assert not same(worse, usual)
     with pytest.raises(InputError, match="one number is allowed, mm per ray"):
         env.reset(options={"level": (1, 1)})
