@@ -153,6 +153,7 @@ def test_the_yardstick_closes_the_contacts() -> None:
     assert np.abs(system.residual(goals)).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_a_peer_runs_in_a_process_of_its_own() -> None:
     ran = run("newton", "fig2", "2/1", 2, beside=("contact",))
     assert ran.ended == "ok"
@@ -162,12 +163,14 @@ def test_a_peer_runs_in_a_process_of_its_own() -> None:
     assert {"contact", "newton", "scipy trf", "gtsam qr"} <= set(peers())
 
 
+@pytest.mark.slow
 def test_a_process_that_hangs_is_killed_and_one_that_crashes_says_why() -> None:
     deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); time.sleep(600)"
     assert process(["-c", deaf], 1.0)[0] == "killed"
     assert process(["-c", "raise ValueError('three')"], 60.0)[0] == "ValueError: three"
 
 
+@pytest.mark.slow
 def test_a_suite_that_cannot_run_is_a_missed_target() -> None:
     (row,) = part("of_nothing", 1, 60.0)
     assert row.met is False

@@ -157,6 +157,7 @@ def test_any_root_of_the_covariance_will_do(seed: int) -> None:
     assert_allclose((Q @ b.z.reshape(3, 6, 1)).ravel(), a.z, rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_slsqp_finds_the_same_where_nothing_is_redundant() -> None:
     """A block on a block on the table, 6 equations of 12 unknowns: three vertices per contact, of the plain ones."""
     operations = [

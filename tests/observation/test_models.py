@@ -18,8 +18,6 @@ from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.observing import observe
 from tests import scenes
 
-pytestmark = pytest.mark.numeric
-
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
 MODELS = [Anisotropic, PerPart]
 LEVEL = Level(3.0, 6.0)

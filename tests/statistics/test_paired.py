@@ -127,7 +127,7 @@ def test_holm_published_example() -> None:
     assert holm({}) == {}
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
 def test_adjustment_only_raises_and_keeps_the_order(p: list[float]) -> None:
     found = list(holm(dict(enumerate(p))).values())
