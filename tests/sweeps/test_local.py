@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import imageio.v3 as imageio
 import pytest
 
 from apo_bench.cli.app import main
@@ -85,13 +86,19 @@ def slow(seen):
 FOLDERS = pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def module(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    folder = tmp_path_factory.mktemp("module")
+    (folder / "unruly.py").write_text(CODE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        yield
+
+
 @pytest.fixture(autouse=True)
-def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "unruly.py").write_text(CODE)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield
-    sys.modules.pop("unruly", None)
 
 
 def grid(*methods: str, scenarios: tuple[str, ...] = ("block_on_block",), **more: Any) -> SweepSettings:
@@ -106,34 +113,50 @@ def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]
     }
 
 
-def test_what_a_corrector_says_can_be_written_as_text(tmp_path: Path) -> None:
-    (said,) = run_sweep(grid("halves"), tmp_path / "rows")
-    assert "half a letter" in said["sentence"]
-    said["sentence"].encode()
+MANY = grid(
+    *("raises", "dies_of_b", "nonsense", "halves", "forks"), scenarios=("block_on_block", "stick_in_tower"), trials=2
+)
 
 
-def test_a_corrector_that_forks_has_one_row(tmp_path: Path) -> None:
-    rows = run_sweep(grid("forks", "raises", trials=2), tmp_path / "rows", workers=1)
-    assert sorted((row["seed"], row["method"]) for row in rows) == [
-        (seed, f"unruly:{method}") for seed in (0, 1) for method in ("forks", "raises")
+@pytest.fixture(scope="module")
+def one(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """The rows of `MANY` out of one process."""
+    return run_sweep(MANY, tmp_path_factory.mktemp("one"), workers=1)
+
+
+def test_what_a_corrector_says_can_be_written_as_text(one: list[dict[str, Any]]) -> None:
+    said = [row["sentence"] for row in one if row["method"] == "unruly:halves"]
+    assert len(said) == 4
+    for sentence in said:
+        assert "half a letter" in sentence
+        sentence.encode()
+
+
+def test_a_corrector_that_forks_has_one_row(one: list[dict[str, Any]]) -> None:
+    rows = [row for row in one if row["method"] in ("unruly:forks", "unruly:raises")]
+    assert sorted((row["scenario"], row["seed"], row["method"]) for row in rows) == [
+        (scenario, seed, f"unruly:{method}")
+        for scenario in MANY.scenarios
+        for seed in (0, 1)
+        for method in ("forks", "raises")
     ]
     assert {row["failure_code"] for row in rows} == {"raised"}
 
 
-def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(tmp_path: Path) -> None:
-    asked = grid("raises", "dies_of_b", "nonsense", scenarios=("block_on_block", "stick_in_tower"), trials=2)
-    one = run_sweep(asked, tmp_path / "one", workers=1)
-    four = run_sweep(asked, tmp_path / "four", workers=4)
+def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(
+    one: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    four = run_sweep(MANY, tmp_path / "four", workers=4)
     assert endings(one) == {
         **{
             (scenario, method): ("correct", "raised")
-            for scenario in asked.scenarios
-            for method in ("raises", "nonsense")
+            for scenario in MANY.scenarios
+            for method in ("raises", "nonsense", "halves", "forks")
         },
         ("stick_in_tower", "dies_of_b"): ("correct", "raised"),
         ("block_on_block", "dies_of_b"): ("worker", "worker_died"),
     }
-    assert len(one) == 2 * 2 * 3
+    assert len(one) == 2 * 2 * 5
     assert all(row["success"] is False for row in one)
     assert sorted(map(json.dumps, one)) == sorted(map(json.dumps, four))
     timing = [json.loads(text) for text in (tmp_path / "four" / "timing.jsonl").read_text().splitlines()]
@@ -162,6 +185,9 @@ def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> N
         assert row == {**lost(spec, "", "time_limit"), **same}
 
 
+TALKS = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:talks", "--json"]
+
+
 def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Limits = USUAL_LIMITS) -> dict[str, Any]:
     """The row that the command of a row prints."""
     assert main([*shlex.split(replay_command(row, None, limits))[1:], "--json"]) == 0
@@ -169,31 +195,33 @@ def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Li
 
 
 def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    one: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = run_sweep(grid("raises", "nonsense", "dies_of_b"), tmp_path / "run", workers=1)
+    methods = [f"unruly:{method}" for method in ("raises", "nonsense", "dies_of_b")]
+    rows = [row for row in one if row["method"] in methods and (row["scenario"], row["seed"]) == ("block_on_block", 0)]
+    assert len(rows) == 3
     assert {row["failure_code"] for row in rows} == {"raised", "worker_died"}
     for row in rows:
         assert ("--trial-limit 600" in replay_command(row)) is (row["failure_stage"] == "worker")
         assert replayed(row, capsys) == json.loads(json.dumps(row))
 
 
-@pytest.mark.parametrize(("workers", "limits"), [(1, Limits(50.0, 1.5)), (None, Limits(None, 1.5))])
+@pytest.mark.parametrize(("workers", "limits"), [(1, Limits(50.0, 0.5)), (None, Limits(None, 0.5))])
 def test_what_the_limit_of_the_corrector_ended_is_the_same_row_again(
     workers: int | None, limits: Limits, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (row,) = run_sweep(grid("hangs"), tmp_path / "run", workers=workers, limit_s=50.0, corrector_limit_s=1.5)
+    (row,) = run_sweep(grid("hangs"), tmp_path / "run", workers=workers, limit_s=50.0, corrector_limit_s=0.5)
     assert (row["failure_code"], row["sentence"]) == ("time_limit", "the corrector took longer than its limit")
     assert limits_of(read_run(tmp_path / "run")) == limits
     assert replayed(row, capsys, limits) == json.loads(json.dumps(row))
     kept = pages.trials(report(tmp_path / "run").page)["words"]["command"]
-    said = ["--corrector-limit 1.5" in kept[0], "--trial-limit 50 " in f"{kept[0]} ", len(kept)]
+    said = ["--corrector-limit 0.5" in kept[0], "--trial-limit 50 " in f"{kept[0]} ", len(kept)]
     assert said == [True, workers == 1, 1]
 
 
 def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:hangs"]
-    assert main([*trial, "--trial-limit", "6", "--json"]) == 0
+    assert main([*trial, "--trial-limit", "0.5", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["failure_code"] == "time_limit"
     assert main([*trial, "--trial-limit", "-1"]) == 2
     assert "a limit of -1 s per trial was given" in capsys.readouterr().err
@@ -201,54 +229,70 @@ def test_a_replay_with_a_limit_of_its_own(tmp_path: Path, capsys: pytest.Capture
 
 def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     film, seen = tmp_path / "film.gif", tmp_path / "seen.json"
-    trial = ["replay", "block_on_block", "--careless", "0", "--level", "0.1", "--grasp", "weld", "--method", "none"]
+    trial = ["replay", "block_on_block", "--careless", "0", "--fidelity", "contact", "--method", "none"]
     written = ["--video", str(film), "--save-observation", str(seen)]
-    assert main([*trial, *written, "--trial-limit", "500", "--json"]) == 0
+    assert main([*trial, *written, "--level", "40", "--trial-limit", "500", "--json"]) == 0
     row = json.loads(capsys.readouterr().out)
-    assert row["failure_stage"] in (None, "judge")
+    assert (row["method"], row["sim_seconds"] is None) == ("none", False)
     assert film.read_bytes()[:3] == b"GIF"
-    measured = ["replay", "block_on_block", "--grasp", "weld", "--observation", str(seen), "--json"]
+    assert len(imageio.imread(film, index=None)) > 1
+    film.unlink()
+    drawn = seen.read_bytes()
+    assert main([*trial, "--save-observation", str(seen), "--level", "0.1", "--trial-limit", "500", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["failure_stage"] in (None, "judge")
+    assert seen.read_bytes() != drawn
+    measured = ["replay", "block_on_block", "--fidelity", "contact", "--observation", str(seen), "--json"]
     assert main([*measured, "--method", "none"]) == 0
     here = json.loads(capsys.readouterr().out)
     assert main([*measured, "--method", "none", "--trial-limit", "500"]) == 0
     assert json.loads(capsys.readouterr().out) == here
-    assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "2"]) == 0
+    assert main([*measured, "--method", "unruly:hangs", "--trial-limit", "0.5"]) == 0
     late = json.loads(capsys.readouterr().out)
     assert (late["failure_code"], late["noise"], late["level"]) == ("time_limit", "measured", None)
     assert list(late) == list(here)
-    film.unlink()
     assert main([*trial[:-1], "unruly:ends", *written]) == 0
     assert "nothing was replayed, so" in capsys.readouterr().err
     assert not film.exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")
-def test_a_row_on_standard_output_stands_there_alone(tmp_path: Path) -> None:
-    """Also what is held back until the end, where the output is no terminal."""
-    trial = ["replay", "block_on_block", "--careless", "0", "--method", "unruly:talks", "--json"]
+@pytest.mark.parametrize("more", [[], ["--trial-limit", "100"]])
+def test_a_row_on_standard_output_stands_there_alone(
+    more: list[str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also what is held back until the end of the corrector's process, where the output is no terminal."""
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
+    assert main([*TALKS, *more]) == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out)["method"] == "unruly:talks"
+    for words in ("from Python", "from behind", "from below", "from C"):
+        assert words in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the C library has no name there")
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_program_has_a_row_alone_on_its_output_or_none_where_that_is_closed(closed: bool) -> None:
+    command = shlex.join([sys.executable, "-m", "apo_bench.cli.app", *TALKS]) + " >&-" * closed
     held_back = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
-    for more in ([], ["--trial-limit", "100"]):
-        command = [sys.executable, "-m", "apo_bench.cli.app", *trial, *more]
-        done = subprocess.run(command, capture_output=True, text=True, env=held_back, check=True, timeout=120)
-        assert json.loads(done.stdout)["method"] == "unruly:talks"
-        for words in ("from Python", "from behind", "from below", "from C"):
-            assert words in done.stderr
-    closed = shlex.join([sys.executable, "-m", "apo_bench.cli.app", *trial]) + " >&-"
-    done = subprocess.run(closed, shell=True, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False, timeout=120, env=held_back)
     assert "Traceback" not in done.stderr
+    if not closed:
+        assert done.returncode == 0
+        assert json.loads(done.stdout)["method"] == "unruly:talks"
+        assert "from C" in done.stderr
 
 
 @FOLDERS
 def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
     began = time.monotonic()
-    rows = run_sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=8.0)
+    rows = run_sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=4.0)
     assert endings(rows) == {
         ("block_on_block", "hangs"): ("worker", "time_limit"),
         ("block_on_block", "raises"): ("correct", "raised"),
     }
-    assert 8.0 < time.monotonic() - began < 300.0
+    assert 4.0 < time.monotonic() - began < 300.0
     assert not asleep()
-    assert "8" not in rows[0]["sentence"]
+    assert "4" not in rows[0]["sentence"]
 
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
@@ -291,16 +335,17 @@ class Deadly:
         return os._exit, (5,)
 
 
-def test_processes_that_cannot_begin_are_given_up() -> None:
-    asked = grid("raises")
-    lock: Any = Deadly()
+def test_processes_that_cannot_begin_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, lock = grid("raises"), EnvironmentLock({}, versions())
+    real = pool.Process
+    monkeypatch.setattr(pool, "Process", lambda *given: real(Deadly()))  # type: ignore[arg-type]
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
         spread(tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None)
     assert FALSE_STARTS == 3
 
 
 def test_a_corrector_that_removes_the_folder_of_the_rows(tmp_path: Path) -> None:
-    rows = run_sweep(grid("removes", "raises", trials=2), "run", workers=1)
+    rows = run_sweep(grid("removes", "raises", trials=2), "run")
     assert len(rows) == 4
     assert {row["failure_code"] for row in rows} == {"raised"}
     assert count(tmp_path / "run") == 4
@@ -318,7 +363,7 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
 
     def start(work: Any, *given: Any) -> Any:
         asked_for.append(work)
-        return real(work, *(given if len(asked_for) == 1 else [Deadly()]))
+        return real(work, *given) if len(asked_for) == 1 else real(Deadly())
 
     real = pool.Process
     monkeypatch.setattr(pool, "Process", start)

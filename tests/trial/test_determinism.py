@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench.cli.app import main
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
@@ -62,24 +63,27 @@ def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> 
 
 
 def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
-    """Here, and in 1, 2 and 4 processes: the same lines, byte for byte."""
+    """Here, and in 1 and 4 processes: the same lines, byte for byte."""
     spec = SweepSettings(("stick_on_castles",), (HOPELESS,), (1.0,), ("none", "paper"), trials=4, grasps=("weld",))
     written = {}
-    for workers in (None, 1, 2, 4):
+    for workers in (None, 1, 4):
         folder = tmp_path / str(workers)
         rows = run_sweep(spec, folder, workers=workers)
         assert rows == read_rows(folder)
         written[workers] = sorted((folder / "trials.jsonl").read_bytes().splitlines())
     assert len(written[None]) == 8
-    assert written[None] == written[1] == written[2] == written[4]
+    assert written[None] == written[1] == written[4]
 
 
 @pytest.mark.slow
 def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
-    spec = SweepSettings(("stick_in_tower", "stick_on_castles"), levels=(0.5,), careless=(1.0,), trials=1, seed=21)
-    one = run_sweep(spec, tmp_path / "one", workers=1)
+    """Here, one scenario after the other, and in a process for each."""
+    scenarios, methods = ("stick_in_tower", "stick_on_castles"), ("none", "paper")
+    spec = SweepSettings(scenarios, levels=(0.5,), careless=(1.0,), methods=methods, trials=1, seed=21)
+    here = run_sweep(spec, tmp_path / "here")
     two = run_sweep(spec, tmp_path / "two", workers=2)
-    assert by_seed_and_method(one) == by_seed_and_method(two)
+    assert len(here) == 4
+    assert by_seed_and_method(here) == by_seed_and_method(two)
     alone = run_trial(
         TrialSettings("stick_in_tower", level_mm=0.5, level_deg=0.5, method="paper", seed=21),
         build_scene(load_scenario("stick_in_tower")),
@@ -91,11 +95,11 @@ def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None
 def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "run"
     command = [
-        *(sys.executable, "-m", "apo_bench.cli.app", "sweep", "stick_on_castles", "--levels", "0,1", "--careless", "1"),
-        *("--methods", "none,paper", "--trials", "3", "--grasp", "weld", "--workers", "2", "--out", str(out)),
+        *("sweep", "stick_on_castles", "--levels", "0,1", "--careless", "1", "--methods", "none,paper"),
+        *("--trials", "2", "--grasp", "weld", "--workers", "2", "--out", str(out)),
     ]
     process = subprocess.Popen(
-        command,
+        [sys.executable, "-m", "apo_bench.cli.app", *command],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -112,9 +116,9 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
     assert complaint.startswith("apo-bench: interrupted")
     assert "Traceback" not in complaint
     left = read_rows(out)
-    assert 0 < len(left) < 12
+    assert 0 < len(left) < 8
     assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
-    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+    assert main(command) == 0
     rows = read_rows(out)
     assert rows[: len(left)] == left
-    assert len({json.dumps(row) for row in rows}) == 12
+    assert len({json.dumps(row) for row in rows}) == 8
