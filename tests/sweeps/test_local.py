@@ -11,9 +11,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import imageio.v3 as imageio
 import pytest
@@ -114,26 +115,45 @@ def endings(rows: list[dict[str, Any]]) -> dict[tuple[str, str], tuple[str, str]
 
 
 MANY = grid(
-    *("raises", "dies_of_b", "nonsense", "halves", "forks"), scenarios=("block_on_block", "stick_in_tower"), trials=2
+    *("raises", "dies_of_b", "nonsense", "halves", "forks", "interrupts"),
+    scenarios=("block_on_block", "stick_in_tower"),
+    trials=2,
 )
 
 
+class Ended(NamedTuple):
+    """A sweep of `MANY`."""
+
+    rows: list[dict[str, Any]]
+    said: str
+    """What stood on standard error, of all processes."""
+
+
 @pytest.fixture(scope="module")
-def one(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """The rows of `MANY` out of one process."""
-    return run_sweep(MANY, tmp_path_factory.mktemp("one"), workers=1)
+def one(tmp_path_factory: pytest.TempPathFactory) -> Ended:
+    """With one worker process."""
+    folder = tmp_path_factory.mktemp("one")
+    before = os.dup(2)
+    try:
+        with (folder / "said").open("w") as file, redirect_stderr(file):
+            os.dup2(file.fileno(), 2)
+            rows = run_sweep(MANY, folder / "run", workers=1)
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+    return Ended(rows, (folder / "said").read_text())
 
 
-def test_what_a_corrector_says_can_be_written_as_text(one: list[dict[str, Any]]) -> None:
-    said = [row["sentence"] for row in one if row["method"] == "unruly:halves"]
+def test_what_a_corrector_says_can_be_written_as_text(one: Ended) -> None:
+    said = [row["sentence"] for row in one.rows if row["method"] == "unruly:halves"]
     assert len(said) == 4
     for sentence in said:
         assert "half a letter" in sentence
         sentence.encode()
 
 
-def test_a_corrector_that_forks_has_one_row(one: list[dict[str, Any]]) -> None:
-    rows = [row for row in one if row["method"] in ("unruly:forks", "unruly:raises")]
+def test_a_corrector_that_forks_has_one_row(one: Ended) -> None:
+    rows = [row for row in one.rows if row["method"] in ("unruly:forks", "unruly:raises")]
     assert sorted((row["scenario"], row["seed"], row["method"]) for row in rows) == [
         (scenario, seed, f"unruly:{method}")
         for scenario in MANY.scenarios
@@ -143,36 +163,29 @@ def test_a_corrector_that_forks_has_one_row(one: list[dict[str, Any]]) -> None:
     assert {row["failure_code"] for row in rows} == {"raised"}
 
 
-def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(
-    one: list[dict[str, Any]], tmp_path: Path
-) -> None:
+def test_a_corrector_that_ends_its_process_costs_its_own_trials_alone(one: Ended, tmp_path: Path) -> None:
     four = run_sweep(MANY, tmp_path / "four", workers=4)
-    assert endings(one) == {
+    assert endings(one.rows) == {
         **{
             (scenario, method): ("correct", "raised")
             for scenario in MANY.scenarios
-            for method in ("raises", "nonsense", "halves", "forks")
+            for method in ("raises", "nonsense", "halves", "forks", "interrupts")
         },
         ("stick_in_tower", "dies_of_b"): ("correct", "raised"),
         ("block_on_block", "dies_of_b"): ("worker", "worker_died"),
     }
-    assert len(one) == 2 * 2 * 5
-    assert all(row["success"] is False for row in one)
-    assert sorted(map(json.dumps, one)) == sorted(map(json.dumps, four))
+    assert len(one.rows) == 2 * 2 * 6
+    assert all(row["success"] is False for row in one.rows)
+    assert sorted(map(json.dumps, one.rows)) == sorted(map(json.dumps, four))
     timing = [json.loads(text) for text in (tmp_path / "four" / "timing.jsonl").read_text().splitlines()]
     assert len(timing) == len(four)
     assert {t["worker"] for t in timing} <= {0, 1, 2, 3}
 
 
-def test_an_interrupt_of_the_correctors_own_is_an_error_that_it_raised(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    rows = run_sweep(grid("interrupts", "raises"), tmp_path / "run", workers=1)
-    assert endings(rows) == {
-        ("block_on_block", "interrupts"): ("correct", "raised"),
-        ("block_on_block", "raises"): ("correct", "raised"),
-    }
-    assert "Traceback" not in capfd.readouterr().err
+def test_an_interrupt_of_the_correctors_own_is_an_error_that_it_raised(one: Ended) -> None:
+    found = endings(one.rows)
+    assert found["block_on_block", "interrupts"] == found["block_on_block", "raises"] == ("correct", "raised")
+    assert "Traceback" not in one.said
 
 
 def test_what_ends_before_anyone_looks_is_late_all_the_same(tmp_path: Path) -> None:
@@ -194,11 +207,9 @@ def replayed(row: dict[str, Any], capsys: pytest.CaptureFixture[str], limits: Li
     return dict(json.loads(capsys.readouterr().out))
 
 
-def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(
-    one: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]
-) -> None:
-    methods = [f"unruly:{method}" for method in ("raises", "nonsense", "dies_of_b")]
-    rows = [row for row in one if row["method"] in methods and (row["scenario"], row["seed"]) == ("block_on_block", 0)]
+def test_a_replay_of_a_trial_that_went_wrong_is_the_same_row(one: Ended, capsys: pytest.CaptureFixture[str]) -> None:
+    first, methods = ("block_on_block", 0), [f"unruly:{m}" for m in ("raises", "nonsense", "dies_of_b")]
+    rows = [row for row in one.rows if row["method"] in methods and (row["scenario"], row["seed"]) == first]
     assert len(rows) == 3
     assert {row["failure_code"] for row in rows} == {"raised", "worker_died"}
     for row in rows:
