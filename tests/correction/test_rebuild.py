@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,15 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import LAYOUT, Attempt, observe_recording, record_demonstration, replay_and_judge, stream
+from apo_bench.trial.stages import (
+    LAYOUT,
+    Attempt,
+    Recording,
+    observe_recording,
+    record_demonstration,
+    replay_and_judge,
+    stream,
+)
 
 SCENES = (
     "block_on_block",
@@ -29,12 +38,22 @@ SCENES = (
 SEED = 3
 
 
-@pytest.fixture(scope="module")
-def scenes() -> Mapping[str, Scene]:
-    return {name: build_scene(load_scenario(name)) for name in SCENES}
+@cache
+def scene_of(name: str) -> Scene:
+    return build_scene(load_scenario(name))
 
 
-def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Sequence[float]]) -> Attempt:
+@cache
+def shown(name: str, seed: int) -> Recording:
+    return record_demonstration(scene_of(name), 1.0, seed)
+
+
+def built(
+    scene: Scene,
+    schedule: tuple[Step, ...],
+    wrong_mm: Mapping[int, Sequence[float]],
+    fidelity: str = "contact",
+) -> Attempt:
     """Follow a schedule at the truth; operations done for the first time are `wrong_mm` off in the part's frame."""
     layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
     seen: set[int] = set()
@@ -47,7 +66,7 @@ def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Seque
         if undo:
             wrong_mm = {j: w for j, w in wrong_mm.items() if j != k}
     plan = Plan(scene.scenario.assembly, layout.start, layout.goals, schedule, np.array(targets))
-    return replay_and_judge(plan, scene, layout.goals)
+    return replay_and_judge(plan, scene, layout.goals, fidelity=fidelity)
 
 
 def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:
@@ -58,9 +77,9 @@ def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_true_layout_is_assembled(scenes: Mapping[str, Scene], name: str) -> None:
-    scene = scenes[name]
-    tried = built(scene, tuple(Step(k) for k in range(len(scene.scenario.assembly))), {})
+def test_the_true_layout_is_assembled(name: str) -> None:
+    scene = scene_of(name)
+    tried = built(scene, tuple(Step(k) for k in range(len(scene.scenario.assembly))), {}, "full")
     assert (tried.result.outcome.code, tried.verdict.demonstrated.code) == ("ok", "ok")
     assert tried.verdict.success
 
@@ -74,18 +93,18 @@ def test_the_true_layout_is_assembled(scenes: Mapping[str, Scene], name: str) ->
     ],
 )
 def test_the_robot_takes_apart_what_was_wrong_and_builds_it_again(
-    scenes: Mapping[str, Scene], name: str, step: int, wrong_mm: Mapping[int, Sequence[float]]
+    name: str, step: int, wrong_mm: Mapping[int, Sequence[float]]
 ) -> None:
     """Fig. 14 and 17, and the same for Fig. 6: back to operation 2, which the human had got wrong."""
-    scene = scenes[name]
+    scene = scene_of(name)
     tried = built(scene, back_to(2, step, len(scene.scenario.assembly)), wrong_mm)
     assert (tried.result.outcome.code, tried.verdict.demonstrated.code) == ("ok", "ok")
     assert tried.verdict.success
     assert tried.verdict.demonstrated.pushed_mm < 0.5
 
 
-def test_a_group_is_taken_down_as_a_group_and_all_of_it_undone(scenes: Mapping[str, Scene]) -> None:
-    scene = scenes["carried_bridge"]
+def test_a_group_is_taken_down_as_a_group_and_all_of_it_undone() -> None:
+    scene = scene_of("carried_bridge")
     n = len(scene.scenario.assembly)
     schedule = (*(Step(k) for k in range(n)), *(Step(k, undo=True) for k in reversed(range(n))))
     tried = built(scene, schedule, {})
@@ -98,8 +117,8 @@ def test_a_group_is_taken_down_as_a_group_and_all_of_it_undone(scenes: Mapping[s
     assert all(snapshot is None for snapshot in tried.result.reached.after)
 
 
-def test_a_wrong_layout_is_not_assembled(scenes: Mapping[str, Scene]) -> None:
-    scene = scenes["carried_bridge"]
+def test_a_wrong_layout_is_not_assembled() -> None:
+    scene = scene_of("carried_bridge")
     tried = built(scene, tuple(Step(k) for k in range(len(scene.scenario.assembly))), {1: (0, 3, 0)})
     assert not tried.verdict.success
 
@@ -116,10 +135,9 @@ SETS = {
 @pytest.mark.parametrize("name", SETS)
 def test_the_paper_s_sets_are_tried_after_real_demonstrations(name: str) -> None:
     """Only the human is careless: every set but the last leaves a gap."""
-    scene = build_scene(load_scenario(name))
     step, sets = SETS[name]
     for seed in range(4):
-        seen = observe_recording(record_demonstration(scene, 1.0, seed), make_noise("isotropic", Level(0.0, 0.0)), seed)
+        seen = observe_recording(shown(name, seed), make_noise("isotropic", Level(0.0, 0.0)), seed)
         made = correct(seen, "paper-track")
         tried = [one for one in made.tried if one.step == step - 1]
         assert [tuple(k + 1 for k in one.free) for one in tried] == sets
@@ -128,8 +146,7 @@ def test_the_paper_s_sets_are_tried_after_real_demonstrations(name: str) -> None
 
 
 def test_fig_6_frees_all_but_operation_4() -> None:
-    scene = build_scene(load_scenario("pocket_table"))
-    seen = observe_recording(record_demonstration(scene, 1.0, 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
+    seen = observe_recording(shown("pocket_table", 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
     assert [k + 1 for k in correct(seen, "paper").freed] == [6, 5, 3, 2, 1]
 
 
@@ -172,9 +189,9 @@ def test_tall_parts_are_carried_over_what_stands(tmp_path: Path) -> None:
     assert tried.verdict.success
 
 
-def test_a_collision_names_what_was_struck(scenes: Mapping[str, Scene]) -> None:
+def test_a_collision_names_what_was_struck() -> None:
     """Block A is believed to be where it is not: the fingers come down on it."""
-    scene = scenes["block_on_block"]
+    scene = scene_of("block_on_block")
     layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
     there = {**layout.start, "A": layout.start["B"] @ pose.at((0.06, 0.0, 0.0))}
     result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene, parts_at=there)

@@ -95,7 +95,7 @@ def test_cubes_hang_on_the_stick_and_land_in_their_pockets():
 
 def test_a_group_leaves_nothing_behind_for_the_next_trial():
     """Where a hand holds a carried part is written into the shared model; the next trial must not see it."""
-    first = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
+    first = shown("pocket_table", 1.0, 2).demonstration
     record_demonstration(scene("pocket_table"), 0.0, 5)
     again = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
     np.testing.assert_array_equal(first.goals, again.goals)

@@ -45,7 +45,8 @@ def done(
     scene = build_scene(scenario)
     layout = draw_layout(scenario, np.random.default_rng(1), scene.clearance_mm)
     goals = layout.goals @ pose.at(1e-3 * np.array(off_mm))
-    return replay_and_judge(Plan(scenario.assembly, layout.start, goals, schedule), scene, layout.goals)
+    plan = Plan(scenario.assembly, layout.start, goals, schedule)
+    return replay_and_judge(plan, scene, layout.goals, fidelity="contact")
 
 
 def names(scenario: Scenario) -> list[list[str]]:
