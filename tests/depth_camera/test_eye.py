@@ -29,7 +29,9 @@ from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.tv import Change, TvCamera
+from apo_bench.sweeps import sweep
 from apo_bench.sweeps.grid import SweepSettings
+from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import OBSERVATION, Recording, observe_recording, range_sensor, record_demonstration, stream
 from apo_bench.trial.trial import run_trial
 from tests import pages
@@ -217,12 +219,19 @@ def figure_texts(run: Path) -> dict[str, list[str]]:
     return {name: ["".join(text.itertext()) for text in texts] for name, texts in found.items()}
 
 
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps start no worker."""
+    monkeypatch.setattr(sweep, "run_sweep", lambda *a, **k: run_sweep(*a, **{**k, "workers": None}))
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked = ["--eye", "range", "--levels", "0.5", "--careless", "0", "--methods", "none,contact", "--trials", "1"]
     out = tmp_path / "run"
-    more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--workers", "1", "--out", str(out)]
+    more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--fidelity", "contact", "--out", str(out)]
     assert main(["sweep", "block_on_block", *asked, *more]) == 0
     assert main(["report", str(out)]) == 0
     said, page = capsys.readouterr().out, pages.words(out / "report.html")
