@@ -21,6 +21,7 @@ TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method
 MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "none")
 HOPELESS = ("--level", "40")
 """Plans at this level are refused before the arm moves, so that a replay costs little."""
+QUICK = ("--fidelity", "contact")
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -153,7 +154,7 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
 
 
 def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, *TRIAL, "--method", "paper", "--json")
+    code, out, err = run(capsys, "replay", "block_on_block", "--seed", "5", *QUICK, "--method", "paper", "--json")
     assert (code, err) == (0, "")
     assert out.count("\n") == 1
     row = json.loads(out)
@@ -191,7 +192,8 @@ def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str
 def test_a_table_is_replayed_like_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Of noise that is not stated nothing is assumed; the graph, which needs none, is printed all the same."""
     seen = Path(__file__).parents[2] / "docs" / "seen.csv"
-    code, out, err = run(capsys, *MEASURED, "--observation", str(seen), "--method", "contact", "--json")
+    measured = ("replay", "stick_in_tower", *QUICK, "--observation", str(seen), "--method", "contact", "--json")
+    code, out, err = run(capsys, *measured)
     assert (code, err, json.loads(out)["success"]) == (0, "", True)
     path = tmp_path / "bare.csv"
     path.write_text("\n".join(",".join(line.split(",")[:9]) for line in seen.read_text().splitlines()))
@@ -212,7 +214,8 @@ def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp
 
 def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "replay.gif"
-    code, out, err = run(capsys, *TRIAL, *HOPELESS, "--video", str(path))
+    trial = ("replay", "block_on_block", "--careless", "0", "--method", "none", *HOPELESS)
+    code, out, err = run(capsys, *trial, "--video", str(path))
     assert (code, err) == (0, "")
     assert out.endswith(f"Film: {path}\n")
     assert path.read_bytes().startswith(b"GIF8")
@@ -250,7 +253,7 @@ def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypa
 def test_a_sweep_prints_rates_and_its_report_follows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out_folder = tmp_path / "run"
     code, out, err = run(
-        capsys, "sweep", "stick_in_tower", "--levels", "40", "--careless", "0", "--methods", "none", "--trials", "2",
+        capsys, "sweep", "block_on_block", "--levels", "40", "--careless", "0", "--methods", "none", "--trials", "2",
         "--seed", "3", "--grasp", "weld", "--workers", "1", "--out", str(out_folder),
     )  # fmt: skip
     assert (code, err) == (0, "")
