@@ -273,13 +273,13 @@ def test_an_endless_loop_ends_at_its_limit(folder: Path) -> None:
 
 def test_the_import_of_a_module_has_a_limit(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "sleeping.py").write_text("import time; time.sleep(600)")
-    monkeypatch.setattr(own, "LEAST_STARTING_S", 3.0)
+    monkeypatch.setattr(own, "LEAST_STARTING_S", 1.5)
     with (
         OwnCorrectors(limit_s=0.5) as correctors,
-        pytest.raises(InputError, match=r"took longer than 3 s while it was"),
+        pytest.raises(InputError, match=r"took longer than 1\.5 s while it was"),
     ):
         correctors.find("sleeping:any")
-    with OwnCorrectors(limit_s=4.0) as correctors, pytest.raises(InputError, match=r"took longer than 4 s while"):
+    with OwnCorrectors(limit_s=2.0) as correctors, pytest.raises(InputError, match=r"took longer than 2 s while"):
         correctors.find("sleeping:any")
 
 
