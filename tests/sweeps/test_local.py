@@ -242,16 +242,12 @@ def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.
     film, seen = tmp_path / "film.gif", tmp_path / "seen.json"
     trial = ["replay", "block_on_block", "--careless", "0", "--fidelity", "contact", "--method", "none"]
     written = ["--video", str(film), "--save-observation", str(seen)]
-    assert main([*trial, *written, "--level", "40", "--trial-limit", "500", "--json"]) == 0
+    assert main([*trial, *written, "--level", "0.1", "--trial-limit", "500", "--json"]) == 0
     row = json.loads(capsys.readouterr().out)
-    assert (row["method"], row["sim_seconds"] is None) == ("none", False)
+    assert (row["method"], row["failure_stage"] in (None, "judge")) == ("none", True)
     assert film.read_bytes()[:3] == b"GIF"
-    assert len(imageio.imread(film, index=None)) > 1
+    assert len(imageio.imread(film, index=None)) > 20
     film.unlink()
-    drawn = seen.read_bytes()
-    assert main([*trial, "--save-observation", str(seen), "--level", "0.1", "--trial-limit", "500", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["failure_stage"] in (None, "judge")
-    assert seen.read_bytes() != drawn
     measured = ["replay", "block_on_block", "--fidelity", "contact", "--observation", str(seen), "--json"]
     assert main([*measured, "--method", "none"]) == 0
     here = json.loads(capsys.readouterr().out)
@@ -296,14 +292,14 @@ def test_the_program_has_a_row_alone_on_its_output_or_none_where_that_is_closed(
 @FOLDERS
 def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) -> None:
     began = time.monotonic()
-    rows = run_sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=4.0)
+    rows = run_sweep(grid("hangs", "raises"), tmp_path / "run", workers=1, limit_s=8.0)
     assert endings(rows) == {
         ("block_on_block", "hangs"): ("worker", "time_limit"),
         ("block_on_block", "raises"): ("correct", "raised"),
     }
-    assert 4.0 < time.monotonic() - began < 300.0
+    assert 8.0 < time.monotonic() - began < 300.0
     assert not asleep()
-    assert "4" not in rows[0]["sentence"]
+    assert "8" not in rows[0]["sentence"]
 
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
