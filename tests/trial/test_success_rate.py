@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from scipy.stats import binom
 
+from apo_bench.records.row import Row
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
@@ -39,6 +40,7 @@ SURPRISE = 1e-4
 """A count less likely than this under the claimed rate is a regression."""
 METHODS = dict.fromkeys(EXAMPLES, ("oracle", "none", "paper", "paper-track"))
 METHODS |= dict.fromkeys(OTHERS, ("oracle", "none", "paper"))
+CASES = [(name, method) for name, methods in METHODS.items() for method in methods]
 
 
 def spec(scenario: str, method: str, seed: int) -> TrialSettings:
@@ -66,15 +68,18 @@ def shown(name: str, careless: float, seed: int) -> Recording:
     return record_demonstration(scene(name), careless, seed)
 
 
+def trial(name: str, method: str, seed: int, cache: ReplayCache | None = None) -> Row:
+    asked = spec(name, method, seed)
+    return run_trial(asked, scene(name), recording=shown(name, asked.careless, seed), cache=cache)
+
+
 def verdicts(name: str) -> dict[str, str]:
     """Method -> whether it was made as demonstrated, for each seed, as ones and zeros."""
     found = dict.fromkeys(METHODS[name], "")
     for seed in SEEDS:
         cache = ReplayCache()
         for method in (m for m in found if seed in FEWER.get(m, SEEDS)):
-            asked = spec(name, method, seed)
-            row = run_trial(asked, scene(name), recording=shown(name, asked.careless, seed), cache=cache)
-            found[method] += str(int(row["as_demonstrated"]))
+            found[method] += str(int(trial(name, method, seed, cache)["as_demonstrated"]))
     return found
 
 
