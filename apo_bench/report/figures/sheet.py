@@ -205,9 +205,14 @@ def _with_tips(svg: str, tips: Sequence[Sequence[str]]) -> str:
     head, *rest = re.split(r'<g id="tips-(\d+)">', svg)
     made = [head]
     for number, segment in zip(rest[::2], rest[1::2], strict=True):
-        said = iter(tips[int(number)])
-        made += ["<g>", SHAPE.sub(lambda m: _pointed(m, next(said, None)), segment)]  # noqa: B023
+        made += ["<g>", _tipped(segment, tips[int(number)])]
     return "".join(made)
+
+
+def _tipped(segment: str, tips: Sequence[str]) -> str:
+    """One tip for each mark, in their order; marks that are left have none."""
+    left = iter(tips)
+    return SHAPE.sub(lambda mark: _pointed(mark, next(left, None)), segment)
 
 
 def _pointed(mark: re.Match[str], said: str | None) -> str:
