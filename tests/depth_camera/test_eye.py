@@ -74,7 +74,7 @@ def test_being_watched_changes_nothing(name: str) -> None:
 def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
     built = scene("stick_in_tower")
     start = watched("stick_in_tower").layout.start
-    hands, finder = Hands(built.shown, start), RangeFinder()
+    hands, finder = Hands(built, start), RangeFinder()
     hands.grab(0, "stick")  # the ball that holds it is thicker than the stick
     sight = Sight(built.shown)
     sight.look(hands.data.qpos)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,9 @@ from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.simulation.human import demonstration
+from apo_bench.simulation.human.hands import Hands
+from apo_bench.simulation.robot.paths import shifted, smooth
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import Recording, record_demonstration
 
@@ -43,9 +48,9 @@ def off_mm(of: Recording) -> Array:
 
 def end_mm(of: Recording, part: str) -> Array:
     """How far a part ends from where it should be, (3,), world."""
-    demonstration = of.demonstration
-    true = placements(demonstration.assembly, of.layout.start, of.layout.goals)[-1][part]
-    return 1e3 * (demonstration.final[part] - true)[:3, 3]
+    human = of.demonstration
+    true = placements(human.assembly, of.layout.start, of.layout.goals)[-1][part]
+    return 1e3 * (human.final[part] - true)[:3, 3]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -101,6 +106,45 @@ def test_a_group_leaves_nothing_behind_for_the_next_trial():
     np.testing.assert_array_equal(first.goals, again.goals)
     for part, T in first.final.items():
         np.testing.assert_array_equal(T, again.final[part])
+
+
+def test_what_is_left_out_and_what_sleeps_changes_micrometres(monkeypatch: pytest.MonkeyPatch):
+    """Two operations carry parts that touch, and the stick falls from a hand in which it hung still."""
+    quick = shown("pocket_table", 1.0, 2).demonstration
+    monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n: [(0, n)])
+    monkeypatch.setattr(demonstration, "sleeping", lambda world, allowed: nullcontext())
+    whole = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
+    pairs = [*zip(whole.goals, quick.goals, strict=True), *((T, quick.final[part]) for part, T in whole.final.items())]
+    off = np.array([pose.log(pose.inverse(a) @ b) for a, b in pairs])
+    assert np.abs(off[:, :3]).max() < 5e-6
+    assert np.degrees(np.abs(off[:, 3:]).max()) < 0.005
+
+
+class Pictures:
+    """Notes when it looks, and where the stick is then."""
+
+    period_s = 0.05
+
+    def __init__(self, at: int) -> None:
+        self.at, self.seen = at, list[tuple[float, Array]]()
+
+    def __call__(self, data: Any) -> None:
+        self.seen.append((float(data.time), data.qpos[self.at : self.at + 3].copy()))
+
+
+def test_who_watches_sees_a_picture_every_period_also_of_what_is_left_out():
+    its, layout = scene("stick_in_tower"), shown("stick_in_tower", 1.0, 2).layout
+    pictures = Pictures(its.shown.qpos["stick"])
+    hands = Hands(its, layout.start, pictures)
+    lift = smooth(hands.grab(0, "stick"), shifted(layout.start["stick"], (0, 0, 1), 0.4), 0.9)
+    hands.move((0, lift))
+    hands.wait(0.2)
+    times, places = map(np.array, zip(*pictures.seen, strict=True))
+    assert times == pytest.approx(0.05 * np.arange(len(times)), abs=1e-9)
+    assert len(times) == 1 + int((lift.seconds + 0.2) / 0.05)
+    rises = np.diff(places[:, 2])
+    assert (rises > -1e-3).all(), "never back, or it would look like another motion"
+    assert places[-1, 2] == pytest.approx(layout.start["stick"][2, 3] + 0.4, abs=1e-4)
 
 
 OWN = """

@@ -17,7 +17,7 @@ from apo_bench.simulation.human.acts import act
 from apo_bench.simulation.human.hands import Hands, Watcher
 from apo_bench.simulation.human.perform import REST_S, perform
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import has_failed, snapshot
+from apo_bench.simulation.scene.world import has_failed, sleeping, snapshot
 
 
 def demonstrate(
@@ -37,16 +37,17 @@ def demonstrate(
     scenario = scene.scenario
     error = spread_error(scenario, layout, _draw(scenario.careless, human_error, rng))
     stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
-    hands = Hands(scene.shown, layout.start, watch)
-    hands.wait(0.05)
+    hands = Hands(scene, layout.start, watch)
     goals, after = [], []
-    for k, operation in enumerate(scenario.assembly.operations):
-        target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
-        late = error.left if k == len(scenario.assembly) - 1 else ()
-        perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
-        after.append(snapshot(scene.shown, hands.data, layout.start))
-        goals.append(after[-1].poses[operation.main])
-    hands.wait(REST_S)
+    with sleeping(scene.shown, True):
+        hands.wait(0.05)
+        for k, operation in enumerate(scenario.assembly.operations):
+            target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
+            late = error.left if k == len(scenario.assembly) - 1 else ()
+            perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
+            after.append(snapshot(scene.shown, hands.data, layout.start))
+            goals.append(after[-1].poses[operation.main])
+        hands.wait(REST_S)
     final = snapshot(scene.shown, hands.data, layout.start)
     why = "the simulation became unstable" if has_failed(hands.data) else _wrong(scene, layout, after, final)
     return Demonstration(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from copy import copy
+from functools import partial
 from typing import Any, Protocol
 
 import mujoco
@@ -10,9 +13,21 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
+from apo_bench.simulation.robot.near import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene.scene import HANDS
-from apo_bench.simulation.scene.world import World, initial_state, part_pose
+from apo_bench.simulation.scene.scene import HANDS, Scene
+from apo_bench.simulation.scene.world import Ints, initial_state, part_pose, sleeping
+
+_TRAIL_S = 0.019
+"""What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""
+_RUN_UP_S = 0.08
+"""A motion is simulated from so long before it comes near: what trails wrongly by 0.3 mm is in place by then."""
+_NEAR_M = 0.0005
+_NO_TURN = 1e-9
+"""Lines that turn less are straight, [rad]."""
+_LOOK_STEPS = 10
+"""While it waits it looks so often whether everything sleeps."""
 
 
 class Watcher(Protocol):
@@ -26,15 +41,17 @@ class Watcher(Protocol):
 class Hands:
     """Two hands and the parts before them; one demonstration long."""
 
-    def __init__(self, world: World, start: Poses, watch: Watcher | None = None) -> None:
-        self.world = world
-        self.data: Any = initial_state(world, start)
+    def __init__(self, scene: Scene, start: Poses, watch: Watcher | None = None) -> None:
+        self.scene, self.world = scene, scene.shown
+        self.data: Any = initial_state(self.world, start)
+        self._step_s = float(self.world.model.opt.timestep)
         self._watch, self._steps = watch, 0
-        self._every = max(1, round(watch.period_s / world.model.opt.timestep)) if watch else 0
+        self._every = max(1, round(watch.period_s / self._step_s)) if watch else 0
         if watch:
             watch(self.data)
-        self._mocap = [int(world.model.body(hand).mocapid[0]) for hand in HANDS]
+        self._mocap = [int(self.world.model.body(hand).mocapid[0]) for hand in HANDS]
         self._at = [np.eye(4) for _ in HANDS]
+        self._held: list[dict[str, Array]] = [{} for _ in HANDS]
 
     def pose(self, part: str) -> Array:
         """Where a movable part is, (4, 4)."""
@@ -43,7 +60,8 @@ class Hands:
     def grab(self, hand: int, part: str) -> Array:
         """Take a part where it is, at its frame; returns its pose."""
         T = self.pose(part)
-        self._put(hand, T)
+        self._at[hand] = T
+        self._put(self.data, hand, T)
         self._hold(hand, part, np.eye(4))
         return T
 
@@ -54,24 +72,66 @@ class Hands:
     def let_go(self, hand: int, *parts: str) -> None:
         for part in parts:
             self.data.eq_active[self._weld(hand, part)] = 0
+            self._held[hand].pop(part, None)
 
     def move(self, *moves: tuple[int, Trajectory]) -> None:
-        """Move hands together; a hand whose line ends early waits at its end."""
-        step = self.world.model.opt.timestep
-        counts = [max(1, round(line.seconds / step)) for _, line in moves]
-        paths = [line.poses(line.progress(np.arange(1, n + 1) / n)) for (_, line), n in zip(moves, counts, strict=True)]
-        targets = [(hand, path[:, :3, 3], _quaternions(path)) for (hand, _), path in zip(moves, paths, strict=True)]
-        for i in range(max(counts)):
-            for hand, positions, quaternions in targets:
-                j = min(i, len(positions) - 1)
-                self.data.mocap_pos[self._mocap[hand]] = positions[j]
-                self.data.mocap_quat[self._mocap[hand]] = quaternions[j]
-            self._step(1)
-        for (hand, _), path in zip(moves, paths, strict=True):
-            self._at[hand] = path[-1]
+        """Move hands together; a hand whose line ends early waits at its end.
+
+        Where one hand moves alone, stretches on which nothing is near are left out.
+        """
+        counts, done = [max(1, round(line.seconds / self._step_s)) for _, line in moves], 0
+        for begin, end in [(0, max(counts))] if len(moves) > 1 else self._spans(*moves[0], counts[0]):
+            if begin > done:
+                self._pass(begin - done, partial(self._leap, *moves[0], counts[0], done))
+            self._run(moves, counts, np.arange(begin + 1, end + 1))
+            done = end
+        for hand, line in moves:
+            self._at[hand] = line.end
 
     def wait(self, seconds: float) -> None:
-        self._step(round(seconds / self.world.model.opt.timestep))
+        """Stand still; once everything sleeps, time passes.
+
+        What was just let go hung still in the hand, and is kept awake until it falls.
+        """
+        steps = round(seconds / self._step_s)
+        with sleeping(self.world, False):
+            self._step(min(_LOOK_STEPS, steps))
+        for done in range(_LOOK_STEPS, steps, _LOOK_STEPS):
+            if self.data.ntree_awake == 0:
+                return self._pass(steps - done, lambda data, i: None)
+            self._step(min(_LOOK_STEPS, steps - done))
+
+    def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
+        """Which steps of a line are simulated: those where something is near; at last the end."""
+        boxes, tip = self.scene.boxes, pose.inverse(line.start)
+        held = tuple(self._held[hand])
+        moving = [Moving(boxes[part], tip @ self.pose(part)) for part in held]
+        s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
+        spans = near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
+        return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
+
+    def _leap(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:
+        """Be so many steps further on a line at once, with what is held."""
+        at = begin + steps + np.array([0.0, TINY_S / self._step_s])
+        after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))
+        for part, T_hand_part in self._held[hand].items():
+            before = part_pose(self.world, data, part) @ pose.inverse(T_hand_part)
+            take_along(self.world, data, (part,), (before, after, later))
+        self._put(data, hand, line.poses(line.progress(at[:1] / n))[0])
+
+    def _run(self, moves: tuple[tuple[int, Trajectory], ...], counts: list[int], steps: Ints) -> None:
+        """Simulate these steps of lines."""
+        targets = []
+        for (hand, line), n in zip(moves, counts, strict=True):
+            path, at = line.poses(line.progress(np.minimum(steps / n, 1.0))), self._mocap[hand]
+            targets.append((self.data.mocap_pos[at], path[:, :3, 3]))
+            self.data.mocap_quat[at] = _quaternion(line.end)
+            if np.abs(line.turn).max() > _NO_TURN:
+                targets.append((self.data.mocap_quat[at], _quaternions(path)))
+        for i in range(len(steps)):
+            for now, wanted in targets:
+                now[:] = wanted[i]
+            self._step(1)
 
     def _step(self, n: int) -> None:
         """Step, and let who watches look whenever it is time."""
@@ -83,19 +143,50 @@ class Hands:
             mujoco.mj_step(self.world.model, self.data, n)
             self._steps += n
 
+    def _pass(self, steps: int, put: Callable[[Any, int], None]) -> None:
+        """Let time pass that is not simulated.
+
+        Args:
+            put: Makes of the present state what it will be so many steps later; who watches is shown that in a copy.
+        """
+        if self._watch:
+            for i in range(self._every - self._steps, steps + 1, self._every):
+                picture = copy(self.data)
+                self._after(picture, i, put)
+                mujoco.mj_kinematics(self.world.model, picture)
+                self._watch(picture)
+            self._steps = (self._steps + steps) % self._every
+        self._after(self.data, steps, put)
+
+    def _after(self, data: Any, steps: int, put: Callable[[Any, int], None]) -> None:
+        put(data, steps)
+        data.time += steps * self._step_s
+
     def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
         weld = self._weld(hand, part)
-        quaternion = _quaternions(T_hand_part[None])[0]
+        quaternion = _quaternion(T_hand_part)
         self.world.model.eq_data[weld, :11] = (0, 0, 0, *T_hand_part[:3, 3], *quaternion, 1)
         self.data.eq_active[weld] = 1
+        self._held[hand][part] = T_hand_part
 
     def _weld(self, hand: int, part: str) -> int:
         return int(self.world.model.equality(f"{HANDS[hand]}_{part}").id)
 
-    def _put(self, hand: int, T: Array) -> None:
-        self._at[hand] = T
-        self.data.mocap_pos[self._mocap[hand]] = T[:3, 3]
-        self.data.mocap_quat[self._mocap[hand]] = _quaternions(T[None])[0]
+    def _put(self, data: Any, hand: int, T: Array) -> None:
+        data.mocap_pos[self._mocap[hand]] = T[:3, 3]
+        data.mocap_quat[self._mocap[hand]] = _quaternion(T)
+
+
+def _quaternion(T: Array) -> Array:
+    """(4, 4) -> (4,), w first."""
+    q = np.zeros(4)
+    mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
+    return q
+
+
+def _trailing(steps: Array, n: int, step_s: float) -> Array:
+    """When on a line of n steps a hand was where what it holds is now, as part of the whole time."""
+    return np.asarray(np.clip((steps - _TRAIL_S / step_s) / n, 0.0, 1.0))
 
 
 def _quaternions(T: Array) -> Array:

@@ -10,7 +10,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.world import World, part_pose, place
 
-_TINY_S = 1e-4
+TINY_S = 1e-4
 """Speeds of the tip are differences over this time."""
 
 
@@ -34,11 +34,17 @@ def fast_forward(
     at, dof = joints
     before = forward(data.qpos[at])
     q = data.qpos[at] + by
-    after, later = forward(q), forward(q + _TINY_S * velocity)
+    after, later = forward(q), forward(q + TINY_S * velocity)
     data.qpos[at], data.qvel[dof] = q, velocity
+    take_along(world, data, held, (before, after, later))
+
+
+def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Array, Array, Array]) -> None:
+    """Move parts as one rigid body with a frame, (4, 4): where it is, where it shall be, and where `TINY_S` later."""
+    before, after, later = frames
     way = after @ pose.inverse(before)
-    speed = (later[:3, 3] - after[:3, 3]) / _TINY_S
-    spin = after[:3, :3] @ pose.log(pose.inverse(after) @ later)[3:] / _TINY_S
+    speed = (later[:3, 3] - after[:3, 3]) / TINY_S
+    spin = after[:3, :3] @ pose.log(pose.inverse(after) @ later)[3:] / TINY_S
     for part in held:
         T = way @ part_pose(world, data, part)
         place(world, data, part, T)

@@ -17,7 +17,7 @@ from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
 from apo_bench.geometry.solid import Box
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import Ints, part_pose
+from apo_bench.simulation.scene.world import Ints, World, part_pose
 
 NEAR_M, _NEAR_GROUP_M = 0.00015, 0.002
 """A part drifts by less than the first in a hand; parts of a group have that much play and more in each other."""
@@ -44,7 +44,15 @@ class Moving(NamedTuple):
 
 
 def near_spans(
-    scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], line: Trajectory, s: Array
+    scene: Scene,
+    data: Any,
+    moving: Iterable[Moving],
+    held: tuple[str, ...],
+    line: Trajectory,
+    s: Array,
+    world: World | None = None,
+    run_up_s: float = _RUN_UP_S,
+    near_m: float = NEAR_M,
 ) -> list[_Span]:
     """The stretches of a line along which something comes near, each with its run-up.
 
@@ -52,17 +60,21 @@ def near_spans(
         moving: The hand and what it holds.
         held: Which parts move with the tip.
         s: (n + 1,), how far along the line the tip is at each step, from 0 to 1.
+        world: Where it moves, by default where the robot works.
+        run_up_s: A motion is simulated from so long before it comes near.
+        near_m: How near, for a single part.
     """
-    n = len(s) - 1
-    others = [part for part in (*scene.work.free, *scene.work.fixed) if part not in held]
-    if not _still(scene, data, others):
+    n, world = len(s) - 1, world or scene.work
+    others = [part for part in (*world.free, *world.fixed) if part not in held]
+    if not _still(world, data, others):
         return [(0, n)]
     far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
-    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, 1.0, _APART_M / max(far, _APART_M))), n))
-    poses = {part: _pose(scene, data, part) for part in others}
+    looks = np.searchsorted(s, np.arange(0.0, s[-1], _APART_M / max(far, _APART_M)))
+    looks = np.unique(np.append(looks, n))
+    poses = {part: _pose(world, data, part) for part in others}
     obstacles = {part: (scene.boxes[part], T) for part, T in poses.items()}
-    near = _near(moving, obstacles, line, s[looks], NEAR_M if len(held) < 2 else _NEAR_GROUP_M)
-    return _spans(near, looks, n, float(scene.physics.timestep_s))
+    near = _near(moving, obstacles, line, s[looks], near_m if len(held) < 2 else _NEAR_GROUP_M)
+    return _spans(near, looks, n, run_up_s, float(scene.physics.timestep_s))
 
 
 def clear(scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], T: Array) -> bool:
@@ -105,9 +117,9 @@ def _swept(low: Array, high: Array) -> tuple[Array, Array]:
     return np.array([-reach, -reach, low[2]]), np.array([reach, reach, high[2]])
 
 
-def _spans(near: _Flags, looks: Ints, n: int, step_s: float) -> list[_Span]:
+def _spans(near: _Flags, looks: Ints, n: int, run_up_s: float, step_s: float) -> list[_Span]:
     """Stretches that are near, begun earlier by the run-up, as one where little lies between."""
-    run_up, shortest = round(_RUN_UP_S / step_s), round(_SHORTEST_S / step_s)
+    run_up, shortest = round(run_up_s / step_s), round(_SHORTEST_S / step_s)
     spans: list[_Span] = []
     for i in map(int, np.flatnonzero(near)):
         begin, end = int(looks[max(i - 1, 0)]) - run_up, int(looks[min(i + 1, len(looks) - 1)])
@@ -120,15 +132,15 @@ def _spans(near: _Flags, looks: Ints, n: int, step_s: float) -> list[_Span]:
     return spans
 
 
-def _still(scene: Scene, data: Any, parts: Iterable[str]) -> bool:
-    starts = [scene.work.dof[part] for part in parts if part in scene.work.dof]
+def _still(world: World, data: Any, parts: Iterable[str]) -> bool:
+    starts = [world.dof[part] for part in parts if part in world.dof]
     speeds = np.abs(np.array([data.qvel[v : v + 6] for v in starts]).reshape(-1, 6))
     return not len(speeds) or bool(speeds[:, :3].max() < _STILL_M_S and speeds[:, 3:].max() < _STILL_RAD_S)
 
 
-def _pose(scene: Scene, data: Any, part: str) -> Array:
-    if part in scene.work.dof:
-        return part_pose(scene.work, data, part)
-    body, T = scene.work.body[part], np.eye(4)
+def _pose(world: World, data: Any, part: str) -> Array:
+    if part in world.dof:
+        return part_pose(world, data, part)
+    body, T = world.body[part], np.eye(4)
     T[:3, :3], T[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
     return T
