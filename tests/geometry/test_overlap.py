@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import face_area, overlap
+from apo_bench.geometry.overlap import NOTHING, face_area, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.parts import load_part
 
@@ -53,6 +53,18 @@ def test_the_corners_lie_on_the_lower_plane_whatever_the_distance():
     found = overlap(rectangle(0.03, 0.02), pose.at((0, 0, 0.7), (180, 0, 0)), rectangle(0.1, 0.1), EYE)
     assert found.area == pytest.approx(24e-4)
     assert np.abs(found.corners[:, 2]).max() == 0.0
+
+
+def test_a_share_is_what_is_covered_of_the_other_overlap():
+    """A quarter of the wide one lies under the narrow one, which is covered whole."""
+    table = rectangle(0.1, 0.1)
+    wide, narrow = (overlap(rectangle(x, 0.02), OVER, table, EYE) for x in (0.04, 0.01))
+    beside = overlap(rectangle(0.01, 0.02), pose.at((0.08, 0, 0)) @ OVER, table, EYE)
+    assert narrow.share(wide) == pytest.approx(0.25)
+    assert wide.share(narrow) == pytest.approx(1.0)
+    assert beside.share(wide) == 0.0
+    assert NOTHING.share(wide) == 0.0
+    assert wide.share(NOTHING) == 1.0
 
 
 def test_a_strip_across_a_concave_face_leaves_two_pieces():

@@ -7,8 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from shapely import MultiPoint
 
 from apo_bench.assembly.goals import Poses
@@ -18,7 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.solid import Solid
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout, layout_at
 from apo_bench.scenario.scenario import Grasp, Scenario, Site
@@ -271,41 +269,3 @@ def test_everything_is_within_reach(name: str):
     distance = np.linalg.norm(np.array(held)[:, :2, 3] - BASE_M, axis=1)
     assert distance.min() > 0.25
     assert distance.max() < 0.72
-
-
-coordinates = st.floats(-0.1, 0.1)
-turns = st.floats(-180, 180)
-poses = st.builds(pose.at, st.tuples(*[coordinates] * 3), st.tuples(*[turns] * 3))
-
-
-def block(*half: float) -> Solid:
-    return Solid("block", {}, (Box("block", np.zeros(3), np.array(half)),), np.zeros(3), 8 * float(np.prod(half)))
-
-
-@given(poses, poses)
-@settings(max_examples=100, deadline=None)
-def test_intrusion_is_symmetric_and_moves_with_the_pair(T: Array, T_both: Array):
-    a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
-    depth = intrusion(a, np.eye(4), b, T)
-    assert intrusion(b, T, a, np.eye(4)) == pytest.approx(depth, abs=1e-12)
-    assert intrusion(a, T_both, b, T_both @ T) == pytest.approx(depth, abs=1e-9)
-
-
-@given(poses)
-@settings(max_examples=100, deadline=None)
-def test_intrusion_agrees_with_points(T: Array):
-    """A common point well inside both boxes means intrusion; boxes pushed apart by the depth only touch."""
-    a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
-    grid = np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 9)] * 3), axis=-1).reshape(-1, 3)
-    inside = np.abs(pose.apply(pose.inverse(T), grid * a.boxes[0].half)) < 0.95 * b.boxes[0].half
-    depth = intrusion(a, np.eye(4), b, T)
-    if inside.all(axis=1).any():
-        assert depth > 0
-    if depth == 0:
-        assert not inside.all(axis=1).any()
-
-
-@pytest.mark.parametrize(("apart_mm", "depth_mm"), [(19.0, 1.0), (20.0, 0.0), (21.0, 0.0)])
-def test_the_depth_of_two_aligned_blocks(apart_mm: float, depth_mm: float):
-    a = block(0.05, 0.05, 0.01)
-    assert 1e3 * intrusion(a, np.eye(4), a, pose.at((0, 0, 1e-3 * apart_mm))) == pytest.approx(depth_mm, abs=1e-9)

@@ -1,0 +1,100 @@
+"""Thirty small errors that the tests must notice, each of a kind that people make when they change this code.
+
+They were chosen by reading the code, not the tests: a flipped sign, a wrong index, a dropped term, swapped operands, an
+end of a range that is off by one, a missing check. None stops a module from being imported.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Fault(NamedTuple):
+    """One error in one file of the package."""
+
+    file: str
+    """Under `apo_bench`; its first folder is the room whose tests must notice."""
+    before: str
+    """Found exactly once in the file."""
+    after: str
+    what: str
+
+    @property
+    def room(self) -> str:
+        return self.file.split("/")[0]
+
+
+FAULTS = (
+    Fault("geometry/pose.py", "- K / 2 + D * K @ K", "- K / 2 + K @ K", "the logarithm loses a factor"),
+    Fault(
+        "geometry/clearance.py",
+        "box.center + (recede[:, 0] - recede[:, 1]) / 2",
+        "box.center - (recede[:, 0] - recede[:, 1]) / 2",
+        "a box with one fit side recedes to the wrong side",
+    ),
+    Fault("geometry/overlap.py", "area / of.area)", "area / self.area)", "a share of the wrong overlap"),
+    Fault("geometry/intrusion.py", "a[2] * b[0] - a[0]", "a[2] * b[0] + a[0]", "a cross product of edges is none"),
+    Fault("geometry/drop.py", " and low_b[2] < high_a[2])", ")", "what lies above is met on the way down"),
+    Fault("geometry/swept.py", "return max(0.0, at - _SLACK_M)", "return max(0.0, at)", "the slack is kept"),
+    Fault("geometry/symmetry.py", '"nij,mji->nm"', '"nij,mij->nm"', "a turn instead of its inverse"),
+    Fault("geometry/twist.py", "shift[j, k], shift[k, j] = -1.0, 1.0", "shift[j, k] = -1.0", "half of an adjoint"),
+    Fault(
+        "correction/solvers/manifold.py",
+        "(L[:, :, 3:] @ step",
+        "(L[:, :, :3] @ step",
+        "steps are shortened by their shift instead of their turn",
+    ),
+    Fault(
+        "correction/solvers/inequalities.py",
+        "plane[:, 3] -= np.where",
+        "plane[:, 3] += np.where",
+        "planes are shifted to the wrong side",
+    ),
+    Fault("correction/solvers/newton.py", "ca * sg + sa * sb * cg", "ca * sg - sa * sb * cg", "a wrong sign in Eq. 4"),
+    Fault(
+        "correction/posterior.py",
+        "chdtri(free.shape[1], ",
+        "chdtri(known.rank, ",
+        "directions that are fixed for those that are free",
+    ),
+    Fault("correction/consistency.py", "play_m / sqrt(3.0)", "play_m / sqrt(12.0)", "half the play instead of all"),
+    Fault("correction/holding.py", "self.operations[i] if j > k})", "self.operations[i] if j >= k})", "one too many"),
+    Fault("correction/baselines/track.py", "in reversed(range(i, n))", "in range(i, n)", "undone in the wrong order"),
+    Fault(
+        "correction/baselines/penalty.py",
+        "np.sqrt(v / (1 - _SQUARE**t))",
+        "np.sqrt(v / (1 - _MEAN**t))",
+        "Adam's memory of squares is corrected as that of means",
+    ),
+    Fault(
+        "judging/contacts.py",
+        "np.abs((found.corners - T_m[:3, 3]) @ n + plane[3])",
+        "((found.corners - T_m[:3, 3]) @ n + plane[3])",
+        "faces that are inside each other have no gap",
+    ),
+    Fault("judging/finished.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
+    Fault("judging/finished.py", "found.area / true.area", "true.area / found.area", "shares turned over"),
+    Fault("judging/demonstrated.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
+    Fault("judging/judgement.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
+    Fault("judging/verdict.py", "or not self.demonstrated.holds)", "or self.demonstrated.holds)", "the wrong reason"),
+    Fault(
+        "sweeps/dispatch.py",
+        "self._now - job.heard > STARTING_S",
+        "self._now - job.heard > self._limit_s",
+        "a worker that compiles has the limit of a trial",
+    ),
+    Fault("sweeps/dispatch.py", "min(now - self._looked, _LONGEST_TURN_S)", "now - self._looked", "sleep counts"),
+    Fault(
+        "sweeps/grid.py", "<= seed < grid.seed + grid.trials]", "<= seed <= grid.seed + grid.trials]", "one too many"
+    ),
+    Fault("sweeps/worker.py", 'row["failure_stage"] == "worker"', "False", "a lost trial is judged by its time again"),
+    Fault("sweeps/progress.py", "(total - ended) / ended", "total / ended", "the time left does not fall"),
+    Fault("assembly/topology.py", "Term(k), *inverted(before)", "Term(k), *before", "a carried part goes twice"),
+    Fault(
+        "observation/models/anisotropic.py",
+        "_stretch(sight, IN_IMAGE, OUT_OF_IMAGE)",
+        "_stretch(sight, OUT_OF_IMAGE, IN_IMAGE)",
+        "turns are worst about the line of sight",
+    ),
+    Fault("statistics/paired.py", "np.std(x, ddof=1)", "np.std(x)", "the spread of a sample is that of all"),
+)

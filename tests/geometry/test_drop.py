@@ -1,0 +1,38 @@
+"""How far parts would fall: until the lowest corner touches, and past what is beside or below."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.drop import TOUCH_M, drop
+from apo_bench.geometry.solid import Box, Solid
+
+
+def cuboid(*half: float) -> Solid:
+    return Solid("cuboid", {}, (Box("cuboid", np.zeros(3), np.array(half)),), np.zeros(3), 8 * float(np.prod(half)))
+
+
+SLAB, CUBE = cuboid(0.4, 0.4, 0.001), cuboid(0.02, 0.02, 0.02)
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-5, 0.0123, 1.5])
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 30), (45, 0, 0), (20, 30, 40)])
+def test_a_cube_falls_until_its_lowest_corner_touches(height: float, turn: tuple[float, float, float]) -> None:
+    T = pose.at((0.05, 0.03, 0.0), turn)
+    T[2, 3] = 0.001 + height + 0.02 * np.abs(T[2, :3]).sum()
+    assert drop(CUBE, T, SLAB, np.eye(4)) == pytest.approx(height, abs=3 * TOUCH_M)
+
+
+@pytest.mark.parametrize("at", [(0.5, 0.0, 0.1), (0.42, 0.0, 0.1), (0.0, 0.0, -0.1)])
+def test_what_is_beside_or_below_is_passed_by(at: tuple[float, float, float]) -> None:
+    """Also a wall along which the cube slides down."""
+    assert drop(CUBE, pose.at(at), SLAB, np.eye(4)) == np.inf
+
+
+def test_a_castle_stands_in_the_shadow_of_another_one_and_falls_past_it() -> None:
+    """Boxes around both lie over one another, the cubes do not."""
+    T, other = pose.at((0.0, 0.0, 0.1), (0, 0, 45)), pose.at((0.035, 0.035, 0.0), (0, 0, 45))
+    assert drop(CUBE, T, CUBE, other) == np.inf
+    assert drop(CUBE, T, CUBE, pose.at((0.025, 0.025, 0.0), (0, 0, 45))) == pytest.approx(0.06, abs=3 * TOUCH_M)

@@ -1,0 +1,91 @@
+"""Boxes that are swept along a line: against samples of the way, points in common, and cases by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.intrusion import intrusion_depths
+from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.swept import Posed, exit_distance, is_way_free, overlap_intervals
+from tests import scenes
+
+X, Y, Z = np.eye(3)
+
+
+def boxes(rng: np.random.Generator) -> Posed:
+    """One to three boxes of some centimetres, turned and shifted at random."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.random(random_state=rng).as_matrix() if rng.integers(3) else np.eye(3)
+    T[:3, 3] = rng.uniform(-0.1, 0.1, 3)
+    many = [Box(f"b{i}", rng.uniform(-0.03, 0.03, 3), rng.uniform(0.005, 0.03, 3)) for i in range(rng.integers(1, 4))]
+    return Posed(tuple(many), T)
+
+
+def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
+    rng, met = np.random.default_rng(1), 0
+    for _ in range(250):
+        a, b, slack = boxes(rng), boxes(rng), rng.choice([5e-5, -5e-5])
+        way = rng.standard_normal(3) if rng.integers(2) else np.eye(3)[rng.integers(3)]
+        way = way / np.linalg.norm(way)
+        s = np.linspace(-0.3, 0.3, 301)
+        deep = intrusion_depths(a.boxes, a.T[:3, :3], a.T[:3, 3] + np.outer(s, way), b.boxes, b.T) - slack
+        spans = overlap_intervals(a, way, b, slack)
+        inside = ((s[:, None] > spans[:, 0]) & (s[:, None] < spans[:, 1])).any(axis=1)
+        clear = np.abs(deep) > 1e-9
+        np.testing.assert_array_equal(inside[clear], deep[clear] > 0.0)
+        met += bool(inside.any())
+    assert met > 40
+
+
+def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
+    """The same without separating axes: by a programme for a point in both boxes."""
+    rng, met = np.random.default_rng(2), 0
+    for _ in range(60):
+        a, b = boxes(rng), boxes(rng)
+        a, b = Posed(a.boxes[:1], a.T), Posed(b.boxes[:1], b.T)
+        way = (b.T - a.T)[:3, 3] + rng.uniform(-0.02, 0.02, 3)
+        way = way / np.linalg.norm(way)
+        spans = overlap_intervals(a, way, b, 0.0)
+        for s in rng.uniform(0.0, 0.3, 4):
+            moved = Posed(a.boxes, pose.at(s * way) @ a.T)
+            if np.abs(spans - s).min(initial=1.0) > 1e-6:
+                assert common_point(moved, b) == bool(((spans[:, 0] < s) & (s < spans[:, 1])).any())
+                met += common_point(moved, b)
+    assert met > 20
+
+
+def common_point(a: Posed, b: Posed) -> bool:
+    A, limits = [], []
+    for posed in (a, b):
+        (box,) = posed.boxes
+        R, middle = posed.T[:3, :3], posed.T[:3, :3] @ box.center + posed.T[:3, 3]
+        A += [R.T, -R.T]
+        limits += [box.half + R.T @ middle, box.half - R.T @ middle]
+    scale = 100.0
+    found = linprog(np.zeros(3), A_ub=np.concatenate(A), b_ub=scale * np.concatenate(limits), bounds=[(None, None)] * 3)
+    return bool(found.status == 0)
+
+
+def posed(solid: Solid, T: Array) -> Posed:
+    return Posed(solid.boxes, T)
+
+
+def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
+    stick, cube = posed(scenes.stick(), scenes.mm(0, 0, 25)), posed(scenes.cube(), scenes.mm(0, 0, 25))
+    assert is_way_free([stick], X, 0.5, [cube])
+    assert is_way_free([stick], -X, 0.5, [cube])
+    assert not is_way_free([stick], Z, 0.05, [cube])
+    assert not is_way_free([stick], (X + 0.01 * Y) / np.linalg.norm(X + 0.01 * Y), 0.5, [cube])
+    assert exit_distance([stick], X, [cube]) == pytest.approx(0.135, abs=1e-9)
+    assert exit_distance([stick], X, []) == 0.0
+    second = posed(scenes.cube(), scenes.mm(60, 0, 25))
+    assert exit_distance([stick], X, [cube, second]) == pytest.approx(0.195, abs=1e-9)
+    assert exit_distance([stick], -X, [cube, second]) == pytest.approx(0.135, abs=1e-9)
+    beyond = posed(scenes.block(), scenes.mm(300, 0, 25))
+    assert is_way_free([stick], X, 0.1649, [cube, beyond])
+    assert not is_way_free([stick], X, 0.1652, [cube, beyond])
