@@ -134,7 +134,7 @@ def tested(place: Path, room: str) -> Ran:
         raise RuntimeError(
             f"the tests of {room} ended with exit code {ended.returncode}:\n{ended.stdout}{ended.stderr}"
         )
-    by = re.search(r"^(?:FAILED|ERROR) (\S+)", ended.stdout, re.MULTILINE)
+    by = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", ended.stdout, re.MULTILINE)
     return Ran(not ended.returncode, by[1] if by else ended.stdout.splitlines()[-1], seconds)
 
 

@@ -16,7 +16,7 @@ from apo_bench.assembly.reached import Reached
 from apo_bench.geometry import pose
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import FAULTS
-from apo_bench.judging.verdict import judge
+from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.records.outcomes import CODES
 from apo_bench.records.thresholds import Criteria, Thresholds
 from tests import scenes
@@ -433,6 +433,19 @@ def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:
         found = judge(scene.assembly, reached, scene.goals, Criteria(Thresholds(), CLEARANCE_MM, meaning))
         assert (found.success, found.as_demonstrated) == (right, False)
         assert found.rests_on.code == ("ok" if right else "gap")
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("demonstrated", [True, False])
+def test_the_reason_is_that_of_the_rule_that_decides(finished: bool, demonstrated: bool) -> None:
+    """Where the stricter rule is asked for, it is the reason unless only the finished assembly is wrong."""
+    good, bad = verdict(TOWER(), []), verdict(TOWER(), [shift("castle2", 2, 0, 6, 0)])
+    rules = ((good if finished else bad).finished, (good if demonstrated else bad).demonstrated)
+    assert [rule.holds for rule in rules] == [finished, demonstrated]
+    assert Verdict("assembled", *rules).rests_on is rules[0]
+    strict = Verdict("as_demonstrated", *rules)
+    assert strict.rests_on is (rules[0] if demonstrated and not finished else rules[1])
+    assert strict.rests_on.holds == strict.success == (finished and demonstrated)
 
 
 def test_a_symmetry_is_chosen_once_for_a_part() -> None:
