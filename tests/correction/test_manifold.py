@@ -13,7 +13,7 @@ from apo_bench.assembly.equations import Equations, equations
 from apo_bench.assembly.topology import Operation
 from apo_bench.correction.posterior import jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.manifold import STEP, NearestGoals, nearest_goals
+from apo_bench.correction.solvers.manifold import LARGEST_TURN, STEP, NearestGoals, nearest_goals, shortened_step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes
@@ -57,6 +57,21 @@ def jacobian(system: CompactEquations, found: NearestGoals) -> Array:
 def drift(J: Array, z: Array, directions: int) -> float:
     """Length of what z has along directions that the contacts leave free."""
     return float(np.linalg.norm(np.linalg.svd(J)[2][directions:] @ z))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_is_shortened_by_how_far_it_turns_a_goal_and_not_by_how_far_it_shifts_it(seed: int) -> None:
+    """Of two observations each is shortened by itself; metres do not count."""
+    rng = np.random.default_rng(seed)
+    L = np.stack([crooked(3, rng), crooked(3, rng)])
+    step = np.linalg.solve(L, rng.standard_normal((2, 3, 6, 1)))[..., 0]
+    for turned in (2.0 * LARGEST_TURN, 0.5 * LARGEST_TURN):
+        twist = (L @ step[..., None])[..., 0]
+        far = np.linalg.norm(twist[..., 3:], axis=-1).max(axis=1)
+        asked = step * np.array([turned, 0.1 * LARGEST_TURN])[:, None, None] / far[:, None, None]
+        made = shortened_step(asked.reshape(2, -1), L).reshape(2, 3, 6)
+        assert_allclose(made[0], asked[0] * min(1.0, LARGEST_TURN / turned), rtol=1e-12)
+        assert_array_equal(made[1], asked[1])
 
 
 @pytest.mark.parametrize("name", RANKS)

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,10 +29,6 @@ HOPELESS = 40.0
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     return build_scene(load_scenario("stick_on_castles"), grasp="weld")
-
-
-def by_seed_and_method(rows: list[dict[str, Any]]) -> list[str]:
-    return sorted(json.dumps(row) for row in rows)
 
 
 def test_a_demonstration_is_the_same_after_others(scene: Scene) -> None:
@@ -62,33 +57,31 @@ def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> 
     assert run_trial(spec, build_scene(load_scenario("stick_on_castles"), grasp="weld")) == first
 
 
-def test_rows_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
-    """Here, and in 1 and 4 processes: the same lines, byte for byte."""
-    spec = SweepSettings(("stick_on_castles",), (HOPELESS,), (1.0,), ("none", "paper"), trials=4, grasps=("weld",))
+@pytest.mark.slow
+def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
+    """Here, one scenario after the other, and in 3 processes: the same lines, byte for byte, whole replays too.
+
+    That 1 and 4 processes give the same, also where correctors misbehave, see `tests/sweeps/test_local.py`.
+    """
+    methods, replayed = ("none", "paper"), 0.5
+    grids = (
+        SweepSettings(("stick_on_castles",), (HOPELESS,), (1.0,), methods, trials=4),
+        SweepSettings(("block_on_block", "stick_on_castles"), (replayed,), (1.0,), methods, trials=1, seed=21),
+    )
     written = {}
-    for workers in (None, 1, 4):
+    for workers in (None, 3):
         folder = tmp_path / str(workers)
-        rows = run_sweep(spec, folder, workers=workers)
+        rows = run_sweep(grids, folder, workers=workers)
         assert rows == read_rows(folder)
         written[workers] = sorted((folder / "trials.jsonl").read_bytes().splitlines())
-    assert len(written[None]) == 8
-    assert written[None] == written[1] == written[4]
-
-
-@pytest.mark.slow
-def test_whole_replays_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
-    """Here, one scenario after the other, and in a process for each."""
-    scenarios, methods = ("stick_in_tower", "stick_on_castles"), ("none", "paper")
-    spec = SweepSettings(scenarios, levels=(0.5,), careless=(1.0,), methods=methods, trials=1, seed=21)
-    here = run_sweep(spec, tmp_path / "here")
-    two = run_sweep(spec, tmp_path / "two", workers=2)
-    assert len(here) == 4
-    assert by_seed_and_method(here) == by_seed_and_method(two)
+    assert len(written[None]) == 8 + 4
+    assert written[None] == written[3]
+    assert sum(row["level"] == replayed and row["sim_seconds"] > 1.0 for row in rows) == 4
     alone = run_trial(
-        TrialSettings("stick_in_tower", level_mm=0.5, level_deg=0.5, method="paper", seed=21),
-        build_scene(load_scenario("stick_in_tower")),
+        TrialSettings("stick_on_castles", level_mm=replayed, level_deg=replayed, method="paper", seed=21),
+        build_scene(load_scenario("stick_on_castles")),
     )
-    assert alone in two
+    assert alone in rows
 
 
 @pytest.mark.slow
@@ -96,7 +89,7 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
     out = tmp_path / "run"
     command = [
         *("sweep", "stick_on_castles", "--levels", "0,1", "--careless", "1", "--methods", "none,paper"),
-        *("--trials", "3", "--grasp", "weld", "--workers", "2", "--out", str(out)),
+        *("--trials", "2", "--grasp", "weld", "--workers", "2", "--out", str(out)),
     ]
     process = subprocess.Popen(
         [sys.executable, "-m", "apo_bench.cli.app", *command],
@@ -116,9 +109,9 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
     assert complaint.startswith("apo-bench: interrupted")
     assert "Traceback" not in complaint
     left = read_rows(out)
-    assert 0 < len(left) < 12
+    assert 0 < len(left) < 8
     assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
     assert main(command) == 0
     rows = read_rows(out)
     assert rows[: len(left)] == left
-    assert len({json.dumps(row) for row in rows}) == 12
+    assert len({json.dumps(row) for row in rows}) == 8
