@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import NO_RESULT, check_writable
-from apo_bench.cli.setting_options import CorrectorLimit, ScenarioArgument, takes, trial_options
+from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import interrupted
 from apo_bench.io.output import redirect_output
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -31,6 +31,7 @@ def replay(
         float | None, typer.Option(metavar="SECONDS", help="Run it in a process of its own, as sweeps do: ended then.")
     ] = None,
     corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
+    cache: CacheFolder = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
     **asked: Any,
 ) -> None:
@@ -52,6 +53,7 @@ def replay(
         video=video,
         limit_s=trial_limit,
         corrector_limit_s=corrector_limit,
+        cache=cache,
     )
     try:
         with redirect_output(as_json):

@@ -19,6 +19,14 @@ CorrectorLimit = Annotated[
     float,
     typer.Option(metavar="SECONDS", help="A corrector given as package.module:name that takes longer has failed."),
 ]
+CacheFolder = Annotated[
+    Path | None,
+    typer.Option(
+        parser=path_given,
+        metavar="<path>",
+        help="Keep demonstrations in this folder, for the next time; results are the same.",
+    ),
+]
 Command = TypeVar("Command", bound=Callable[..., None])
 
 

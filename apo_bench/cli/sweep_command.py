@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import cores, path_given
-from apo_bench.cli.setting_options import CorrectorLimit, axis_option, read_axis, sweep_options, takes
+from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, axis_option, read_axis, sweep_options, takes
 from apo_bench.errors import InputError
 from apo_bench.records.asked import in_python
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -71,6 +71,7 @@ def sweep(
         float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
     ] = 600.0,
     corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
+    cache: CacheFolder = None,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
     **asked: Any,
@@ -94,6 +95,7 @@ def sweep(
             address=address,
             command=command,
             salt_file=salt_file,
+            cache=cache,
         )
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error

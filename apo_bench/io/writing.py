@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import stat
 from collections.abc import Iterable
 from pathlib import Path
@@ -31,6 +32,22 @@ def to_write(path: Path, mode: str = "wb", buffering: int = -1) -> IO[Any]:
     check_target(path)
     text = {} if "b" in mode else {"encoding": "utf-8", "errors": "replace", "newline": ""}
     return open(path, mode, buffering, opener=_unlinked, **text)  # type: ignore[call-overload]
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file that only its owner can read, all of it or nothing, in place of whatever file stands there.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _flag("O_CLOEXEC")
+    try:
+        with os.fdopen(os.open(beside, flags, 0o600), "w", encoding="utf-8", newline="") as whole:
+            whole.write(text)
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def check_target(path: Path) -> None:

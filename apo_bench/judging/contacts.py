@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.overlap import Overlap, overlap
+from apo_bench.geometry.solid import Face
 from apo_bench.records.thresholds import Thresholds
 
 Moment = Literal["made", "end"]
@@ -95,7 +97,15 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
 def face_overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
     """The overlap of the two faces of a contact; nothing, if they do not look at each other."""
     m, e = contact
-    return overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part])
+    at = (np.ascontiguousarray(poses[end.part], dtype=np.float64).tobytes() for end in contact)
+    return _overlap(assembly.face(m), assembly.face(e), *at)
+
+
+@lru_cache(maxsize=512)
+def _overlap(m: Face, e: Face, at_m: bytes, at_e: bytes) -> Overlap:
+    """Remembered, since all trials of a seed share the true ones: two megabytes at most."""
+    T_m, T_e = (np.frombuffer(at).reshape(4, 4) for at in (at_m, at_e))
+    return overlap(m, T_m, e, T_e)
 
 
 def _when(found: ContactVerdict) -> str:

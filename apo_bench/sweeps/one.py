@@ -29,6 +29,7 @@ from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.local.alone import Say, run_alone
 from apo_bench.sweeps.worker import lost, trial_row
 from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
 from apo_bench.trial.trial import MEASURED, noise_of, run_measured
@@ -53,6 +54,8 @@ class Request:
     """Wall time that a corrector named as `module:name` may take."""
     limit_s: float | None = None
     """Wall time; what has one runs in a process of its own, as in a sweep."""
+    cache: Path | None = None
+    """A folder where demonstrations are kept; the row is the same with and without it."""
 
 
 def run_one(request: Request) -> Row:
@@ -63,6 +66,8 @@ def run_one(request: Request) -> Row:
     """
     scenario = load_scenario(request.scenario)
     spec = _spec(request, scenario.clearance_mm)
+    if request.cache is not None:
+        KeptDemonstrations(request.cache)
     if request.limit_s is not None:
         return run_alone(partial(_run, request, spec), request.limit_s, partial(_lost, request, spec, scenario))
     found: list[Row] = []
@@ -150,7 +155,11 @@ def look(spec: TrialSettings, scene: Scene, recording: Recording) -> Observation
 
 
 def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
-    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    recording = (
+        record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+        if request.cache is None
+        else KeptDemonstrations(request.cache).recording(spec, scene)
+    )
     if request.save_observation:
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
@@ -191,7 +200,8 @@ DRAWN = (LEVEL.name, "level_mm", "level_deg", "careless", "noise", "relations", 
 def _refuse_contradictions(request: Request, asked: Mapping[str, Any]) -> None:
     may_be = asked.get("relations") in ("given", *RECOGNISED)
     given = [name for name in DRAWN if name in asked and not (name == "relations" and may_be)]
-    for name in (*given, *["save_observation"] * (request.save_observation is not None)):
+    more = [name for name in ("save_observation", "cache") if getattr(request, name) is not None]
+    for name in (*given, *more):
         raise InputError(
             f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
         )

@@ -28,6 +28,7 @@ from apo_bench.sweeps.stopping import Check, listening
 from apo_bench.sweeps.worker import Timing, in_time
 from apo_bench.trial.code_version import code_files
 from apo_bench.trial.fingerprint import content_pieces, spec_hash
+from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 
 _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
@@ -44,6 +45,7 @@ def run_sweep(
     address: str | None = None,
     command: str = "",
     salt_file: str | Path | None = None,
+    cache: str | Path | None = None,
 ) -> list[Row]:
     """Run every trial of a sweep that has no row yet.
 
@@ -62,6 +64,8 @@ def run_sweep(
         command: What to note in `run.json` as the command line.
         salt_file: Holds the salt of the trials, and is made if it is not there; None for trials that everybody can
             draw.
+        cache: A folder where demonstrations are kept for other sweeps, made if it is not there. The rows are the same
+            with and without it.
 
     Returns:
         All rows of the folder, in the order in which they ended.
@@ -77,7 +81,7 @@ def run_sweep(
     check_grids(grids)
     names = names_of(grids)
     loaded, arm = _checked(names, grids, corrector_limit_s)
-    lock = environment_lock(names, loaded, arm.mjcf, corrector_limit_s)
+    lock = replace(environment_lock(names, loaded, arm.mjcf, corrector_limit_s), cache=_kept_in(cache))
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
@@ -95,6 +99,11 @@ def run_sweep(
             execute = _executor(backend, address)
             execute(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check)
         return store.rows()
+
+
+def _kept_in(cache: str | Path | None) -> str | None:
+    """The folder of demonstrations, as every worker finds it."""
+    return None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
 
 
 def _executor(backend: str, address: str | None) -> Executor:

@@ -27,6 +27,7 @@ from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message
 from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 from apo_bench.trial.row import head, result
 from apo_bench.trial.scene import scene_key, scene_of
 from apo_bench.trial.stages import Recording, record_demonstration
@@ -48,13 +49,15 @@ class Worker:
         number: Tells workers apart in `timing.jsonl`.
 
         Raises:
-            InputError: Packages of other versions are installed here.
+            InputError: Packages of other versions are installed here, or demonstrations cannot be kept where they
+                should be.
         """
         lock.check_versions()
         self._number = number
         self._lock = lock
         self._scenes: dict[tuple[Any, ...], tuple[Scene, str]] = {}
         self._own = OwnCorrectors(lock.corrector_limit_s)
+        self._kept = None if lock.cache is None else KeptDemonstrations(lock.cache)
 
     def run(self, unit: Unit, stopped: Callable[[], bool] = lambda: False) -> Iterator[Message]:
         """Run the trials of a unit in their order: `began` and `row` for each, as in `messages`.
@@ -80,7 +83,7 @@ class Worker:
             start = time.perf_counter()
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
-                demonstrations[key] = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+                demonstrations[key] = self._recording(spec, scene)
             shown = time.perf_counter()
             row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
             ended = time.perf_counter()
@@ -89,6 +92,11 @@ class Worker:
     def close(self) -> None:
         """End the processes of correctors."""
         self._own.close()
+
+    def _recording(self, spec: TrialSettings, scene: Scene) -> Recording:
+        if self._kept is not None:
+            return self._kept.recording(spec, scene)
+        return record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
 
     def _method(self, name: str) -> Any:
         """The corrector; if it could be imported when the sweep began and cannot now, that is its own failure."""

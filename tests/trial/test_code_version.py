@@ -17,7 +17,7 @@ from apo_bench.trial.fingerprint import content_hash, own_content, spec_hash
 PACKAGE = Path(code_version.__file__).parents[1]
 
 
-def imported(file: Path) -> set[str]:
+def imported(file: Path, *, tables: bool = True) -> set[str]:
     """What a file imports, anywhere in it, and what its tables of names point to."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -25,12 +25,17 @@ def imported(file: Path) -> set[str]:
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("apo_bench."):
+        elif (
+            tables
+            and isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and node.value.startswith("apo_bench.")
+        ):
             found.add(node.value.partition(":")[0])
     return {name for name in found if name.startswith("apo_bench")}
 
 
-def reached(start: Path) -> set[str]:
+def reached(start: Path, *, tables: bool = True) -> set[str]:
     """Every file of the package that a file can come to import, relative to it; the front door leads everywhere."""
     todo, seen = [start], {PACKAGE / "__init__.py"}
     while todo:
@@ -38,7 +43,7 @@ def reached(start: Path) -> set[str]:
         if file in seen:
             continue
         seen.add(file)
-        for name in imported(file):
+        for name in imported(file, tables=tables):
             parts = name.split(".")[1:]
             for i in range(len(parts) + 1):
                 place = PACKAGE.joinpath(*parts[:i])

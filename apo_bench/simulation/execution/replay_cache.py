@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, TypeVar, final
 
 import mujoco
 import numpy as np
@@ -19,7 +19,12 @@ from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import awaken
 
+_MOST = 4096
+"""States, and results, that are kept, 5 kB each; the oldest go first."""
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+_Kept = TypeVar("_Kept")
 
 
 class SavedState(NamedTuple):
@@ -48,7 +53,7 @@ class ReplayCache:
         return self._ended.get(mark)
 
     def end(self, mark: bytes, result: ReplayResult) -> None:
-        self._ended[mark] = result
+        _keep(self._ended, mark, result)
 
     def keep(
         self,
@@ -64,9 +69,9 @@ class ReplayCache:
             model, data = robot.model, robot.data
             state = np.zeros(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
-            self._kept[mark] = SavedState(
-                state, data.sensordata.copy(), model.eq_data.copy(), robot.memory(), grip, tuple(after), tuple(timeline)
-            )
+            felt, welds = data.sensordata.copy(), model.eq_data.copy()
+            saved = SavedState(state, felt, welds, robot.memory(), grip, tuple(after), tuple(timeline))
+            _keep(self._kept, mark, saved)
 
     def resume(self, marks: Sequence[bytes], robot: Robot) -> tuple[int, SavedState | None]:
         """Take up the furthest state that was kept; returns how many of the marks lie behind it, and what was kept."""
@@ -80,6 +85,12 @@ class ReplayCache:
                 robot.remember(kept.robot)
                 return i, kept
         return 0, None
+
+
+def _keep(found: dict[bytes, _Kept], mark: bytes, what: _Kept) -> None:
+    found[mark] = what
+    if len(found) > _MOST:
+        del found[next(iter(found))]
 
 
 def cache_keys(scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]]) -> list[bytes]:
