@@ -22,6 +22,7 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, product, simplified
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.solid import Face
 
 
@@ -135,31 +136,70 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
         goals: (n, 4, 4), where the vertices are taken, world frame, [m].
         free: Operations counted from 0; None stands for every contact, in the order of `assembly.relations()`.
     """
-    parts = tuple(assembly.solids)
-    constants = np.array([start[part] for part in parts]).reshape(-1, 4, 4)
-    chosen = _words(assembly, parts)
-    stack = np.concatenate([constants, goals])
-    flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
-    vertices = [_vertices(flats[c.manipulated], flats[c.environment], word, stack) for c, _, word in chosen]
-    contact = np.repeat(np.arange(len(chosen)), [len(v) for v in vertices]).astype(np.intp)
-    width = max((len(word) for _, _, word in chosen), default=0)
-    padded = [[*word, *[(len(stack), False)] * (width - len(word))] for _, _, word in chosen]
-    table = np.array(padded, dtype=np.intp).reshape(len(chosen), width, 2)
+    known = pattern(assembly)
+    constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
+    stack, vertex = np.concatenate([constants, goals]), np.array(known.corners)
+    for c in np.flatnonzero(known.laid):
+        rows = slice(known.begin[c], known.begin[c + 1])
+        corners = pose.apply(pose.inverse(product(known.words[c], stack)), vertex[rows, :3])
+        n = known.onto[c]
+        vertex[rows, :3] = corners - np.outer(corners @ n[:3] + n[3], n[:3])
     system = Equations(
-        start=constants,
-        letters=table[..., 0],
-        inverse=table[..., 1].astype(np.bool_),
-        made=np.array([made for _, made, _ in chosen], dtype=np.intp),
-        contact=contact,
-        plane=np.array([flats[c.manipulated].plane for c, _, _ in chosen]).reshape(-1, 4)[contact],
-        vertex=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in vertices)]),
+        constants, known.letters, known.inverse, known.made, known.contact, known.plane[known.contact], vertex
     )
     return system if free is None else system.among(system.containing(free))
 
 
-def lies_on(assembly: Assembly, contact: Contact) -> bool:
-    """Whether the vertices are the corners of the manipulated face, so that they depend on the goals."""
-    return _smaller(_flat(assembly.face(contact.manipulated)), _flat(assembly.face(contact.environment)))
+@final
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """What the equations of an assembly have in common, wherever its parts are: c contacts with m vertices."""
+
+    words: tuple[ODL, ...]
+    """D_a^-1 D_b of each contact, simplified; term k stands for the start of part k, then for the operations."""
+    letters: NDArray[np.intp]
+    """(c, w), as `Equations` has it; so are `inverse`, `made` and `contact`."""
+    inverse: NDArray[np.bool_]
+    made: NDArray[np.intp]
+    contact: NDArray[np.intp]
+    begin: NDArray[np.intp]
+    """(c + 1,): contact i has the vertices begin[i] .. begin[i + 1] - 1."""
+    plane: Array
+    """(c, 4): n of Eq. 1, frame of the manipulated part."""
+    onto: Array
+    """(c, 4): the plane of the other face, frame of the environment part."""
+    corners: Array
+    """(m, 4): the corners of the smaller face, homogeneous, in the frame of its own part."""
+    laid: NDArray[np.bool_]
+    """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
+
+
+@remembered
+def pattern(assembly: Assembly) -> Pattern:
+    """What the equations of an assembly have in common."""
+    parts = tuple(assembly.solids)
+    chosen = _words(assembly, parts)
+    c, width = len(chosen), max((len(word) for _, _, word in chosen), default=0)
+    padding = (len(parts) + len(assembly), False)
+    padded = [[*word, *[padding] * (width - len(word))] for _, _, word in chosen]
+    table = np.array(padded, dtype=np.intp).reshape(c, width, 2)
+    flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
+    pairs = [(flats[contact.manipulated], flats[contact.environment]) for contact, _, _ in chosen]
+    laid = [_smaller(a, b) for a, b in pairs]
+    corners = [(a if own else b).corners for (a, b), own in zip(pairs, laid, strict=True)]
+    begin = np.cumsum([0, *map(len, corners)])
+    return Pattern(
+        words=tuple(word for _, _, word in chosen),
+        letters=np.array(table[..., 0]),
+        inverse=table[..., 1].astype(np.bool_),
+        made=np.array([made for _, made, _ in chosen], dtype=np.intp),
+        contact=np.repeat(np.arange(c), np.diff(begin)).astype(np.intp),
+        begin=begin.astype(np.intp),
+        plane=np.array([a.plane for a, _ in pairs]).reshape(-1, 4),
+        onto=np.array([b.plane for _, b in pairs]).reshape(-1, 4),
+        corners=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in corners)]),
+        laid=np.array(laid, dtype=np.bool_),
+    )
 
 
 def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:
@@ -200,15 +240,6 @@ def _flat(face: Face) -> _Flat:
     size = math.sqrt(twice @ twice)
     n = twice / size
     return _Flat(corners, np.append(n, -(corners @ n).sum() / len(corners)), size / 2)
-
-
-def _vertices(manipulated: _Flat, environment: _Flat, word: ODL, stack: Array) -> Array:
-    """The contact vertices of a pair of faces, (k, 3), frame of the environment part, [m]."""
-    if not _smaller(manipulated, environment):
-        return environment.corners
-    corners = pose.apply(pose.inverse(product(word, stack)), manipulated.corners)
-    n = environment.plane
-    return corners - np.outer(corners @ n[:3] + n[3], n[:3])
 
 
 def _smaller(manipulated: _Flat, environment: _Flat) -> bool:

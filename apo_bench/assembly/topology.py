@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.records import copyable
+from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.solid import Face, Solid
 
 
@@ -134,9 +135,12 @@ class Assembly:
         """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play."""
         return self.gaps.get(contact, Gap()).interval(play_m if self.is_fit(contact) else 0.0)
 
+    @remembered
     def intervals(self, play_m: float) -> Array:
         """The least and the largest distance of every contact, (c, 2), in the order of `relations()`, [m]."""
-        return np.array([self.interval(relation.contact, play_m) for relation in self.relations()]).reshape(-1, 2)
+        every = np.array([self.interval(relation.contact, play_m) for relation in self.relations()]).reshape(-1, 2)
+        every.flags.writeable = False
+        return every
 
     def first(self, n: int) -> Assembly:
         """What is known after n operations: the same parts, no later operation."""
@@ -159,6 +163,7 @@ class Assembly:
             current[operation.main] = (Term(k),)
             yield current
 
+    @remembered
     def relations(self) -> tuple[Relation, ...]:
         """Every contact ever made, in the order of the operations."""
         moved: dict[str, list[int]] = {}
@@ -171,6 +176,7 @@ class Assembly:
             for contact in operation.contacts
         )
 
+    @remembered
     def arcs(self) -> tuple[tuple[int, ...], ...]:
         """The contacts of R1, R2, ..: all that one operation makes between one pair of parts (Section 3.1).
 
@@ -189,6 +195,8 @@ class Assembly:
         """
         relations = self.relations()
         kept = np.ones(len(relations), dtype=np.bool_)
+        if not left_out:
+            return kept
         for i, arc in enumerate(self.arcs(), start=1):
             for j in arc:
                 kept[j] = not {f"R{i}", f"R{i}: {relations[j].contact}"}.intersection(left_out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -38,20 +39,29 @@ def check_observations(observations: Sequence[Any]) -> None:
             raise InputError(
                 f"{_name(observations, 0)} has no start of the part '{part}'; state where every part starts."
             )
-    starts = np.array([first.start[part] for part in first.assembly.solids]).reshape(-1, 4, 4)
-    _check_poses(starts, lambda j: f"the start of '{list(first.assembly.solids)[j]}' in {_name(observations, 0)}")
-    _check_poses(
-        np.concatenate([one.goals for one in observations]), lambda j: f"the goal of {_operation(observations, j)}"
-    )
+    parts = list(first.assembly.solids)
+    starts = np.array([first.start[part] for part in parts]).reshape(-1, 4, 4)
+
+    def name(j: int) -> str:
+        if j < len(parts):
+            return f"the start of '{parts[j]}' in {_name(observations, 0)}"
+        return f"the goal of {_operation(observations, j - len(parts))}"
+
+    _check_poses(np.concatenate([starts, *(one.goals for one in observations)]), name)
     C = np.concatenate([one.covariance for one in observations])
-    off, size = (np.abs(M).max(axis=(1, 2), initial=0.0) for M in (C - np.swapaxes(C, 1, 2), C))
-    for j in map(int, np.flatnonzero(off > _ASYMMETRY * size)):
+    off = C - np.swapaxes(C, 1, 2)
+    if not off.any():
+        return
+    lopsided = np.abs(off).max(axis=(1, 2), initial=0.0) > _ASYMMETRY * np.abs(C).max(axis=(1, 2), initial=0.0)
+    for j in map(int, np.flatnonzero(lopsided)):
         raise InputError(
             f"the covariance of {_operation(observations, j)} is not symmetric; entry (i, j) must equal entry (j, i)."
         )
 
 
 def _check_lengths(one: Observation, name: str) -> None:
+    if type(one.gap_m) is type(one.play_m) is float and 0.0 < one.gap_m < inf and 0.0 <= one.play_m < inf:
+        return
     for field, x, low in (("gap_m", one.gap_m, "above"), ("play_m", one.play_m, "from")):
         number = isinstance(x, float | int | np.floating | np.integer) and not isinstance(x, bool)
         if not number or not np.isfinite(x) or x < 0.0 or (low == "above" and x == 0.0):
@@ -60,11 +70,14 @@ def _check_lengths(one: Observation, name: str) -> None:
 
 def _check_poses(T: Array, name: Callable[[int], str]) -> None:
     """Poses (p, 4, 4); `name` says which one is number j."""
-    for j in map(int, np.flatnonzero(~is_rigid(T))):
+    rigid, far = is_rigid(T), (np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1)
+    if rigid.all() and not far.any():
+        return
+    for j in map(int, np.flatnonzero(~rigid)):
         raise InputError(
             f"{name(j)} is not a rigid pose; give a rotation matrix, a position [m] and the last row (0, 0, 0, 1)."
         )
-    for j in map(int, np.flatnonzero((np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1))):
+    for j in map(int, np.flatnonzero(far)):
         raise InputError(
             f"{name(j)} has a position of {np.abs(T[j, :3, 3]).max():g} m; numbers of at most {FARTHEST_M:g} are "
             "allowed, so check the unit."

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Suspect
+from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.remembered import remembered
 
 TEST_LEVEL = 0.01
 """False alarms that are accepted."""
@@ -73,14 +75,15 @@ def _ranked(
     return tuple(sorted(found, key=lambda s: (-s.p_value, (s.chi_square - s.freedom) / sqrt(2 * s.freedom + 1))))
 
 
-def fit_deviation(fits: NDArray[np.bool_], system: CompactEquations, play_m: float) -> Array:
+@remembered
+def fit_deviation(assembly: Assembly, play_m: float) -> Array:
     """The standard deviation of each compact equation, (3 c,), [m]: a contact that fits is uniform within its play.
 
     A row stands for all vertices of its contact, so it is off by as much as they are together.
     """
-    count = system.points[..., 0, 3] ** 2
-    each = np.where(fits, play_m / sqrt(3.0), 0.0) * np.sqrt(count)
-    return np.repeat(each, 3)
+    fits = np.array([assembly.is_fit(relation.contact) for relation in assembly.relations()], dtype=np.bool_)
+    each = np.where(fits, play_m / sqrt(3.0), 0.0) * np.sqrt(np.diff(pattern(assembly).begin))
+    return frozen(np.repeat(each, 3))
 
 
 def p_value(chi_square: float, freedom: int) -> float:

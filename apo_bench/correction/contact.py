@@ -5,6 +5,7 @@ Every motion parameter is free; what the contacts do not ask for is not changed,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, final
 
@@ -12,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
+from apo_bench.assembly.equations import largest
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.ending import refused_correction, status_sentence
 from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
-from apo_bench.correction.problem import Problem, Solver, problem
+from apo_bench.correction.problem import Problem, Solved, Solver, problem
 from apo_bench.correction.solvers import compiled
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
+from apo_bench.correction.whole import correct_compiled, layout
 from apo_bench.errors import InputError
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
@@ -37,8 +40,9 @@ class ContactCorrector:
     test passes."""
     level: float = TEST_LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
-    solver: Solver = nearest_goals
-    """What finds the nearest goals; `compiled.nearest_goals_compiled` is the same, compiled."""
+    solver: Solver | None = None
+    """What finds the nearest goals; None stands for `compiled.nearest_goals_compiled` where Numba is installed and can
+    keep what it compiles, else for `manifold.nearest_goals`. They give the same goals but for rounding."""
 
     def __post_init__(self) -> None:
         if self.doubt not in ("apply", "warn", "refuse", "drop"):
@@ -57,29 +61,50 @@ class ContactCorrector:
         Raises:
             InputError: The covariance of an operation is not positive definite.
         """
-        return self.given(observation, None)
+        made = self.together((observation,))
+        return self.given(observation, None) if made is None else made[0]
+
+    def together(self, observations: Sequence[Observation]) -> list[Correction] | None:
+        """Correct observations of one assembly with the same start poses and play, compiled; None where that cannot be.
+
+        Raises:
+            InputError: As of one.
+        """
+        loops = compiled.kept_loops() if self.solver is None else None
+        known = None if loops is None else layout(observations[0].assembly, observations[0].play_m)
+        if loops is None or known is None:
+            return None
+        seen = [one for one in observations if one.seen.all()]
+        made = iter(correct_compiled(loops, known, seen, self.doubt == "apply", self.level, self.given))
+        return [next(made) if one.seen.all() else refused_correction(one) for one in observations]
 
     def given(self, observation: Observation, found: NearestGoals | None) -> Correction:
         """Correct an observation; `found` are its nearest goals without inequalities, if they are known already."""
         if not observation.seen.all():
             return refused_correction(observation)
-        asked = problem(observation, self.solver)
+        asked = problem(observation, self.chosen_solver())
         every = asked.without(())
-        found, first = asked.solve(every, found)
-        first = replace(first, level=self.level)
-        lost = not found.at_rest and asked.gap(found.goals, every) <= observation.gap_m
-        if not first.passes and self.doubt != "apply" and found.finite and not lost:
-            first = replace(first, suspects=asked.suspects(every))
-        kept, dropped, tested = every, tuple[str, ...](), first
-        while self.doubt == "drop" and not tested.passes and found.finite and len(dropped) < DROPS:
-            worst = asked.suspects(kept) if dropped else first.suspects
+        solved = first = asked.solve(every, found)
+        test = replace(first.test, level=self.level)
+        lost = not first.found.at_rest and largest(first.gaps) <= observation.gap_m
+        if not test.passes and self.doubt != "apply" and first.found.finite and not lost:
+            test = replace(test, suspects=asked.suspects(every))
+        kept, dropped, after = every, tuple[str, ...](), test
+        while self.doubt == "drop" and not after.passes and solved.found.finite and len(dropped) < DROPS:
+            worst = asked.suspects(kept) if dropped else test.suspects
             if not worst:
                 break
             dropped += (self._most_suspect(asked, kept, worst[0]),)
             kept = asked.without(dropped)
-            found, tested = asked.solve(kept)
-            tested = replace(tested, level=self.level)
-        return self._report(asked, found, kept, tested, first, dropped)
+            solved = asked.solve(kept)
+            after = replace(solved.test, level=self.level)
+        return self._report(asked, solved, kept, test, after, dropped)
+
+    def chosen_solver(self) -> Solver:
+        """What finds the nearest goals here."""
+        if self.solver is not None:
+            return self.solver
+        return nearest_goals if compiled.kept_loops() is None else compiled.nearest_goals_compiled
 
     def _most_suspect(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
         """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
@@ -89,33 +114,31 @@ class ContactCorrector:
     def _report(
         self,
         asked: Problem,
-        found: NearestGoals,
+        solved: Solved,
         kept: NDArray[np.bool_],
-        tested: Consistency,
-        first: Consistency,
+        test: Consistency,
+        after: Consistency,
         dropped: tuple[str, ...],
     ) -> Correction:
-        observation, known = asked.observation, freedom(found.Jt)
+        observation, found = asked.observation, solved.found
+        known = freedom(found.Jt)
         directions = jacobian_rank(found.Jt) if known is None else known.rank
-        status = _status(found, asked.gap(found.goals, kept), observation.gap_m)
-        if status == "converged" and self.doubt in ("refuse", "drop") and not tested.passes:
+        status = _status(found, largest(solved.gaps[kept]), observation.gap_m)
+        if status == "converged" and self.doubt in ("refuse", "drop") and not after.passes:
             status = "doubtful"
         of = "every contact" if kept.all() else f"every contact but those of {', '.join(dropped)}"
-        said = status_sentence(status, observation.gap_m, of) + (
-            "" if self.doubt == "apply" else _doubts(first, dropped)
-        )
-        every = asked.without(())
+        doubts = "" if self.doubt == "apply" else _doubts(test, dropped)
         return Correction(
             goals=found.goals,
             status=status,
-            sentence=said,
+            sentence=status_sentence(status, observation.gap_m, of) + doubts,
             freed=asked.system.variables(len(observation.goals)),
-            gap_before_m=asked.gap(observation.goals, every),
-            gap_after_m=asked.gap(found.goals, every),
+            gap_before_m=largest(asked.gaps(observation.goals)),
+            gap_after_m=largest(solved.gaps),
             rank=directions,
             trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),
-            test=first,
-            test_after=tested if dropped else None,
+            test=test,
+            test_after=after if dropped else None,
             covariance=marginals(found, known.free) if known is not None and status == "converged" else None,
             dropped=dropped,
         )
@@ -125,7 +148,7 @@ contact = ContactCorrector()
 contact_apply = ContactCorrector("apply")
 contact_refuse = ContactCorrector("refuse")
 contact_drop = ContactCorrector("drop")
-contact_fast = ContactCorrector(solver=compiled.nearest_goals_compiled)
+contact_fast = contact
 
 
 def _status(found: NearestGoals, left_m: float, gap_m: float) -> str:

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import Equations, equations, lies_on
+from apo_bench.assembly.equations import Equations, equations, pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, corner_moments
 from apo_bench.correction.solvers.inequalities import demanded
 from apo_bench.correction.solvers.manifold import NearestGoals
 from apo_bench.correction.solvers.whitened import scales
@@ -43,55 +43,58 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
     if not observations:
         return ()
     check_observations(observations)
-    for i, other in enumerate(observations, start=1):
-        if other.assembly is not observations[0].assembly or not _alike(other, observations[0]):
-            raise InputError(
-                f"observation {i} is of another assembly, start or play than observation 1; "
-                "correct those together that share them."
-            )
+    if (odd := _odd_one(observations)) is not None:
+        raise InputError(
+            f"observation {odd + 1} is of another assembly, start or play than observation 1; "
+            "correct those together that share them."
+        )
     return tuple(
         made for i in range(0, len(observations), BATCH) for made in _chunk(observations[i : i + BATCH], corrector)
     )
 
 
 def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
+    if (made := corrector.together(observations)) is not None:
+        return made
     goals, L = np.array([one.goals for one in observations]), np.array([scales(one.covariance) for one in observations])
     plain = equations(observations[0].assembly, observations[0].start, observations[0].goals)
-    pattern, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)
-    found = corrector.solver(compact_many(observations[0].assembly, pattern, goals).among(exact), goals, L)
+    system, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)
+    solve = corrector.chosen_solver()
+    found = solve(compact_many(observations[0].assembly, system, goals).among(exact), goals, L)
     return [corrector.given(one, _one(found, i)) for i, one in enumerate(observations)]
 
 
-def compact_many(assembly: Assembly, pattern: Equations, goals: Array) -> CompactEquations:
+def compact_many(assembly: Assembly, system: Equations, goals: Array) -> CompactEquations:
     """The compact equations of many observations, goals (b, n, 4, 4), each with the vertices that it gives itself.
 
     Vertices of the environment's face are the same for all; those of the manipulated face are laid onto the other one
     at each observation's own goals, which takes their centre and axes along, since it is an affine map.
 
     Args:
-        pattern: The equations of one of them.
+        system: The equations of one of them.
     """
-    one = compact_equations(pattern, goals.shape[1])
-    contacts = [relation.contact for relation in assembly.relations()]
-    laid = np.array([lies_on(assembly, contact) for contact in contacts], dtype=np.bool_)
+    one, known = compact_equations(system, goals.shape[1]), pattern(assembly)
+    laid = known.laid
     points = np.array(np.broadcast_to(one.points, (len(goals), *one.points.shape)))
     if laid.any():
-        some = [contact for contact, chosen in zip(contacts, laid, strict=True) if chosen]
-        own = moments([assembly.face(contact.manipulated).outline for contact in some])
+        own = corner_moments(known)[laid]
         back = pose.inverse(one.among(laid).words(goals))
         there = own @ np.swapaxes(back, -1, -2)
-        plane = np.array([assembly.face(contact.environment).plane for contact in some])
+        plane = known.onto[laid]
         points[:, laid] = there
         points[:, laid, :, :3] -= (there @ plane[:, :, None]) * plane[:, None, :3]
     return replace(one, points=points)
 
 
-def _alike(a: Observation, b: Observation) -> bool:
-    return (
-        a.play_m == b.play_m
-        and a.start.keys() == b.start.keys()
-        and all(np.array_equal(T, b.start[part]) for part, T in a.start.items())
-    )
+def _odd_one(observations: Sequence[Observation]) -> int | None:
+    """The first that is not of the same assembly, start and play as the one at the head; None if all are."""
+    first = observations[0]
+    for i, one in enumerate(observations):
+        if one.assembly is not first.assembly or one.play_m != first.play_m or one.start.keys() != first.start.keys():
+            return i
+    starts = np.array([[one.start[part] for part in first.start] for one in observations])
+    odd = np.flatnonzero((starts != starts[0]).reshape(len(starts), -1).any(axis=1))
+    return int(odd[0]) if len(odd) else None
 
 
 def _one(found: NearestGoals, i: int) -> NearestGoals:

@@ -27,7 +27,7 @@ from apo_bench.geometry.twist import right_jacobian
 
 LARGEST_POSTERIOR = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
-_UNCLEAR = (1e-14, 1e-9)
+UNCLEAR = (1e-14, 1e-9)
 """Squares of pivots, in parts of the largest: with none between these, rounding is told from rank quickly."""
 RANK_CUT_OFF = 1e-7
 """Singular values below this part of the largest one are rounding, at a solution."""
@@ -77,8 +77,8 @@ def jacobian_rank(Jt: Any) -> int:
     largest = G.diagonal().max()
     if not largest > 0.0:
         return 0
-    R, _, found, _ = dpstrf(G, tol=_UNCLEAR[0] * largest)
-    if R[found - 1, found - 1] ** 2 > _UNCLEAR[1] * largest:
+    R, _, found, _ = dpstrf(G, tol=UNCLEAR[0] * largest)
+    if R[found - 1, found - 1] ** 2 > UNCLEAR[1] * largest:
         return int(found)
     w = np.linalg.svd(Jt, compute_uv=False)
     return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))

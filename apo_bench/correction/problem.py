@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,22 @@ from apo_bench.correction.consistency import (
     suspects,
 )
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violation
+from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.whitened import scales
 from apo_bench.geometry.arrays import Array
 
 Solver = Callable[[CompactEquations, Array, Array], NearestGoals]
 """(equations, goals seen, L) -> nearest goals; `manifold.nearest_goals` and what does the same."""
+
+
+class Solved(NamedTuple):
+    """What some contacts ask for."""
+
+    found: NearestGoals
+    test: Consistency
+    gaps: Array
+    """(c,): the largest |e| of each contact at the goals that were found, [m]; or how far an inequality is violated."""
 
 
 @final
@@ -50,7 +59,7 @@ class Problem:
     """(3 c,): what the play of parts that fit leaves, for the test."""
     solver: Solver
 
-    def solve(self, kept: NDArray[np.bool_], found: NearestGoals | None = None) -> tuple[NearestGoals, Consistency]:
+    def solve(self, kept: NDArray[np.bool_], found: NearestGoals | None = None) -> Solved:
         """The nearest goals by the contacts that are `kept`, (c,), and the test of their correction.
 
         Active inequalities count like equations: given which they are, the squared length is chi-square
@@ -63,18 +72,21 @@ class Problem:
             found: The nearest goals without inequalities, if they are known already.
         """
         chosen = kept & self.exact
-        part, slack_m = self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
+        part = self.compact if chosen.all() else self.compact.among(chosen)
+        slack_m = self.slack_m[np.repeat(chosen, 3)]
         found = self.solver(part, self.observation.goals, self.L) if found is None else found
+        gaps = self.gaps(found.goals)
         chi_square, freedom, shared = correction_length(part, self.observation.goals, self.L, found, slack_m)
-        if found.finite and largest(self.system.gaps(found.goals)[chosen]) > self.observation.gap_m:
+        if found.finite and largest(gaps[chosen]) > self.observation.gap_m:
             found = shared or nearest_goals(part, self.observation.goals, self.L, np.hypot(slack_m, SOFT_M))
+            gaps = self.gaps(found.goals)
         elif found.finite and kept[~self.exact].any():
             inequalities = self.inequalities.among(kept[~self.exact])
             held = nearest_between(part, inequalities, self.observation.goals, self.L, found)
             touched = active_rank(found.Jt, inequalities, held)
             chi_square += float(held.z @ held.z - found.z @ found.z)
-            found, freedom = held, freedom + touched
-        return found, Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL)
+            found, freedom, gaps = held, freedom + touched, self.gaps(held.goals)
+        return Solved(found, Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL), gaps)
 
     def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
         """Relations whose contacts are `kept`, the most suspect first."""
@@ -85,7 +97,7 @@ class Problem:
         return contact_suspects(self.observation.assembly, kept, self._test, relation)
 
     def _test(self, kept: NDArray[np.bool_]) -> Consistency:
-        return self.solve(kept)[1]
+        return self.solve(kept).test
 
     def _pull(self, kept: NDArray[np.bool_]) -> Array:
         """How hard each contact pulls at the goals, (c,), by the multipliers of its equations."""
@@ -100,9 +112,9 @@ class Problem:
         """The contacts that are left without these relations or single contacts, (c,)."""
         return self.observation.assembly.without(dropped)
 
-    def gap(self, goals: Array, kept: NDArray[np.bool_]) -> float:
-        """The largest |e| of what is kept, [m]; or how far an inequality is violated."""
-        return violation(self.system, self.exact, self.inequalities, goals, kept)
+    def gaps(self, goals: Array) -> Array:
+        """The largest |e| of each contact, (c,), [m]; or how far an inequality is violated."""
+        return violations(self.system, self.exact, self.inequalities, goals)
 
 
 def problem(observation: Observation, solver: Solver) -> Problem:
@@ -115,7 +127,5 @@ def problem(observation: Observation, solver: Solver) -> Problem:
     plain = equations(observation.assembly, observation.start, observation.goals)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     every = compact_equations(system, len(observation.goals))
-    fits = np.array([observation.assembly.is_fit(r.contact) for r in observation.assembly.relations()], dtype=np.bool_)
-    return Problem(
-        observation, system, every, exact, inequalities, L, fit_deviation(fits, every, observation.play_m), solver
-    )
+    slack_m = fit_deviation(observation.assembly, observation.play_m)
+    return Problem(observation, system, every, exact, inequalities, L, slack_m, solver)

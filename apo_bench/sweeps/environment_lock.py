@@ -6,6 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import final
 
@@ -29,6 +30,8 @@ _PACKAGES = (
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
 )
 """The packages whose version may show in a row."""
+_OPTIONAL = ("numba",)
+"""The same, and without them rows are only rounded otherwise."""
 
 
 @final
@@ -146,5 +149,6 @@ def environment_lock(
 
 
 def versions() -> dict[str, str]:
-    """Package -> version, as installed here."""
-    return {package: metadata.version(package) for package in _PACKAGES}
+    """Package -> version, as installed here; `none` of an optional one that is not."""
+    installed = {package: metadata.version(package) for package in _PACKAGES}
+    return installed | {package: metadata.version(package) if find_spec(package) else "none" for package in _OPTIONAL}

@@ -160,7 +160,8 @@ def test_moments_are_those_of_the_corners(seed: int, corners: int) -> None:
     rng = np.random.default_rng(seed)
     plane = rng.standard_normal((2, 3))
     outline = rng.uniform(-1, 1, 3) + rng.uniform(-1, 1, (corners, 2)) @ plane
-    rows = moments([outline, outline[:3]])[0]
+    vertex = np.concatenate([outline, outline[:3]])
+    rows = moments(vertex, np.repeat([0, 1], [len(outline), 3]), 2)[0]
     homogeneous = np.column_stack([outline, np.ones(corners)])
     assert_allclose(rows.T @ rows, homogeneous.T @ homogeneous, rtol=0, atol=1e-12 * corners * 10)
 

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly
-from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.contact import ContactCorrector, Doubt
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
-from apo_bench.correction.solvers import compiled, loops, manifold
+from apo_bench.correction.solvers import compiled, loops, loops_around, manifold
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.manifold import NearestGoals
 from apo_bench.errors import InputError
@@ -94,20 +96,6 @@ def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> N
 
 
 @pytest.mark.numeric
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_the_compact_equations_are_the_same(name: str) -> None:
-    given = load_scenario(name)
-    goals = given.goals @ pose.exp(np.random.default_rng(0).normal(scale=0.01, size=(len(given.assembly), 6)))
-    system = equations(given.assembly, given.start, goals)
-    for some in (system, system.among(np.zeros(len(system.letters), dtype=np.bool_))):
-        expected, actual = compact_equations(some, len(goals)), compiled.compact_equations_compiled(some, len(goals))
-        for field in ("start", "letters", "columns", "inverse", "plane"):
-            assert np.array_equal(getattr(expected, field), getattr(actual, field))
-        v, w = (np.swapaxes(K.points, 1, 2) @ K.points for K in (expected, actual))
-        np.testing.assert_allclose(w, v, rtol=0, atol=1e-15)
-
-
-@pytest.mark.numeric
 def test_what_is_not_finite_is_said_and_left_alone() -> None:
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     three = np.array([goals, goals, goals])
@@ -153,13 +141,59 @@ def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
         assert np.isfinite(found.goals).all()
 
 
-def test_the_corrector_by_name_is_contact_with_another_solver() -> None:
-    built = scenes.ALL["bridge"]()
-    seen = scenes.seen(built, scenes.noisy(built.goals, np.random.default_rng(3), 1.0, 1.0))
-    plain, fast = correct(seen, "contact"), correct(seen, "contact-fast")
-    assert (plain.status, plain.sentence, plain.rank) == (fast.status, fast.sentence, fast.rank)
-    np.testing.assert_allclose(fast.goals, plain.goals, rtol=0, atol=1e-12)
-    assert np.array_equal(ContactCorrector(solver=compiled.nearest_goals_compiled)(seen).goals, fast.goals)
+def observed(name: str, mm: float, degrees: float, seed: int, play_m: float = 0.0) -> Observation:
+    """An observation whose covariance is the one that it was drawn from."""
+    given, (_, goals, L) = load_scenario(name), drawn(name, mm, degrees, seed)
+    seen = np.ones(len(goals), dtype=np.bool_)
+    return Observation(given.assembly, given.start, goals, L @ np.swapaxes(L, 1, 2), seen, play_m=play_m)
+
+
+def check_same(expected: Correction, actual: Correction) -> None:
+    """All that a correction says, but for rounding; goals within 1e-9 mm."""
+    for name in ("status", "sentence", "freed", "rank", "dropped"):
+        assert getattr(actual, name) == getattr(expected, name)
+    np.testing.assert_allclose(actual.goals, expected.goals, rtol=0, atol=1e-12)
+    lengths = [(made.gap_before_m, made.gap_after_m) for made in (expected, actual)]
+    np.testing.assert_allclose(lengths[1], lengths[0], rtol=0, atol=1e-12)
+    assert len(actual.trace) == len(expected.trace)
+    assert expected.test is not None
+    assert actual.test is not None
+    assert (actual.test.freedom, actual.test.level) == (expected.test.freedom, expected.test.level)
+    assert actual.test.chi_square == pytest.approx(expected.test.chi_square, rel=1e-6)
+    assert actual.test.p_value == pytest.approx(expected.test.p_value, rel=1e-6)
+    assert [s.relation for s in actual.test.suspects] == [s.relation for s in expected.test.suspects]
+    assert (actual.covariance is None) == (expected.covariance is None)
+    if actual.covariance is not None and expected.covariance is not None:
+        np.testing.assert_allclose(actual.covariance, expected.covariance, rtol=0, atol=1e-12)
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("play_m", [0.0, 2.5e-4])
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(name: str, play_m: float) -> None:
+    seen = [observed(name, 2.0, 1.0, seed, play_m) for seed in range(4)]
+    for one in seen:
+        check_same(correct(one, ContactCorrector(solver=manifold.nearest_goals)), correct(one))
+        assert np.array_equal(correct(one, "contact-fast").goals, correct(one).goals)
+
+
+def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
+    first = observed("pocket_table", 2.0, 1.0, 0)
+    seen = [replace(first, goals=observed("pocket_table", 2.0, 1.0, seed).goals) for seed in range(3)]
+    for one, made in zip(seen, correct_many(seen), strict=True):
+        alone = correct(one)
+        assert np.array_equal(made.goals, alone.goals)
+        assert (made.covariance is None) == (alone.covariance is None)
+        assert made.trace == alone.trace
+        assert made.test == alone.test
+
+
+@pytest.mark.parametrize("doubt", ["apply", "refuse", "drop"])
+def test_doubts_are_the_same_compiled(doubt: Doubt) -> None:
+    """Three times the noise that is stated: the test fails."""
+    one = observed("stick_on_castles", 2.0, 1.0, 1)
+    one = replace(one, covariance=one.covariance / 9.0)
+    check_same(ContactCorrector(doubt, solver=manifold.nearest_goals)(one), ContactCorrector(doubt)(one))
 
 
 def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> None:
@@ -179,16 +213,35 @@ def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> Non
     assert calls == [3]
 
 
-def test_without_numba_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    compiled._compiled.cache_clear()
+@pytest.fixture
+def no_numba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    compiled.compiled_loops.cache_clear()
+    compiled.kept_loops.cache_clear()
     monkeypatch.setitem(sys.modules, "numba", None)
+    yield
+    compiled.compiled_loops.cache_clear()
+    compiled.kept_loops.cache_clear()
+
+
+@pytest.mark.usefixtures("no_numba")
+def test_without_numba_the_extra_is_named() -> None:
     with pytest.raises(InputError, match=r"pip install 'apo_bench\[fast\]'"):
         compiled.nearest_goals_compiled(*drawn("bridge_cycle", 2.0, 1.0, 0))
 
 
+@pytest.mark.usefixtures("no_numba")
+@pytest.mark.parametrize("name", ["contact", "contact-fast"])
+def test_without_numba_contact_is_not_compiled(name: str) -> None:
+    one = observed("bridge_cycle", 2.0, 1.0, 0)
+    uncompiled = correct(one, ContactCorrector(solver=manifold.nearest_goals))
+    assert np.array_equal(correct(one, name).goals, uncompiled.goals)
+    np.testing.assert_allclose(correct_many([one])[0].goals, uncompiled.goals, rtol=0, atol=1e-12)
+
+
 def test_every_loop_is_handed_to_the_compiler() -> None:
-    written = {f for f in vars(loops).values() if getattr(f, "__module__", "") == loops.__name__ and callable(f)}
-    assert written == {loops.solve_each, loops.summarised, *compiled.HELPERS}
+    for module in (loops, loops_around):
+        written = {f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__ and callable(f)}
+        assert written <= {*compiled.KERNELS, *compiled.HELPERS}
 
 
 @pytest.mark.numeric

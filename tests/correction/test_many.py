@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations, lies_on
+from apo_bench.assembly.equations import equations, pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
@@ -65,12 +65,12 @@ def test_many_are_one_after_the_other(name: str) -> None:
 def test_vertices_of_either_face(name: str) -> None:
     """Corners of the manipulated face are laid onto the other one at each observation's own goals."""
     scene = SCENES[name]()
-    own = [lies_on(scene.assembly, relation.contact) for relation in scene.assembly.relations()]
-    assert any(own)
-    assert not all(own)
+    laid = pattern(scene.assembly).laid
+    assert laid.any()
+    assert not laid.all()
     goals = np.array([one.goals for one in draws(scene, 5, 10.0, 8.0)])
-    pattern = equations(scene.assembly, scene.start, goals[0])
-    together = compact_many(scene.assembly, pattern, goals)
+    system = equations(scene.assembly, scene.start, goals[0])
+    together = compact_many(scene.assembly, system, goals)
     for i, each in enumerate(goals):
         one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
         e, blocks = together.only(np.arange(5) == i).blocks(

@@ -10,7 +10,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.ending import refused_correction, status_sentence
-from apo_bench.correction.solvers.inequalities import demanded, violation
+from apo_bench.correction.solvers.inequalities import demanded, violations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, least_step
 from apo_bench.geometry.arrays import Array
 from apo_bench.records import outcomes
@@ -47,7 +47,7 @@ def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()
     """
     plain = equations(observation.assembly, observation.start, observation.goals)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
-    return violation(system, exact, inequalities, goals, observation.assembly.without(dropped))
+    return largest(violations(system, exact, inequalities, goals)[observation.assembly.without(dropped)])
 
 
 def as_it_ends(observation: Observation, mended: Callable[[Observation], Array], done: str) -> Correction:

@@ -10,7 +10,6 @@ Every array may have leading axes: many observations of one assembly are lineari
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import final
@@ -18,7 +17,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations
+from apo_bench.assembly.equations import Equations, Pattern
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import GENERATORS
 
@@ -165,25 +164,21 @@ def compact_equations(system: Equations, n: int) -> CompactEquations:
     columns = np.where((k >= 0) & (k < n), k, n)
     plane = np.zeros((len(letters), 4))
     plane[system.contact] = system.plane
-    return CompactEquations(system.start, letters, columns, system.inverse, plane, _points(system), n)
+    points = moments(system.vertex[:, :3], system.contact, len(letters))
+    return CompactEquations(system.start, letters, columns, system.inverse, plane, points, n)
 
 
-def moments(outlines: Sequence[Array]) -> Array:
-    """Three points that stand for the corners of each outline (k, 3), as in `CompactEquations.points`, (len, 3, 4)."""
-    count = np.array([len(corners) for corners in outlines])
-    return _moments(np.concatenate(outlines), np.repeat(np.arange(len(count)), count), len(count))
+def corner_moments(known: Pattern) -> Array:
+    """Three points that stand for the corners of each contact, (c, 3, 4), in the frame that these are in."""
+    return moments(known.corners[:, :3], known.contact, len(known.letters))
 
 
-def _points(system: Equations) -> Array:
-    """The centre of the vertices of each contact and two directions, (c, 3, 4), with the same moments."""
-    return _moments(system.vertex[:, :3], system.contact, len(system.letters))
+def moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
+    """The centre of the vertices (m, 3) of each contact and two directions, (c, 3, 4), with the same moments.
 
-
-def _moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
-    """Moments of vertices (m, 3); those of one contact stand next to each other, and each contact has some.
-
-    They lie in a plane, so the sum S of off off^t, over their ways off the centre, is a a^t + b b^t: two steps of a
-    Cholesky factorisation that takes the largest pivot first.
+    Vertices of one contact stand next to each other, and each contact has some. They lie in a plane, so the sum S of
+    off off^t, over their ways off the centre, is a a^t + b b^t: two steps of a Cholesky factorisation that takes the
+    largest pivot first.
     """
     points = np.zeros((c, 3, 4))
     if not c:

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations
-from apo_bench.correction.solvers import loops, manifold
-from apo_bench.correction.solvers.compact import ROUNDING, SMALLEST, CompactEquations
+from apo_bench.correction.solvers import loops, loops_around, manifold
+from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.manifold import NearestGoals, SolverTurn
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -39,7 +38,14 @@ HELPERS = (
     loops.displaced,
     loops.cross_matrix,
     loops.scattered,
+    loops_around.product,
+    loops_around.dropped,
+    loops_around.largest,
+    loops_around.rooted,
+    loops_around.spanned,
+    loops_around.spread,
 )
+KERNELS = (loops.solve_each, loops_around.prepared, loops_around.rated)
 _RULE = (
     manifold.MOST_TURNS,
     manifold.STEP,
@@ -50,6 +56,8 @@ _RULE = (
     manifold.LARGEST_TURN,
     manifold.SMALLEST,
 )
+_FIELDS = ("goals", "z", "e", "Jt", "B", "at_rest", "finite")
+_NONE, _SERIES = np.zeros(0), np.array(SERIES)
 
 
 def nearest_goals_compiled(
@@ -62,61 +70,91 @@ def nearest_goals_compiled(
     Raises:
         InputError: Numba is not installed.
     """
-    (solve, _), lead, n, m = _compiled(), goals.shape[:-3], system.n, 3 * len(system)
+    lead, n = goals.shape[:-3], system.n
+    kernels = compiled_loops()
     if not lead and 6 * n > manifold.LARGEST_DENSE:
         return manifold.nearest_goals(system, goals, L, soft_m)
     b = math.prod(lead)
-    out = tuple(np.empty((b, *shape)) for shape in ((n, 4, 4), (6 * n,), (m,), (6 * n, m), (n, 6, 6)))
-    rest, finite, trace = np.empty(b, np.bool_), np.empty(b, np.bool_), np.zeros((manifold.MOST_TURNS, 2))
-    turns = solve(
+    many, turns = solved(
+        kernels,
+        system,
+        _own(goals).reshape(b, n, 4, 4),
+        _own(L[None] if L.ndim == 3 else np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)),
+        soft_m,
+    )
+    longest = int(turns.ended.max(initial=0))
+    worst = turns.trace[:, :longest].max(axis=0, initial=0.0)
+    shaped = {name: getattr(many, name).reshape(lead + getattr(many, name).shape[1:]) for name in _FIELDS}
+    return NearestGoals(**shaped, trace=tuple(SolverTurn(gap, step) for gap, step in worst.tolist()))
+
+
+class Turns(NamedTuple):
+    """The turns of every observation."""
+
+    trace: Array
+    """(b, MOST_TURNS, 2): the largest |e| before each turn, [m], and the length of its step; zeros behind the last."""
+    ended: NDArray[np.intp]
+    """(b,): how many there were."""
+
+
+def solved(
+    kernels: Kernels, system: CompactEquations, goals: Array, L: Array, soft_m: Array | None
+) -> tuple[NearestGoals, Turns]:
+    """The nearest goals of many observations, without a common trace, and the turns of each."""
+    b, n, m = len(goals), system.n, 3 * len(system)
+    T, z, e = np.empty((b, n, 4, 4)), np.empty((b, 6 * n)), np.empty((b, m))
+    Jt, B = np.empty((b, 6 * n, m)), np.empty((b, n, 6, 6))
+    rest, finite = np.empty(b, np.bool_), np.empty(b, np.bool_)
+    turns = Turns(np.zeros((b, manifold.MOST_TURNS, 2)), np.empty(b, np.intp))
+    kernels.solve_each(
         _own(system.start),
         (_own(system.letters, np.intp), _own(system.columns, np.intp), _own(system.inverse, np.intp)),
         _own(system.plane),
         _own(system.points if system.points.ndim > 3 else system.points[None]),
-        _own(goals).reshape(b, n, 4, 4),
-        _own(L[None] if L.ndim == 3 else np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)),
-        np.zeros(0) if soft_m is None else _own(soft_m),
-        _own(SERIES),
+        goals,
+        L,
+        _NONE if soft_m is None else _own(soft_m),
+        _SERIES,
         _RULE,
-        out,
+        (T, z, e, Jt, B),
         rest,
         finite,
-        trace,
+        *turns,
     )
-    T, z, e, Jt, B, at_rest, ended = (x.reshape(lead + x.shape[1:]) for x in (*out, rest, finite))
-    return NearestGoals(
-        T, z, e, Jt, B, at_rest, ended, tuple(SolverTurn(gap, step) for gap, step in trace[:turns].tolist())
-    )
+    return NearestGoals(T, z, e, Jt, B, rest, finite, ()), turns
 
 
-def compact_equations_compiled(system: Equations, n: int) -> CompactEquations:
-    """Compiled `compact.compact_equations`.
+class Kernels(NamedTuple):
+    """The loops, compiled."""
+
+    solve_each: Callable[..., None]
+    prepared: Callable[..., None]
+    rated: Callable[..., None]
+
+
+@cache
+def kept_loops() -> Kernels | None:
+    """The loops, compiled; None where Numba is not installed, or would have to compile anew in every process."""
+    try:
+        return _compiled(kept=True)
+    except (InputError, RuntimeError):
+        return None
+
+
+@cache
+def compiled_loops() -> Kernels:
+    """The loops, compiled; in every process anew where there is no folder to keep them in.
 
     Raises:
         InputError: Numba is not installed.
     """
-    _, summarised = _compiled()
-    (c, w), p = system.letters.shape, len(system.start)
-    columns, plane, points = np.empty((c, w), np.intp), np.zeros((c, 4)), np.zeros((c, 3, 4))
-    summarised(
-        _own(system.contact, np.intp),
-        _own(system.vertex),
-        _own(system.plane),
-        _own(system.letters, np.intp),
-        p,
-        n,
-        ROUNDING,
-        SMALLEST,
-        columns,
-        plane,
-        points,
-    )
-    return CompactEquations(system.start, system.letters, columns, system.inverse, plane, points, n)
+    try:
+        return _compiled(kept=True)
+    except RuntimeError:
+        return _compiled(kept=False)
 
 
-@cache
-def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
-    """`solve` and `summarised` of `loops`."""
+def _compiled(kept: bool) -> Kernels:
     try:
         from numba import njit
         from numba.extending import register_jitable
@@ -127,14 +165,8 @@ def _compiled() -> tuple[Callable[..., int], Callable[..., None]]:
         ) from error
     for function in HELPERS:
         register_jitable(fastmath=set(_SAFE))(function)
-
-    def compiled(function: Any) -> Any:
-        try:
-            return njit(cache=True, fastmath=set(_SAFE), error_model="numpy")(function)
-        except RuntimeError:  # nowhere to keep it: it is compiled anew in every process
-            return njit(fastmath=set(_SAFE), error_model="numpy")(function)
-
-    return compiled(loops.solve_each), compiled(loops.summarised)
+    compiler: Any = njit(fastmath=set(_SAFE), error_model="numpy", cache=kept)
+    return Kernels(*map(compiler, KERNELS))
 
 
 def _own(x: Any, dtype: Any = np.float64) -> NDArray[Any]:

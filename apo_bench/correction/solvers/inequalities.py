@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations, largest
+from apo_bench.assembly.equations import Equations
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations
@@ -57,23 +57,28 @@ class Inequalities:
         rows = contacts[self.system.contact]
         return Inequalities(self.system.among(contacts), self.low[rows], self.high[rows])
 
-    def overstepped(self, goals: Array) -> float:
-        """By how much the worst vertex is beyond its bounds at the goals, [m]; 0 if none is."""
-        e = self.system.residual(goals)
-        return float(np.maximum(self.low - e, e - self.high).max(initial=0.0))
+    def overstepped(self, goals: Array) -> Array:
+        """By how much the worst vertex of each contact is beyond its bounds at the goals, [m]; 0 if none is."""
+        e, worst = self.system.residual(goals), np.zeros(len(self.system.letters))
+        np.maximum.at(worst, self.system.contact, np.maximum(self.low - e, e - self.high))
+        return worst
 
 
-def violation(
-    system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, goals: Array, kept: NDArray[np.bool_]
-) -> float:
-    """The largest |e| of the equations that are `kept`, (c,), [m]; or how far an inequality is violated."""
-    return max(largest(system.gaps(goals)[kept & exact]), inequalities.among(kept[~exact]).overstepped(goals))
+def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequalities, goals: Array) -> Array:
+    """The largest |e| of each contact that is an equation, (c,), [m]; or how far an inequality is violated."""
+    gaps = system.gaps(goals)
+    if len(inequalities):
+        gaps[~exact] = inequalities.overstepped(goals)
+    return gaps
 
 
 def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
     low, high = assembly.intervals(play_m).T
     exact = low == high
+    if exact.all() and not low.any():
+        none = np.zeros(0)
+        return system, exact, Inequalities(system.among(~exact), none, none)
     plane = np.array(system.plane)
     plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]
     inequalities = system.among(~exact)

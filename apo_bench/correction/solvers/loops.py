@@ -45,8 +45,9 @@ def solve_each(
     rest: NDArray[np.bool_],
     finite: NDArray[np.bool_],
     trace: _Array,
-) -> int:
-    """One observation after the other; returns the turns of the one that took longest.
+    ended: _Index,
+) -> None:
+    """One observation after the other.
 
     Args:
         points: (b or 1, c, 3, 4).
@@ -56,11 +57,12 @@ def solve_each(
         series: `geometry.twist.SERIES`.
         out: goals (b, n, 4, 4), z (b, 6 n), e (b, 3 c), Jt (b, 6 n, 3 c), B (b, n, 6, 6), as in `NearestGoals`.
         rest: (b,), overwritten; so is `finite`.
-        trace: (TURNS, 2), zeros: the largest |e| and the largest step of each turn.
+        trace: (b, TURNS, 2), overwritten: the largest |e| and the largest step of each turn.
+        ended: (b,), overwritten: the number of turns.
     """
     turns, step_size, sure, damp, fall, floor, largest_turn, smallest = rule
     b, n, c, w, p = len(observed), observed.shape[1], len(plane), words[0].shape[1], len(start)
-    m, longest, soft = 3 * c, 0, len(soft_m) > 0
+    m, soft = 3 * c, len(soft_m) > 0
     width, slot, first, begin, users = ordered(words, p + n, n)
     factors = np.zeros((p + n + 1, 2, 4, 4))
     for k in range(p):
@@ -72,7 +74,7 @@ def solve_each(
         v, Lo = points[o if len(points) > 1 else 0], L[o if len(L) > 1 else 0]
         T[:], z[:], B[:], size = observed[o], 0.0, Lo, np.inf
         for turn in range(turns):
-            longest = max(longest, turn + 1)
+            ended[o] = turn + 1
             for k in range(n):
                 both(T[k], factors[p + k])
             linearise(words, width, slot, factors, plane, v, B, e, blocks, behind)
@@ -99,7 +101,7 @@ def solve_each(
             before, size = size, 0.0
             for i in range(6 * n):
                 size = worse(size, abs(step[i]))
-            trace[turn, 0], trace[turn, 1] = worse(trace[turn, 0], gap), worse(trace[turn, 1], size)
+            trace[o, turn, 0], trace[o, turn, 1] = gap, size
             rest[o] = size < step_size or (size < sure and size * size < step_size * before)
             if not finite[o]:
                 break
@@ -116,56 +118,6 @@ def solve_each(
         for k in range(n):
             both(T[k], factors[p + k])
         linearise(words, width, slot, factors, plane, v, B, e, blocks, behind)
-    return longest
-
-
-def summarised(
-    contact: _Index,
-    vertex: _Array,
-    plane: _Array,
-    letters: _Index,
-    p: int,
-    n: int,
-    rounding: float,
-    smallest: float,
-    columns: _Index,
-    planes: _Array,
-    points: _Array,
-) -> None:
-    """Fill columns (c, w), planes (c, 4) and points (c, 3, 4), all zero before, as `compact_equations` does."""
-    c, w = letters.shape
-    count, S, a = np.zeros(c), np.zeros((c, 3, 3)), np.zeros(3)
-    for i in range(c):
-        for j in range(w):
-            columns[i, j] = letters[i, j] - p if p <= letters[i, j] < p + n else n
-    for r in range(len(contact)):
-        i = contact[r]
-        count[i] += 1.0
-        for d in range(4):
-            planes[i, d] = plane[r, d]
-            points[i, 0, d] += vertex[r, d]
-    for r in range(len(contact)):
-        i = contact[r]
-        for d in range(3):
-            a[d] = vertex[r, d] - points[i, 0, d] / count[i]
-        for d in range(3):
-            for s in range(3):
-                S[i, d, s] += a[d] * a[s]
-    for i in range(c):
-        for d in range(4):
-            points[i, 0, d] /= math.sqrt(count[i])
-        least = rounding * (S[i, 0, 0] + S[i, 1, 1] + S[i, 2, 2]) + smallest
-        for k in range(1, 3):
-            pivot = 0
-            for d in range(1, 3):
-                if S[i, d, d] > S[i, pivot, pivot]:
-                    pivot = d
-            root = math.sqrt(max(S[i, pivot, pivot], least))
-            for d in range(3):
-                points[i, k, d] = S[i, pivot, d] / root
-            for d in range(3):
-                for s in range(3):
-                    S[i, d, s] -= points[i, k, d] * points[i, k, s]
 
 
 def worse(a: float, b: float) -> float:

@@ -53,6 +53,12 @@ def scales(covariance: Array) -> Array:
     Raises:
         InputError: One is not positive definite.
     """
+    try:
+        L = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+        if np.isfinite(L).all():
+            return L
+    except np.linalg.LinAlgError:
+        pass
     L = np.zeros(covariance.shape)
     for k, C in enumerate(covariance):
         try:

@@ -1,0 +1,34 @@
+"""What follows from an object that never changes is worked out once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
+
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
+
+_MOST = 16
+"""Answers that are kept of one object; further ones are worked out each time."""
+
+
+def remembered(function: Callable[Given, Found]) -> Callable[Given, Found]:
+    """Keep what a function of an object, and of plain values, returned, for as long as the object lives.
+
+    For objects that are compared by identity and never change. What is returned is shared, so nobody may change it.
+    """
+    known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Found]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def found(*given: Given.args, **named: Given.kwargs) -> Found:
+        answers = known.setdefault(given[0], {})
+        if given[1:] in answers:
+            return answers[given[1:]]
+        made = function(*given, **named)
+        if len(answers) < _MOST:
+            answers[given[1:]] = made
+        return made
+
+    return found
