@@ -11,6 +11,7 @@ import pytest
 from apo_bench.assembly.goals import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest, replay
@@ -183,8 +184,36 @@ def test_what_is_near_is_told_from_what_is_far():
     assert spans(high, shifted(high, (1.0, 0.0, 0.0), 0.1))[0] == []
     turned = high @ pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 40.0))
     assert spans(high, turned)[0] == []
-    tipped = high @ pose.at((0.0, 0.0, 0.0), (0.0, 40.0, 0.0))
-    assert spans(high, tipped)[0] == [(0, spans(high, tipped)[1])], "a turn about a level axis is always simulated"
+    tip = pose.at((0.0, 0.0, 0.0), (0.0, 40.0, 0.0))
+    low = shifted(stick, (0.0, 0.0, 1.0), 0.02)
+    assert spans(high, high @ tip)[0] == []
+    assert spans(low, low @ tip)[0] == [(0, spans(low, low @ tip)[1])], "an end of it may come down"
+
+
+def test_no_turn_that_comes_near_anything_is_left_out():
+    its, rng = scene(), np.random.default_rng(5)
+    data = initial_state(its.work, shown().layout.start)
+    others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
+    hand = [near.Moving(its.boxes["stick"], np.eye(4))]
+    came, left_out = 0, 0
+    for _ in range(60):
+        start = pose.at(rng.uniform((-0.1, -0.1, 0.03), (0.1, 0.1, 0.2)), rng.uniform(-30.0, 30.0, 3))
+        end = shifted(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
+        line, s = Trajectory(start, end, 0.2, np.asarray), np.linspace(0.0, 1.0, 201)
+        spans = near.near_spans(its, data, hand, ("stick",), line, s)
+        for i, T in enumerate(line.poses(s)):
+            depths = [
+                intrusion_depths(
+                    its.boxes["stick"], T[:3, :3], T[None, :3, 3], its.boxes[part], near._pose(its.work, data, part)
+                )
+                for part in others
+            ]
+            is_near = np.max(depths) > -near.NEAR_M[0]
+            came += is_near
+            left_out += not any(begin <= i <= end for begin, end in spans)
+            assert not is_near or any(begin <= i <= end for begin, end in spans)
+    assert came > 500
+    assert left_out > 500
 
 
 def test_nothing_is_left_out_while_something_moves():

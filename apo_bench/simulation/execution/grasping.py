@@ -35,6 +35,9 @@ class Obstacle(NamedTuple):
 
     boxes: tuple[Box, ...]
     T: Array
+    low: Array
+    """The lowest corner of the upright box around it, (3,), world, [m]."""
+    high: Array
 
 
 class RestingPart(NamedTuple):
@@ -64,7 +67,11 @@ class Grips(NamedTuple):
 
 def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
     """Every part but these, where it is believed to be."""
-    return tuple(Obstacle(solid.boxes, poses[part]) for part, solid in solids.items() if part not in without)
+    return tuple(
+        Obstacle(solid.boxes, T := poses[part], *upright_bounds(solid.boxes, T[:3, :3], T[:3, 3]))
+        for part, solid in solids.items()
+        if part not in without
+    )
 
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
@@ -201,15 +208,11 @@ def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[O
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
     low, high = upright_bounds(boxes, R, np.zeros(3))
     low, high = low + at.min(axis=0), high + at.max(axis=0)
-    met = [each for each in around if _overlap(low, high, *upright_bounds(each.boxes, each.T[:3, :3], each.T[:3, 3]))]
-    return np.max(
-        [np.full(len(at), -1.0), *(intrusion_depths(boxes, R, at, each.boxes, each.T) for each in met)], axis=0
-    )
-
-
-def _overlap(low: Array, high: Array, bottom: Array, top: Array) -> bool:
-    """Whether two upright boxes have more than their sides in common."""
-    return bool((low < top).all() and (high > bottom).all())
+    depth = np.full(len(at), -1.0)
+    for each in around:
+        if (low < each.high).all() and (high > each.low).all():
+            depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.boxes, each.T))
+    return depth
 
 
 def _back(stroke: Stroke, left: float) -> Array:

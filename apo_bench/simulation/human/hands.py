@@ -23,7 +23,7 @@ _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""
 _RUN_UP_S = 0.08
 """A motion is simulated from so long before it comes near: what trails wrongly by 0.3 mm is in place by then."""
-_NEAR_M = 0.0005
+_NEAR_M = (0.0005, 0.002)
 _NO_TURN = 1e-9
 """Lines that turn less are straight, [rad]."""
 _LOOK_STEPS = 10

@@ -44,7 +44,8 @@ def take_along(world: World, data: Any, held: tuple[str, ...], frames: tuple[Arr
     before, after, later = frames
     way = after @ pose.inverse(before)
     speed = (later[:3, 3] - after[:3, 3]) / TINY_S
-    spin = after[:3, :3] @ pose.log(pose.inverse(after) @ later)[3:] / TINY_S
+    D = (later[:3, :3] @ after[:3, :3].T) / (2 * TINY_S)
+    spin = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
     for part in held:
         T = way @ part_pose(world, data, part)
         place(world, data, part, T)

@@ -6,7 +6,7 @@ does. Boxes that a separating axis keeps apart by less than `NEAR_M` are near, w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,10 +19,10 @@ from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import Ints, World, part_pose
 
-NEAR_M, _NEAR_GROUP_M = 0.00015, 0.002
-"""A part drifts by less than the first in a hand; parts of a group have that much play and more in each other."""
-_APART_M = 0.001
-"""Looks along a line are this far apart."""
+NEAR_M = (0.00005, 0.00015)
+"""A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
+_LOOKS, _APART_M = 100, (0.0002, 0.001)
+"""So many looks are taken along a line, but not closer together than the first nor further apart than the second."""
 _RUN_UP_S = 0.04
 """A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
 _SHORTEST_S = 0.05
@@ -34,6 +34,13 @@ _UPRIGHT = 1e-6
 _Flags = NDArray[np.bool_]
 _Span = tuple[int, int]
 """The first and the last of the points of a line that are simulated."""
+
+
+class Obstacle(NamedTuple):
+    """A part that rests."""
+
+    boxes: tuple[Box, ...]
+    T: Array
 
 
 class Moving(NamedTuple):
@@ -52,7 +59,7 @@ def near_spans(
     s: Array,
     world: World | None = None,
     run_up_s: float = _RUN_UP_S,
-    near_m: float = NEAR_M,
+    near_m: tuple[float, float] = NEAR_M,
 ) -> list[_Span]:
     """The stretches of a line along which something comes near, each with its run-up.
 
@@ -62,18 +69,16 @@ def near_spans(
         s: (n + 1,), how far along the line the tip is at each step, from 0 to 1.
         world: Where it moves, by default where the robot works.
         run_up_s: A motion is simulated from so long before it comes near.
-        near_m: How near, for a single part.
+        near_m: How near, for a single part and for a group, [m].
     """
     n, world = len(s) - 1, world or scene.work
     others = [part for part in (*world.free, *world.fixed) if part not in held]
     if not _still(world, data, others):
         return [(0, n)]
+    obstacles = [Obstacle(scene.boxes[part], _pose(world, data, part)) for part in others]
     far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
-    looks = np.searchsorted(s, np.arange(0.0, s[-1], _APART_M / max(far, _APART_M)))
-    looks = np.unique(np.append(looks, n))
-    poses = {part: _pose(world, data, part) for part in others}
-    obstacles = {part: (scene.boxes[part], T) for part, T in poses.items()}
-    near = _near(moving, obstacles, line, s[looks], near_m if len(held) < 2 else _NEAR_GROUP_M)
+    looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(far))), n))
+    near = _near(moving, obstacles, line, s[looks], near_m[len(held) > 1])
     return _spans(near, looks, n, run_up_s, float(scene.physics.timestep_s))
 
 
@@ -82,39 +87,49 @@ def clear(scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ..
     return not near_spans(scene, data, moving, held, Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
 
 
-def _near(
-    moving: Iterable[Moving],
-    obstacles: Mapping[str, tuple[tuple[Box, ...], Array]],
-    line: Trajectory,
-    s: Array,
-    margin: float,
-) -> _Flags:
-    """(k,), at which places along the line something is near."""
-    angle = float(np.linalg.norm(line.turn))
-    turning = angle > _UPRIGHT
-    if turning and abs((line.start[:3, :3] @ line.turn)[2]) < (1.0 - _UPRIGHT) * angle:
-        return np.ones(len(s), dtype=np.bool_)
-    R, tips = line.start[:3, :3], line.start[:3, 3] + s[:, None] * (line.end[:3, 3] - line.start[:3, 3])
-    near = np.zeros(len(s), dtype=np.bool_)
+def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Trajectory, s: Array, margin: float) -> _Flags:
+    """(k,), at which places along the line something is near.
+
+    What turns is taken as the box around all that it sweeps, and nothing else is looked at.
+    """
+    R, start = line.start[:3, :3], line.start[:3, 3]
+    tips, near = start + s[:, None] * (line.end[:3, 3] - start), np.zeros(len(s), dtype=np.bool_)
+    turns = float(np.linalg.norm(line.turn)) > _UPRIGHT
+    bounds = np.array([upright_bounds(boxes, T[:3, :3], T[:3, 3]) for boxes, T in obstacles])
     for boxes, T_tip in moving:
         low, high = upright_bounds(boxes, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
-        if turning:
-            low, high = _swept(low, high)
-        for others, T in obstacles.values():
-            bottom, top = upright_bounds(others, T[:3, :3], T[:3, 3])
-            may = ((tips + low < top + margin) & (tips + high > bottom - margin)).all(axis=1) & ~near
-            if turning:
-                near |= may
-            elif may.any():
-                at = tips[may] + R @ T_tip[:3, 3]
-                near[may] = intrusion_depths(boxes, R @ T_tip[:3, :3], at, others, T) > -margin
+        if turns:
+            low, high = _swept(low, high, R @ line.turn)
+        low, high = tips + (low - margin), tips + (high + margin)
+        may: _Flags = np.all((low[:, None] < bounds[:, 1]) & (high[:, None] > bounds[:, 0]), axis=-1)
+        if turns:
+            near |= may.any(axis=1)
+            continue
+        for i in map(int, np.flatnonzero(may.any(axis=0))):
+            look = may[:, i] & ~near
+            if look.any():
+                at = tips[look] + R @ T_tip[:3, 3]
+                near[look] = intrusion_depths(boxes, R @ T_tip[:3, :3], at, *obstacles[i]) > -margin
     return near
 
 
-def _swept(low: Array, high: Array) -> tuple[Array, Array]:
-    """The corners of the upright box around what an upright box sweeps while it turns about the vertical."""
-    reach = float(np.hypot(*np.maximum(np.abs(low), np.abs(high))[:2]))
-    return np.array([-reach, -reach, low[2]]), np.array([reach, reach, high[2]])
+def _apart(far: float) -> float:
+    """How far apart looks are along a line of this length, [m], as a part of it."""
+    least, most = _APART_M
+    return min(max(far / _LOOKS, least), most) / max(far, least)
+
+
+def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
+    """The corners of an upright box around what an upright box sweeps while it turns about the origin.
+
+    Args:
+        turn: (3,), the rotation vector, world, [rad]. Without its level part everything turns about the vertical; with
+            it nothing is further from there than that part times how far it is from the origin.
+    """
+    corner = np.maximum(np.abs(low), np.abs(high))
+    off = float(np.hypot(*turn[:2]) * np.linalg.norm(corner))
+    reach = float(np.hypot(*corner[:2])) + off
+    return np.array([-reach, -reach, low[2] - off]), np.array([reach, reach, high[2] + off])
 
 
 def _spans(near: _Flags, looks: Ints, n: int, run_up_s: float, step_s: float) -> list[_Span]:

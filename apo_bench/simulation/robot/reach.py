@@ -11,7 +11,9 @@ from apo_bench.simulation.scene.arm import Kinematics
 
 _KNOT_M, _KNOT_RAD = 0.03, 0.15
 """Inverse kinematics is solved at least this densely along a line."""
-_FAR_M, _FAR_RAD = 0.1, 0.5
+_SHORT_M, _SHORT_RAD = 0.01, 0.05
+"""So short a line has one knot in its middle; any other has two at least."""
+_FAR_M, _FAR_RAD = 0.3, 1.0
 """The spacing of knots where only the joint angles at the end are asked for."""
 
 
@@ -24,7 +26,9 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Array
     """
     if len(s) == 1:
         return np.asarray(q)[None]
-    count = max(4, int(np.ceil((s[-1] - s[0]) * _steps(line, _KNOT_M, _KNOT_RAD))) + 1)
+    part = float(s[-1] - s[0])
+    least = 3 if part * _steps(line, _SHORT_M, _SHORT_RAD) <= 1.0 else 4
+    count = max(least, int(np.ceil(part * _steps(line, _KNOT_M, _KNOT_RAD))) + 1)
     at = np.linspace(s[0], s[-1], count)
     found = _angles(kinematics, line, at, q)
     return None if found is None else np.asarray(CubicSpline(at, found)(s))
