@@ -48,6 +48,17 @@ def slow_before(assembly: Assembly, found: Arrival, poses: Poses, way: Array) ->
     return depth
 
 
+def mouths(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
+    """How far before the goal the part comes to where walls begin that it goes between, [m], the first one first."""
+    ends = set[float]()
+    for m, e in _walls(found):
+        moved, stands = (poses[of.part] for of in (m, e))
+        ahead = (assembly.face(m).outline @ moved[:3, :3].T + moved[:3, 3]) @ way
+        before = (assembly.face(e).outline @ stands[:3, :3].T + stands[:3, 3]) @ way
+        ends.add(float(ahead.max() - before.min()))
+    return tuple(sorted(ends, reverse=True))
+
+
 def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
     """Normals of the part's faces, (3,) each, that later operations fit or slide something against.
 

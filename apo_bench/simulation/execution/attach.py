@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import change
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
-from apo_bench.simulation.robot.paths import shifted, smooth, steady
+from apo_bench.simulation.robot.paths import Trajectory, paced, shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 
 _PLACE, _TOUCH, _INSERT, _SLIDE = 0.06, 0.01, 0.06, 0.005
@@ -20,6 +22,10 @@ _BOTTOM_M = 0.003
 """From this far before a bottom it is felt for."""
 ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
+_THROUGH = 0.15
+"""Steady speed [m/s] where only walls are that the part is between already."""
+_BEFORE_M, _BEHIND_M = 0.008, 0.004
+"""A mouth may be so much nearer or farther than it is believed to be."""
 _BEYOND_M, _OFF_M = 0.004, 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
 
@@ -45,7 +51,8 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
     guard, rise, found = Guard(t.into.way, t.insert_n), t.floats, None
     if t.into.left is not None and second is not None:
         there = shifted(shifted(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
-        left, found = press_in(robot, t, grip, there @ grip.T_part_tip, _INSERT, guard, ARRIVED_M)
+        line = _into(robot, t, there @ grip.T_part_tip, t.into.left)
+        left, found = press_in(robot, t, grip, line, guard, ARRIVED_M)
         if left > ARRIVED_M:
             return left + t.into.left, grip
         change(robot, t, grip, second, after_search(found, shifted(there, UP, -rise) @ second.T_part_tip))
@@ -53,14 +60,15 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
         robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
     goal = after_search(found, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if any(macro.name == "move-to-bottom" for macro in t.macros):
-        left, found = press_in(robot, t, grip, shifted(goal, t.into.way, -_BOTTOM_M), _INSERT, guard, ARRIVED_M)
+        line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
+        left, found = press_in(robot, t, grip, line, guard, ARRIVED_M)
         if left == 0.0:
             robot.follow(steady(robot.T, after_search(found, shifted(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard)
     else:
-        left, _ = press_in(robot, t, grip, goal, _INSERT, guard, ARRIVED_M)
+        left, _ = press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, ARRIVED_M)
     lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
-    robot.wait(0.05)
+    robot.stand()
     return left, grip
 
 
@@ -69,21 +77,29 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
     robot.stage = "attach"
     down = Guard(t.into.way, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
-    left, found = press_in(robot, t, grip, shifted(goal, t.into.way, -t.slow), _PLACE, down, 0.0)
+    above = steady(robot.T, shifted(goal, t.into.way, -t.slow), _PLACE)
+    left, found = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:
         end = after_search(found, shifted(goal, t.into.way, _OVERTRAVEL_M))
-        press_in(robot, t, grip, end, _TOUCH, down, _OVERTRAVEL_M + t.depth / 2)
-    robot.wait(0.05)
+        press_in(robot, t, grip, steady(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.depth / 2)
+    robot.stand()
     return 0.0
+
+
+def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
+    """On to `left` [m] before the goal, slowly where a mouth may be."""
+    far = float(np.linalg.norm(end[:3, 3] - robot.T[:3, 3]))
+    at = [far + left - mouth for mouth in t.mouths]
+    return paced(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
 
 
 def _slide(robot: Robot, t: Transfer, side: Array) -> None:
     """Off the floor by a hair, sideways until it touches, and down again."""
     robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
-    robot.wait(0.05)
+    robot.stand()
     robot.follow(steady(robot.T, shifted(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
     robot.follow(steady(robot.T, shifted(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))
-    robot.wait(0.05)
+    robot.stand()
 
 
 def pull_out(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> Grip:

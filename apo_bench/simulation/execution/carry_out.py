@@ -9,8 +9,8 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer, first_contac
 from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-_LIFT, _CARRY, _LOWER = 0.25, 0.35, 0.2
-"""Peak speeds with a part, [m/s]: it drifts in the hand by some hundredths of a millimetre, the faster the more."""
+_LIFT, _CARRY, _LOWER = (0.4, 0.25), (0.5, 0.35), (0.35, 0.2)
+"""Peak speeds with a part, and with one that carries others, [m/s]: it drifts in the hand, the faster the more."""
 _LOST_LOAD = 0.8
 """A hand that feels less than this part of the weight of a group has lost some of it."""
 
@@ -56,17 +56,17 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.carried:
         robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT))
+    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "carry"
-    before = shifted(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.into.travel)
+    before = shifted(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.begins)
     if t.into.level:
         before = shifted(before, UP, t.floats)
-    robot.go(at_height(before, max(t.safe, before[2, 3])), _CARRY)
-    robot.follow(smooth(robot.T, before, _LOWER))
-    robot.wait(0.1)
+    robot.go(at_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
+    robot.follow(smooth(robot.T, before, _LOWER[bool(t.carried)]))
+    robot.stand()
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.load() < _LOST_LOAD * t.weight_n:
         raise Halt("carry", "lost_grasp", " or ".join(t.carried))

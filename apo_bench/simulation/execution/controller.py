@@ -62,7 +62,7 @@ def replay(
         return ended
     robot, after = Robot(scene, start, watch, fidelity), list[Snapshot | None]([None] * len(plan.assembly))
     timeline = list[tuple[Step, float]]()
-    with sleeping(scene.work, fidelity == "contact"):
+    with sleeping(scene.work, scene.grasp == "friction"):
         outcome = refused or _carry_out(plan, robot, todo, after, timeline, cache, way, most_s)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(

@@ -7,7 +7,7 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
 from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-_FREE, _NEAR = 1.4, 0.55
+_FREE, _NEAR = 1.4, 0.8
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
 _DEPART_M = 0.09
 _OPEN_TO_PICK_M, _OPEN_TO_RELEASE_M = 0.012, 0.008
@@ -22,14 +22,14 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
     robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=3.0)
     robot.handle(t.part)
-    robot.fingers(min(grip.half_width + _OPEN_TO_PICK_M, robot.arm.opening_m), 0.1)
+    robot.fingers(min(grip.half_width + _OPEN_TO_PICK_M, robot.arm.opening_m))
     robot.follow(smooth(robot.T, at, _NEAR))
-    robot.wait(0.05)
+    robot.stand()
     robot.hold(t.part, *t.carried)
     if robot.scene.grasp == "weld":
         robot.weld(t.part, True)
     else:
-        robot.fingers(grip.half_width - robot.arm.squeeze_m, 0.25)
+        robot.fingers(grip.half_width - robot.arm.squeeze_m)
     check_hold(robot, grip)
 
 
@@ -37,7 +37,7 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "release"
     if robot.scene.grasp == "weld":
         robot.weld(t.part, False)
-    robot.fingers(min(grip.half_width + _OPEN_TO_RELEASE_M, robot.arm.opening_m), 0.25)
+    robot.fingers(min(grip.half_width + _OPEN_TO_RELEASE_M, robot.arm.opening_m))
     robot.hold()
 
 
@@ -51,7 +51,7 @@ def depart(robot: Robot, t: Transfer) -> None:
 def change(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
     """Let go, and take the part at another place."""
     stage = robot.stage
-    robot.wait(0.05)
+    robot.stand()
     release(robot, t, grip)
     depart(robot, t)
     robot.stage = stage

@@ -12,7 +12,15 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_boxes
 from apo_bench.geometry.solid import extent
-from apo_bench.insertion.surroundings import OVER_M, ends_of, later_walls, neighbours, slide_directions, slow_before
+from apo_bench.insertion.surroundings import (
+    OVER_M,
+    ends_of,
+    later_walls,
+    mouths,
+    neighbours,
+    slide_directions,
+    slow_before,
+)
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (
@@ -147,6 +155,7 @@ def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: 
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
         slow=slow_before(plan.assembly, comes, after, into.way),
+        mouths=mouths(plan.assembly, comes, after, into.way),
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,
         insert_n=_INSERT_WEIGHTS * min(near, default=held),

@@ -11,7 +11,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
-from apo_bench.simulation.robot.paths import shifted, smooth, steady
+from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
 from apo_bench.simulation.robot.robot import Guard, Robot
 
 _YAWS_DEG, _YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
@@ -27,7 +27,7 @@ _PIECE_M, _NOTHING_M = 0.01, 1e-6
 
 
 def press_in(
-    robot: Robot, t: Transfer, grip: Grip, end: Array, speed: float, guard: Guard, near: float
+    robot: Robot, t: Transfer, grip: Grip, line: Trajectory, guard: Guard, near: float
 ) -> tuple[float, Array | None]:
     """A guarded motion of the tip that may search where it is stopped farther than `near` [m] from its end.
 
@@ -35,7 +35,8 @@ def press_in(
         What is left of it, [m], and what brings the poses that were meant to those that were found, (4, 4), world; None
         if nothing was searched for or found.
     """
-    left, found, meant, aside = robot.follow(steady(robot.T, end, speed), guard), None, end, 0.0
+    end = meant = line.end
+    left, found, aside = robot.follow(line, guard), None, 0.0
     if t.front is None:
         return left, None
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)

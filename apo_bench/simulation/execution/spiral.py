@@ -5,6 +5,9 @@ Each is called once a physics step with the force on the part in the hand, and s
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
@@ -26,6 +29,19 @@ _PATIENCE, _DOWN_S = 3.0, 1.0
 """A spiral ends after so many times the time that its length takes, and this long, [s], for the way ahead."""
 
 
+class _Felt:
+    """The force on the part, averaged: called once a physics step. Plain numbers, since arrays this small are slow."""
+
+    def __init__(self, guard: Guard, step_s: float) -> None:
+        self._way, self._part, self._force = guard.way.tolist(), step_s / _FELT_S, [0.0, 0.0, 0.0]
+
+    def __call__(self, force: Sequence[float]) -> tuple[float, list[float]]:
+        """How hard it is pushed back, [N], and the rest of the force, across, (3,), [N]."""
+        self._force = [mean + (now - mean) * self._part for mean, now in zip(self._force, force, strict=True)]
+        push = -sum(f * w for f, w in zip(self._force, self._way, strict=True))
+        return push, [f + push * w for f, w in zip(self._force, self._way, strict=True)]
+
+
 class Spiral:
     """Across while the part is pushed back, ahead while it is not: it ends where the part drops in."""
 
@@ -43,24 +59,23 @@ class Spiral:
         first = np.cross((0.0, 0.0, 1.0) if level else (0.0, 1.0, 0.0), guard.way)
         first /= np.linalg.norm(first)
         self._axes = np.array([first, np.cross(guard.way, first)])
-        self._force, self._ahead, self._speed, self._angle = np.zeros(3), 0.0, 0.0, 0.0
+        self._felt, self._ahead, self._speed, self._angle = _Felt(guard, step_s), 0.0, 0.0, 0.0
         self._left = round((_PATIENCE * np.pi * radius**2 / PITCH_M / _ACROSS + _DOWN_S) / step_s)
         self.found = False
 
     @property
     def aside(self) -> Array:
         """How far off the middle it is, (3,), world, [m]."""
-        return np.asarray(self._r * np.array([np.cos(self._angle), np.sin(self._angle)]) @ self._axes)
+        return np.array([self._r * math.cos(self._angle), self._r * math.sin(self._angle)]) @ self._axes
 
     @property
     def _r(self) -> float:
-        return PITCH_M * self._angle / (2.0 * np.pi)
+        return PITCH_M * self._angle / (2.0 * math.pi)
 
-    def __call__(self, force: Array) -> Array | None:
+    def __call__(self, force: Sequence[float]) -> Array | None:
         """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
-        self._force += (force - self._force) * self.step_s / _FELT_S
-        push = -float(self._force @ self.guard.way)
-        side = float(np.linalg.norm(self._force + push * self.guard.way))
+        push, across = self._felt(force)
+        side = math.hypot(*across)
         self.found, self._left = self._ahead > self.deep, self._left - 1
         if self.found or self._r > self.radius or self._left < 0 or side > push + self.guard.newton:
             return None
@@ -78,17 +93,16 @@ class Easing:
 
     def __init__(self, guard: Guard, length: float, step_s: float) -> None:
         self.guard, self.length, self.step_s = guard, length, step_s
-        self._force, self._offset, self._ahead = np.zeros(3), np.zeros(3), 0.0
+        self._felt, self._offset, self._ahead = _Felt(guard, step_s), np.zeros(3), 0.0
         self.stopped = False
 
-    def __call__(self, force: Array) -> Array | None:
+    def __call__(self, force: Sequence[float]) -> Array | None:
         """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
-        self._force += (force - self._force) * self.step_s / _FELT_S
-        push = -float(self._force @ self.guard.way)
+        push, side = self._felt(force)
         self.stopped = push > self.guard.newton
         if self.stopped or self._ahead >= self.length:
             return None
         ahead = min(self.step_s * _EASE, self.length - self._ahead)
-        across = self.step_s * _YIELD * (self._force + push * self.guard.way)
+        across = self.step_s * _YIELD * np.array(side)
         self._ahead, self._offset = self._ahead + ahead, self._offset + across + ahead * self.guard.way
         return self._offset

@@ -12,6 +12,8 @@ from apo_bench.insertion.macros import MacroName
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot.paths import at_height, shifted
 
+_AHEAD_M = 0.01
+"""A motion from above is guarded from so far above where it turns slow."""
 SAFE_M = 0.15
 """Least height of the tip at which parts are carried over the others."""
 _HOVER_M = 0.11
@@ -79,6 +81,8 @@ class Transfer:
     """Height of the tip at which the part is carried over everything that stands, [m]."""
     slow: float
     """From this far before the goal a motion from above goes slowly: contact may come any moment, [m]."""
+    mouths: tuple[float, ...]
+    """So far before the goal the part comes to where walls begin that it goes between, [m]."""
     weight_n: float
     """The weight of the part and what it carries, [N]."""
     place_n: float
@@ -92,6 +96,11 @@ class Transfer:
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""
+
+    @property
+    def begins(self) -> float:
+        """How far before the goal the guarded motion begins, [m]: from above, just before it turns slow."""
+        return self.into.travel if self.into.level else min(self.into.travel, self.slow + _AHEAD_M)
 
     @property
     def depth(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final
@@ -14,6 +14,8 @@ from apo_bench.geometry.arrays import Array
 
 _PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
+_GAIN, _CELL_M = 0.6, 2e-5
+"""How fast a paced motion gains and loses speed, [m/s^2]; its speed is found in cells of this length."""
 _STRAIGHT = 1e-8
 """Rotations this near to none are as good as their antisymmetric part, which is quick to have."""
 
@@ -58,6 +60,22 @@ def steady(start: Array, end: Array, speed: float, ramp: float = 0.1) -> Traject
     return Trajectory(start, end, seconds, _Trapezoid(ramp / seconds))
 
 
+def paced(start: Array, end: Array, quick: float, slow: float, stretches: Sequence[tuple[float, float]]) -> Trajectory:
+    """As `steady`, at one speed [m/s] along some stretches, from and to so far from the start, [m], else at another."""
+    far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
+    x = np.linspace(0.0, far, max(2, round(far / _CELL_M)) + 1)
+    limit = np.full(len(x), quick)
+    for begin, stop in stretches:
+        limit[(x >= begin) & (x <= stop)] = slow
+    limit[[0, -1]] = 0.0
+    squares, gain = limit**2, 2.0 * _GAIN * (x[1] - x[0]) * np.arange(len(x))
+    squares = np.minimum.accumulate(squares - gain) + gain
+    squares = (np.minimum.accumulate((squares + gain)[::-1]) - gain[::-1])[::-1]
+    v = np.sqrt(squares)
+    t = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(x) / (v[1:] + v[:-1]))])
+    return Trajectory(start, end, float(t[-1]), _Table(t / t[-1], x / far))
+
+
 def minimum_jerk(t: Array) -> Array:
     """10 t^3 - 15 t^4 + 6 t^5 (Flash and Hogan, 1985)."""
     return t**3 * (10.0 + t * (-15.0 + 6.0 * t))
@@ -74,6 +92,18 @@ class _Trapezoid:
         r, top = self.ramp, 1.0 - self.ramp
         s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
         return s / top
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Progress by what is known of some times."""
+
+    times: Array
+    parts: Array
+
+    def __call__(self, t: Array) -> Array:
+        return np.interp(t, self.times, self.parts)
 
 
 def _turn_between(start: Array, end: Array) -> Array:

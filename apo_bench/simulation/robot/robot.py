@@ -7,7 +7,7 @@ never reads where a part is. It is one class, longer than most: to follow, to fe
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -28,6 +28,10 @@ TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
+_FINGERS_M_S, _LONGEST_GRIP_S = 0.28, 0.2
+"""How fast the command of the fingers moves, and how long they may take to rest behind it."""
+_REST_RAD_S, _REST_M_S = 2e-3, 3e-3
+"""Joints and fingers that move slower than this rest."""
 _SHIFT_M = 0.001
 """How far the tip is shifted in thought to see how the joints turn."""
 
@@ -108,7 +112,7 @@ class Robot:
         for T in waypoints_unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
-    def servo(self, law: Callable[[Array], Array | None]) -> None:
+    def servo(self, law: Callable[[Sequence[float]], Array | None]) -> None:
         """Shift the tip a little, step by step, as the force on the part in the hand has it.
 
         Args:
@@ -120,11 +124,12 @@ class Robot:
         """
         q, T, offset, passed = self.q, self.T, np.zeros(3), 0
         moves = np.array([self._across(q, T, axis) for axis in np.eye(3)])
-        while (asked := law(self.force())) is not None:
+        force, ctrl, drives = self._feel(), self.data.ctrl, self._drives
+        while (asked := law(force)) is not None:
             offset, passed = asked, passed + 1
-            self.data.ctrl[self._drives] = q + offset @ moves
+            ctrl[drives] = q + offset @ moves
             mujoco.mj_step(self.model, self.data)
-            self._feel()
+            force = self._feel()
             if passed % self._every == 0:
                 self._look()
         self.q, self.T = q + offset @ moves, shifted(T, offset, 1.0)
@@ -148,27 +153,44 @@ class Robot:
             if n == self._every:
                 self._look()
 
-    def fingers(self, to: float, seconds: float = 0.25) -> None:
-        """Command both fingers to an opening [m] and wait; beyond the part's surface the force limit rules."""
+    def stand(self, most_s: float = 0.1) -> None:
+        """Stand still until the joints and the fingers rest, at most so long, [s]."""
+        for _ in range(round(most_s / TICK_S)):
+            self.wait(TICK_S)
+            if self._rests():
+                return
+
+    def fingers(self, to: float) -> None:
+        """Command both fingers to an opening [m] until they rest; beyond the part's surface the force limit rules."""
+        start = self._nearest_command(to)
+        ticks = max(1, round(abs(to - start) / _FINGERS_M_S / TICK_S))
         if self.fidelity == "contact" and not self._held and self._may_open(to):
             self.data.qpos[self._fingers], self.data.ctrl[self._grip] = to, to
-            return self._pass(seconds)
-        start = float(self.data.ctrl[self._grip])
-        ticks = max(1, round(seconds / TICK_S))
-        for i in range(1, ticks + 1):
-            self.data.ctrl[self._grip] = start + (to - start) * min(1.0, i / (0.6 * ticks))
+            return self._pass(ticks * TICK_S)
+        for i in range(1, ticks + round(_LONGEST_GRIP_S / TICK_S)):
+            self.data.ctrl[self._grip] = start + (to - start) * min(1.0, i / ticks)
             self.wait(TICK_S)
+            if self._rests() and (i >= ticks or self._grips_fully()):
+                break
+        self.data.ctrl[self._grip] = to
+
+    def _nearest_command(self, to: float) -> float:
+        """The command nearest to `to` at which the fingers push as they do now, [m]: their force is limited."""
+        command, slack = float(self.data.ctrl[self._grip]), self._slack
+        return min(max(command, self.opening() - slack), self.opening() + slack)
+
+    def _grips_fully(self) -> bool:
+        """Whether the fingers push with all the force that they have."""
+        return abs(float(self.data.ctrl[self._grip]) - self.opening()) >= self._slack
+
+    def _rests(self) -> bool:
+        """Whether the joints and the fingers rest, as far as they feel."""
+        turning, closing = np.abs(self.data.qvel[self._dof]), np.abs(self.data.qvel[self._finger_dof])
+        return bool(turning.max() < _REST_RAD_S and closing.max() < _REST_M_S)
 
     def opening(self) -> float:
         """What the fingers measure, [m] per finger."""
         return float(self.data.qpos[self._fingers].min())
-
-    def force(self) -> Array:
-        """The net force of everything but the gripper on what is in the hand, (3,) world, [N].
-
-        What the parts of a group exert on each other cancels.
-        """
-        return np.asarray(self._net @ self._forces)
 
     def memory(self) -> tuple[Any, ...]:
         """What the controller knows, apart from the physics; for `remember`."""
@@ -245,10 +267,12 @@ class Robot:
         if guard is None:
             self._run_free(rows)
             return len(targets)
+        a, b, c = guard.way.tolist()
         for i, row in enumerate(rows, start=1):
             ctrl[:] = row
             step(model, data)
-            if self._pushed_back(guard):
+            x, y, z = self._feel()
+            if -(x * a + y * b + z * c) > guard.newton:
                 self._look()
                 return i
             if i % every == 0:
@@ -281,14 +305,13 @@ class Robot:
             self.watch(self.data)
 
     def _feel(self) -> list[float]:
-        """The force on the part in the hand, remembered if it is the largest so far."""
+        """The net force of everything but the gripper on what is in the hand, (3,) world, [N].
+
+        What the parts of a group exert on each other cancels. The largest so far is remembered.
+        """
         x, y, z = f = (self._net @ self._forces).tolist()
         self.peak_force_n = max(self.peak_force_n, math.sqrt(x * x + y * y + z * z))
         return f
-
-    def _pushed_back(self, guard: Guard) -> bool:
-        (x, y, z), (a, b, c) = self._feel(), guard.way.tolist()
-        return -(x * a + y * b + z * c) > guard.newton
 
     def _hardest_blow(self) -> tuple[str, float]:
         """The part that the arm strikes hardest without handling it, and the force, [N]."""
@@ -306,15 +329,18 @@ class Robot:
         """After a guard: the measured joint positions become the command, which takes the pressure away."""
         self.q = np.array(self.data.qpos[self._qpos])
         self.T = self.scene.kinematics.forward(self.q)
-        self.wait(0.05)
+        self.stand(0.06)
 
     def _find_joints(self) -> None:
         model = self.model
         joints = [model.joint(f"arm/{name}").id for name in self.arm.joints]
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self.step_s = float(model.opt.timestep)
-        self._drives = [model.actuator(f"arm/{name}").id for name in self.arm.joints]
+        self._drives = np.array([model.actuator(f"arm/{name}").id for name in self.arm.joints])
         self._grip = model.actuator(f"arm/{self.arm.grip}").id
+        limit, stiffness = model.actuator_forcerange[self._grip, 1], model.actuator_gainprm[self._grip, 0]
+        self._slack = float(limit / stiffness) if model.actuator_forcelimited[self._grip] else math.inf
+        self._finger_dof = np.array([model.jnt_dofadr[model.joint(f"arm/{name}").id] for name in self.arm.fingers])
         self._fingers = np.array([model.jnt_qposadr[model.joint(f"arm/{name}").id] for name in self.arm.fingers])
         gain, bias = model.actuator_gainprm[self._drives, 0], model.actuator_biasprm[self._drives, 2]
         self._lead = (model.dof_damping[model.jnt_dofadr[joints]] - bias) / gain
