@@ -17,6 +17,8 @@ from apo_bench.files.csv_form import table
 from apo_bench.files.observation import as_planned
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
+from apo_bench.sweeps.grid import SweepSettings
+from apo_bench.sweeps.sweep import run_sweep
 
 SCENARIO = "stick_in_tower"
 
@@ -161,9 +163,8 @@ def _residuals(work: Path, estimates: bytes, truth: bytes) -> bytes:
 
 def _run(work: Path) -> Mapping[str, bytes]:
     """The folder of a small sweep."""
-    out = work / "run"
-    grid = ["block_on_block", "--levels", "0,1", "--careless", "0", "--methods", "oracle,none", "--trials", "2"]
-    _must(["sweep", *grid, "--fidelity", "contact", "--workers", "1", "--out", str(out)])
+    out, methods = work / "run", ("oracle", "none")
+    run_sweep(SweepSettings(("block_on_block",), (0.0, 1.0), (0.0,), methods, trials=2, fidelity="contact"), out)
     return {name: (out / name).read_bytes() for name in ("trials.jsonl", "run.json", "timing.jsonl")}
 
 

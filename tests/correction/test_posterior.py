@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap, Operation
 from apo_bench.correction.correctors import correct
+from apo_bench.correction.many import correct_many
 from apo_bench.correction.posterior import contains_truth, freedom, jacobian_rank, marginals
 from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.geometry import pose
@@ -76,8 +79,7 @@ def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> 
     n = len(scene.goals)
     L = crooked(n, np.random.default_rng(1), 0.5, 0.5) if correlated else scales(n, 0.5, 0.5)
     errors, stated = np.zeros((400, n, 6)), np.zeros((n, 6, 6))
-    for seed in range(len(errors)):
-        made = correct(look(scene, L, seed), "contact")
+    for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))])):
         assert made.covariance is not None
         errors[seed] = pose.log(pose.inverse(made.goals) @ scene.goals)
         stated += made.covariance / len(errors)
@@ -103,13 +105,19 @@ def test_contacts_take_uncertainty_away_and_add_none() -> None:
     assert np.linalg.eigvalsh(scaled).max() > 0.99
 
 
+@cache
+def corrected_towers() -> tuple[scenes.Scene, list[Observation], tuple[Correction, ...]]:
+    """300 draws of one tower, for every level."""
+    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    seen = [look(scene, L, seed) for seed in range(300)]
+    return scene, seen, correct_many(seen)
+
+
 @pytest.mark.parametrize(("level", "low", "high"), [(0.95, 0.90, 0.99), (0.5, 0.41, 0.59)])
 def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, high: float) -> None:
-    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
-    held = []
-    for seed in range(300):
-        seen = look(scene, L, seed)
-        held.append(contains_truth(seen, correct(seen, "contact"), scene.goals, level))
+    scene, seen, made = corrected_towers()
+    held = [contains_truth(one, found, scene.goals, level) for one, found in zip(seen, made, strict=True)]
+    assert len(held) == 300
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high
 

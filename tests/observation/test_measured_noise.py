@@ -282,8 +282,21 @@ def test_bad_noise_files_are_refused(
     with pytest.raises(InputError, match=message) as raised:
         make_noise(str(path), LEVEL)
     assert str(path) in str(raised.value)
-    assert main(["replay", "stick_in_tower", "--noise", str(path)]) == 2
+    assert main(["noise", "card", str(path)]) == 2
     assert capsys.readouterr().err == f"apo-bench: {raised.value}\n"
+
+
+def test_a_replay_refuses_a_bad_noise_file_with_the_same_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "noise.toml"
+    path.write_text(GOOD.replace("[turn]", "[turns]", 1), encoding="utf-8")
+    said = []
+    for command in (["noise", "card", str(path)], ["replay", "block_on_block", "--noise", str(path)]):
+        assert main(command) == 2
+        said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+    assert "unknown key 'turns'" in said[0]
 
 
 @pytest.mark.parametrize(

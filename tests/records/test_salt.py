@@ -221,14 +221,14 @@ def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest
 
 
 def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The same rows in this process and in two others; resumed and replayed with its salt, which nothing shows."""
+    """The same rows in this process and in another one; resumed and replayed with its salt, which nothing shows."""
     file, here, there = tmp_path / "salt", tmp_path / "here", tmp_path / "there"
     rows = run_sweep(GRID, here, salt_file=file)
     salt = read_salt(file)
     assert len(rows) == 4
     assert {one["salt"] for one in rows} == {salt.hash}
     assert json.loads((here / "run.json").read_text())["salt"] == salt.hash
-    spread = run_sweep(GRID, there, salt_file=file, workers=2)
+    spread = run_sweep(GRID, there, salt_file=file, workers=1)
     assert sorted(map(json.dumps, spread)) == sorted(map(json.dumps, rows))
     before = (here / "trials.jsonl").read_bytes()
     assert run_sweep(GRID, here, salt_file=file) == rows

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -29,8 +30,9 @@ from tests.benchmarks.test_headline import fidelity, kept_rows, key
 
 RECORD = Path(__file__).with_name("success_rate.json")
 SEEDS = range(10)
-FEWER = {"oracle": range(5), "paper-track": range(5)}
-"""What is right at every seed of every scenario, and takes longest, is asked less often."""
+"""Those of the record."""
+ASKED = dict.fromkeys(("none", "paper"), range(6)) | dict.fromkeys(("oracle", "paper-track"), range(5))
+"""Those that are run here; what is right at every seed of every scenario, and takes longest, is asked less often."""
 WHOLE = range(1)
 """At these seeds every motion is simulated; at the others where things may touch, which gives the same verdicts."""
 EXAMPLES = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
@@ -39,8 +41,8 @@ OTHERS = ("stick_on_castles", "block_on_block", "bridge_cycle", "fixture_alignme
 RATES = {"oracle": (0.99, 1.0), "paper": (0.97, 1.0), "paper-track": (0.95, 1.0), "none": (0.0, 0.05)}
 """The rates that the README claims, at least and at most; `none` only where a fit makes it fail."""
 FITS = (*EXAMPLES, "stick_on_castles")
-SURPRISE = 1e-4
-"""A count less likely than this under the claimed rate is a regression."""
+SURPRISE = 2.5e-3
+"""A count less likely than this under the claimed rate is a regression: of six, three failures in place of none."""
 METHODS = dict.fromkeys(EXAMPLES, ("oracle", "none", "paper", "paper-track"))
 METHODS |= dict.fromkeys(OTHERS, ("oracle", "none", "paper"))
 HEADLINE_METHODS = ("none", "paper", "contact")
@@ -97,16 +99,19 @@ class Ended(NamedTuple):
     def verdicts(self) -> dict[str, str]:
         """Method -> whether it was made as demonstrated, for each seed, as ones and zeros."""
         return {
-            method: "".join(str(int(self.rows[method, seed]["as_demonstrated"])) for seed in FEWER.get(method, SEEDS))
+            method: "".join(
+                str(int(self.rows[method, seed]["as_demonstrated"])) for seed in SEEDS if (method, seed) in self.rows
+            )
             for method in METHODS[self.name]
         }
 
 
-def ended(name: str) -> Ended:
+def ended(name: str, seeds: Mapping[str, range]) -> Ended:
+    """The trials of a scenario, method by method at these seeds."""
     found = {}
     for seed in SEEDS:
         cache = ReplayCache()
-        asked = [method for method in METHODS[name] if seed in FEWER.get(method, SEEDS)]
+        asked = [method for method in METHODS[name] if seed in seeds[method]]
         also = HEADLINE_METHODS if name in EXAMPLES and seed in HEADLINE_SEEDS else ()
         for method in dict.fromkeys((*asked, *also)):
             found[method, seed] = trial(name, method, seed, cache)
@@ -116,7 +121,7 @@ def ended(name: str) -> Ended:
 @pytest.fixture(scope="module", params=METHODS)
 def all_ended(request: pytest.FixtureRequest) -> Ended:
     """Run once for both tests."""
-    return ended(request.param)
+    return ended(request.param, ASKED)
 
 
 def bits(name: str) -> str:
@@ -166,5 +171,7 @@ def rate_of(name: str, method: str) -> float:
 
 
 if __name__ == "__main__":
-    record = {name: {"bits": bits(name), "verdicts": ended(name).verdicts} for name in METHODS}
+    record = {
+        name: {"bits": bits(name), "verdicts": ended(name, dict.fromkeys(RATES, SEEDS)).verdicts} for name in METHODS
+    }
     RECORD.write_text(json.dumps(record, indent=1) + "\n")
