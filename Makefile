@@ -15,7 +15,7 @@ headline: OUT ?= runs/headline_$(FIDELITY)
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
-NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m "numeric and not slow" -n 2 --dist worksteal \
+NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m "numeric and not slow" -n 0 \
     $$(grep -rl pytest.mark.numeric tests --include=test_*.py)
 MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 
@@ -34,13 +34,14 @@ headline: $(VENV)/.installed
 	    --out $(OUT)
 	$(BIN)/apo-bench report $(OUT)
 
+# three processes for two cores: some tests wait for a process or a limit
 test: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mkdocs --quiet build --strict --site-dir build/site
-	$(BIN)/pytest -q -n 2 --dist worksteal -m "not extras"
+	$(BIN)/pytest -q -n 3 --dist worksteal -m "not extras"
 	$(NUMERIC)
 
 # the tests that start a Ray cluster

@@ -75,6 +75,25 @@ def test_a_process_says_when_it_has_not_the_kernels_that_it_was_started_for(monk
     assert switches.missing() is None
 
 
+def test_every_kernel_has_its_command_and_one_that_fails_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(switches, "under", lambda asked: OWN)
+    names = ("one", "two", "three")
+    monkeypatch.setattr(
+        switches,
+        "switches",
+        lambda own: iter([*(Switch(name, {"NAME": name}, own) for name in names), "four is not run"]),
+    )
+    for failing, code in (("none", 0), ("two", 1)):
+        asked = f'echo "$NAME of $APO_BENCH_KERNELS"; echo aside >&2; test "$NAME" != {failing}'
+        assert switches.main(["sh", "-c", asked]) == code
+        said = capsys.readouterr().out
+        assert "-- four is not run\n" in said
+        for name in names:
+            assert f"-- under {name}\n{name} of {json.dumps(asdict(OWN))}\naside\n" in said
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [

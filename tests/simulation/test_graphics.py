@@ -19,7 +19,7 @@ def loaded():
 """
 REPLAY = """
 import gymnasium, apo_bench
-env = gymnasium.make("APOReplay-v0", scenario="stick_in_tower", level=0.0, careless=0.0, render_mode=MODE)
+env = gymnasium.make("APOReplay-v0", scenario="block_on_block", level=0.0, careless=0.0, render_mode=MODE)
 env.reset(seed=0)
 info = env.step(0 * env.action_space.sample())[-1]
 scene = env.unwrapped._scene
@@ -27,7 +27,7 @@ scene = env.unwrapped._scene
 COMPOSE = """
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
-scene = build_scene(load_scenario("stick_in_tower"))
+scene = build_scene(load_scenario("block_on_block"))
 """
 DRAW = """
 from apo_bench.errors import InputError
