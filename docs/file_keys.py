@@ -20,7 +20,8 @@ from fields import sentences
 
 from apo_bench.cli.setting_options import shown_default
 from apo_bench.io.strict_json import JsonNode
-from apo_bench.observation.noise_file import presets, read_noise
+from apo_bench.observation.noise_file import read_noise
+from apo_bench.observation.presets import presets
 from apo_bench.parts.allowed import ELEMENT_RULES
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import SETTINGS

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
-from scipy.ndimage import binary_erosion
 
 from apo_bench.depth_camera.distance import Shape, signed_distance
 from apo_bench.depth_camera.explained import share_explained
@@ -63,6 +62,8 @@ class Appearance:
 
     def points(self) -> Points:
         """The measured points; the outermost pixels of the regions are left out."""
+        from scipy.ndimage import binary_erosion
+
         at, rays, number = [], [], []
         for v, (view, image, mask) in enumerate(zip(self.views, self.images, self.masks, strict=True)):
             pixels = np.flatnonzero(binary_erosion(mask) & np.isfinite(image))

@@ -15,6 +15,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, failed, unknown
 from apo_bench.names import resolve
 from apo_bench.observation.models.level import Level
+from apo_bench.observation.presets import noise_path, presets
 
 __all__ = ["NOISES", "Level", "Noise", "make_noise"]
 
@@ -55,10 +56,11 @@ def make_noise(given: Any, level: Level) -> Noise:
         if not (math.isfinite(value) and value >= 0.0):
             raise InputError(f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.")
     if isinstance(given, str):
-        from apo_bench.observation.noise_file import noise_of_file, presets
+        if noise_path(given) is not None:
+            from apo_bench.observation.noise_file import noise_of_file
 
-        if (measured := noise_of_file(given, level)) is not None:
-            return measured
+            if (measured := noise_of_file(given, level)) is not None:
+                return measured
         if ":" not in given and given not in NOISES:
             raise InputError(_unknown(given, (*NOISES, *presets())))
     model = resolve(given, NOISES, "noise model")

@@ -1,9 +1,8 @@
-"""Noise files: what was measured of a pose estimator, as TOML; and those that come with the package."""
+"""Noise files: what was measured of a pose estimator, as TOML."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 
 from apo_bench.io.strict_json import JsonNode
@@ -13,31 +12,14 @@ from apo_bench.observation.models.empirical import Empirical, empirical_noise
 from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Fitted, MeasuredNoise
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.tails import Split, Tail
+from apo_bench.observation.presets import noise_path
 from apo_bench.records.short_names import RESIDUALS
-from apo_bench.resources import folder
 from apo_bench.scenario.keys import read_pose
 
 _SCHEMA = "apo-bench/noise/1"
 _FARTHEST_MM = 1e5
 _HUGE = 1e300
 """Degrees of freedom beyond are infinitely many."""
-
-
-def presets() -> Mapping[str, Path]:
-    """The noise files that come with the package, by the names they go by."""
-    return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
-
-
-def noise_path(name: str) -> Path | None:
-    """The file behind the name of a noise model, None if there is none.
-
-    A path that ends in .toml, a name that comes with the package, or `empirical:` and the path of a file of residuals.
-    """
-    if name.startswith(RESIDUALS):
-        return Path(name.removeprefix(RESIDUALS))
-    if name.endswith(".toml"):
-        return Path(name)
-    return presets().get(name)
 
 
 def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:

@@ -16,8 +16,9 @@ from apo_bench.names import resolve
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.level import Facts
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.observation.noise_file import noise_of_file, presets, read_noise
+from apo_bench.observation.noise_file import noise_of_file, read_noise
 from apo_bench.observation.observing import observe
+from apo_bench.observation.presets import presets
 from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"

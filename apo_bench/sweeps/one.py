@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
-from apo_bench.files.json_forms import observation_form, write_form
-from apo_bench.files.observation import read_observation_file, read_stated
 from apo_bench.io.reading import read_text
 from apo_bench.records.asked import in_python
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -26,13 +24,15 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.sweeps.local.alone import Say, run_alone
 from apo_bench.sweeps.worker import lost, trial_row
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
 from apo_bench.trial.trial import MEASURED, noise_of, run_measured
+
+if TYPE_CHECKING:
+    from apo_bench.sweeps.local.alone import Say
 
 MEASURED_AIR_M = 5e-3
 """A start that was measured may be wrong by so much: as far apart as `loose_success` lets faces be."""
@@ -69,6 +69,8 @@ def run_one(request: Request) -> Row:
     if request.cache is not None:
         KeptDemonstrations(request.cache)
     if request.limit_s is not None:
+        from apo_bench.sweeps.local.alone import run_alone
+
         return run_alone(partial(_run, request, spec), request.limit_s, partial(_lost, request, spec, scenario))
     found: list[Row] = []
     _run(request, spec, lambda kind, *news: found.extend(news))
@@ -128,6 +130,8 @@ def looked_at(
             )
     if observation is None:
         return watched(Request(scenario, asked)), False
+    from apo_bench.files.observation import read_observation_file
+
     stated = {name: value for name, value in deviations.items() if value is not None}
     seen, _, assumed = read_observation_file(observation, scenario, **stated)
     return seen, assumed
@@ -161,6 +165,8 @@ def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, fil
         else KeptDemonstrations(request.cache).recording(spec, scene)
     )
     if request.save_observation:
+        from apo_bench.files.json_forms import observation_form, write_form
+
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
@@ -168,6 +174,8 @@ def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, fil
 
 
 def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
+    from apo_bench.files.observation import read_stated
+
     observation = read_stated(path, scene.scenario)
     aloft = in_the_air(observation.assembly, observation.start, MEASURED_AIR_M)
     if aloft is not None:

@@ -7,7 +7,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.reached import Outcome
@@ -23,8 +23,6 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
@@ -32,6 +30,10 @@ from apo_bench.trial.row import head, result
 from apo_bench.trial.scene import scene_key, scene_of
 from apo_bench.trial.stages import Recording, record_demonstration
 from apo_bench.trial.trial import run_trial
+
+if TYPE_CHECKING:
+    from apo_bench.sweeps.environment_lock import EnvironmentLock
+    from apo_bench.sweeps.grid import Unit
 
 Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""

@@ -16,7 +16,7 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.files import json_forms as files
 from apo_bench.io.reading import read_bytes
-from apo_bench.observation.noise_file import noise_path
+from apo_bench.observation.presets import noise_path
 from apo_bench.records.relations import WRONG
 from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.records.short_names import RESIDUALS

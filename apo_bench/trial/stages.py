@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Layout, Observation, Plan
 from apo_bench.assembly.reached import Outcome, ReplayResult
-from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.verdict import Verdict, judge
@@ -29,7 +28,10 @@ from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.sensor.watch import DemonstrationCamera, DemonstrationImages
+
+if TYPE_CHECKING:
+    from apo_bench.depth_camera.range_sensor import RangeSensor
+    from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV = range(6)
 """Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
@@ -65,13 +67,19 @@ def record_demonstration(
 ) -> Recording:
     """Draw the truth of a trial and let the human demonstrate it; the eye `range` records images of that."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, salt), scene.clearance_mm)
-    watcher = DemonstrationCamera(scene.shown, stream(seed, TV, salt)) if eye == RANGE else None
-    demonstration = demonstrate(scene, layout, careless, stream(seed, DEMONSTRATION, salt), watcher)
-    return Recording(layout, demonstration, watcher.watched() if watcher else None)
+    rng = stream(seed, DEMONSTRATION, salt)
+    if eye != RANGE:
+        return Recording(layout, demonstrate(scene, layout, careless, rng))
+    from apo_bench.simulation.sensor.watch import DemonstrationCamera
+
+    watcher = DemonstrationCamera(scene.shown, stream(seed, TV, salt))
+    return Recording(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
 
 
 def range_sensor(scene: Scene, recording: Recording, level_mm: float) -> RangeSensor:
     """The range finder that recorded a demonstration, as a noise model; `level_mm` is the noise of a ray."""
+    from apo_bench.depth_camera.range_sensor import RangeSensor
+
     assert recording.images is not None, "record the demonstration with eye='range'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]

@@ -17,8 +17,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.models.plain import Plain
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.observation.noise_file import presets
 from apo_bench.observation.observing import observe
+from apo_bench.observation.presets import presets
 from apo_bench.show.noise_card import draw_errors, facts, listed_models, model_description, noise_card
 from tests import scenes
 

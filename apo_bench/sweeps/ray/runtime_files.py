@@ -9,7 +9,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
-from apo_bench.observation.noise_file import noise_path
+from apo_bench.observation.presets import noise_path
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.sweeps.environment_lock import Names
