@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from benchmarks.coverage import PAGE, STUDIES, TABLE, Setting, coverage, settings, size, tables
+from benchmarks.intervals import PAGE, STUDIES, TABLE, Setting, coverage, settings, size, tables
 
 
 def kept() -> list[tuple[Setting, int, float]]:

@@ -1,4 +1,4 @@
-"""How often do the intervals of a report hold the truth? `python benchmarks/coverage.py [WORKERS [EXPERIMENTS]]`
+"""How often do the intervals of a report hold the truth? `python benchmarks/intervals.py [WORKERS [EXPERIMENTS]]`
 (10,000 experiments per setting, of those that take long a fifth: some minutes on two cores).
 
 Sweeps are drawn from known rates, 0.05 to 0.95, with 50, 100 and 200 seeds, and the 95 % intervals are computed by the
@@ -45,7 +45,7 @@ SHAPES = tuple(product(("logistic", "lapses", "normal", "early", "late"), (2.0, 
 """Of curves that have a half level, and their steepness; `early` ones leave the ceiling early, `late` ones late."""
 HERE = Path(__file__).parent
 TABLE, PAGE = HERE / "results" / "coverage.csv", HERE.parent / "docs" / "how" / "statistics.md"
-BEGIN, END = "<!-- tables: python benchmarks/coverage.py -->", "<!-- end of tables -->"
+BEGIN, END = "<!-- tables: python benchmarks/intervals.py -->", "<!-- end of tables -->"
 
 
 class Setting(NamedTuple):
