@@ -7,7 +7,7 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
 from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-_FREE, _NEAR = 1.4, 0.8
+_FREE, _NEAR = 2.0, 0.8
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
 _DEPART_M = 0.09
 _OPEN_TO_PICK_M, _OPEN_TO_RELEASE_M = 0.012, 0.008
@@ -20,7 +20,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
     above = at_height(at, hover_pose(at))
     robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
-    robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=3.0)
+    robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=4.5)
     robot.handle(t.part)
     robot.fingers(min(grip.half_width + _OPEN_TO_PICK_M, robot.arm.opening_m))
     robot.follow(smooth(robot.T, at, _NEAR))
