@@ -20,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -64,8 +65,8 @@ def main() -> int:
         return 1
     rooms = list(dict.fromkeys(fault.room for _, fault in chosen))
     jobs: list[Fault | str] = [*rooms, *(fault for _, fault in chosen)]
-    with ThreadPoolExecutor(asked.workers) as pool:
-        ran = list(pool.map(lambda job: run(ROOT, job), jobs))
+    with tempfile.TemporaryDirectory() as work, ThreadPoolExecutor(asked.workers) as pool:
+        ran = list(pool.map(lambda job: run(ROOT, job, Path(work) / threading.current_thread().name), jobs))
     sound, found = dict(zip(rooms, ran, strict=False)), list(zip(chosen, ran[len(rooms) :], strict=True))
     for room, whole in sound.items():
         print(f"   {room:12} without an error: {whole.by}, {whole.seconds:.0f} s")
@@ -77,17 +78,21 @@ def main() -> int:
     return int(any(one.passed for _, one in found) or not all(whole.passed for whole in sound.values()))
 
 
-def run(root: Path, job: Fault | str) -> Ran:
+def run(root: Path, job: Fault | str, work: Path) -> Ran:
     """Run the tests of a room in a copy, with an error, or without one where only the room is named.
+
+    Args:
+        work: A folder for copies, one after the other at one place, so that Numba compiles again only what differs.
 
     Raises:
         RuntimeError: The tests could not be run.
     """
-    with tempfile.TemporaryDirectory() as place:
-        copy(root, Path(place))
-        if isinstance(job, Fault):
-            put(job, Path(place))
-        return tested(Path(place), job.room if isinstance(job, Fault) else job)
+    place = work / "copy"
+    shutil.rmtree(place, ignore_errors=True)
+    copy(root, place)
+    if isinstance(job, Fault):
+        put(job, place)
+    return tested(place, job.room if isinstance(job, Fault) else job)
 
 
 def copy(root: Path, place: Path) -> None:
@@ -97,7 +102,7 @@ def copy(root: Path, place: Path) -> None:
     for name in filter(None, said.split("\0")):
         if (root / name).is_file():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(root / name, place / name)
+            shutil.copy2(root / name, place / name)
 
 
 def is_possible(fault: Fault, place: Path) -> bool:
@@ -121,7 +126,8 @@ def tested(place: Path, room: str) -> Ran:
     """The tests of a room in a copy, up to the first that fails; what hypothesis draws is the same every time."""
     options = ["-q", "-x", "-n", "0", "-m", "not extras", "--tb=no", "-rfE", "--hypothesis-seed=0"]
     command = [sys.executable, "-m", "pytest", *options, f"tests/{room}"]
-    env = os.environ | {"PYTHONPATH": str(place), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    env = os.environ | {"PYTHONPATH": str(place), "NUMBA_CACHE_DIR": str(place.parent / "compiled")}
+    env |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     began = time.perf_counter()
     try:
         ended = subprocess.run(

@@ -24,13 +24,14 @@ def root(tmp_path: Path) -> Path:
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).write_text(text)
     (tmp_path / "apo_bench" / "__init__.py").touch()
+    (tmp_path / ".gitignore").write_text("work\n")
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = extras\npythonpath = .\n")
     subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
     return tmp_path
 
 
 def test_an_error_is_noticed_or_not_and_the_checkout_stays_as_it_is(root: Path) -> None:
-    noticed, missed = run(root, SIGN), run(root, OTHER)
+    noticed, missed = (run(root, error, root / "work") for error in (SIGN, OTHER))
     assert (noticed.passed, noticed.by) == (False, "tests/toy/test_one.py::test_the_larger")
     assert missed.passed
     assert missed.by.startswith("1 passed")
