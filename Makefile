@@ -22,7 +22,7 @@ MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test test-extras numeric docs lowest clean
+.PHONY: sweep headline test style types walls site compiled test-extras numeric docs lowest clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
@@ -34,15 +34,29 @@ headline: $(VENV)/.installed
 	    --out $(OUT)
 	$(BIN)/apo-bench report $(OUT)
 
-# three processes for two cores: some tests wait for a process or a limit
+# what needs one core runs beside what needs the other; three processes for two cores, as some tests wait for a process
+# or a limit
 test: $(VENV)/.installed-dev
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports --no-logo --no-cache
-	$(BIN)/mkdocs --quiet build --strict --site-dir build/site
+	$(MAKE) --jobs 2 types site compiled style walls
 	$(BIN)/pytest -q -n 3 --dist worksteal -m "not extras"
 	$(NUMERIC)
+
+types: $(VENV)/.installed-dev
+	$(BIN)/mypy
+
+site: $(VENV)/.installed-dev
+	$(BIN)/mkdocs --quiet build --strict --site-dir build/site
+
+style: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+walls: $(VENV)/.installed-dev
+	$(BIN)/lint-imports --no-logo --no-cache
+
+# Numba keeps what it compiles, so that three processes of tests do not compile it three times
+compiled: $(VENV)/.installed-dev
+	@$(BIN)/apo-bench correct stick_in_tower --observation docs/seen.csv --method contact > /dev/null
 
 # the tests that start a Ray cluster
 test-extras: $(VENV)/.installed-dev
