@@ -27,7 +27,7 @@ def pytest_configure() -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What takes longest comes first, so that no process is left alone with it at the end."""
-    items.sort(key=lambda item: item.path.name != "test_success_rate.py")
+    items.sort(key=lambda item: item.path.suffix != ".ipynb" and item.path.name != "test_success_rate.py")
 
 
 @pytest.fixture(scope="session")
