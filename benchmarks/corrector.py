@@ -2,7 +2,8 @@
 
 Prints a table of targets, what was measured and whether it was met, and writes every number as JSON. Draws are
 synthetic and Gaussian around an exactly consistent truth; each peer runs in a process of its own with a time limit.
-GTSAM and numba are measured if they are installed.
+GTSAM, pyceres and Numba are measured if they are installed. A run of all suites also writes the page
+`docs/results/corrector.md`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import subprocess
 import sys
 import time
 from importlib import metadata
@@ -20,23 +22,25 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from benchmarks.corrector_bench import suite_quality, suite_speed
+from benchmarks.corrector_bench import suite_door, suite_quality
+from benchmarks.corrector_bench.page import page
 from benchmarks.corrector_bench.part import part
 from benchmarks.corrector_bench.rows import Row, printed, written
 
 OUT = Path(__file__).resolve().parent / "results" / "corrector.json"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "corrector.md"
 APART = {
     "freedom": 300.0,
     "edges": 300.0,
     "walls": 600.0,
-    "batches": 300.0,
+    "compiled": 300.0,
     "scale": 300.0,
     "wrong": 600.0,
     "calibration": 900.0,
 }
 """Suites that run in one process each, and their limits in seconds."""
-SUITES = ("quality", "speed", *APART)
-PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam")
+SUITES = ("door", "quality", *APART)
+PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam", "pyceres")
 
 
 def main() -> int:
@@ -49,6 +53,8 @@ def main() -> int:
         print(f"\n{suite} ({took[suite]:.0f} s)\n{printed(found)}", flush=True)
         rows += found
         written(rows, given.out, _head(given.draws, took))
+    if tuple(given.only) == SUITES:
+        PAGE.write_text(page(_head(given.draws, took), rows), encoding="utf-8")
     missed = [row for row in rows if row.met is False]
     judged = sum(row.met is not None for row in rows)
     print(f"\n{judged - len(missed)} of {judged} targets met; every number is in {given.out}")
@@ -68,8 +74,8 @@ def _arguments() -> argparse.Namespace:
 def _measured(suite: str, draws: int) -> list[Row]:
     if suite == "quality":
         return suite_quality.suite(draws)
-    if suite == "speed":
-        return suite_speed.suite(draws)
+    if suite == "door":
+        return suite_door.suite(draws)
     return part(suite, draws, APART[suite])
 
 
@@ -80,9 +86,16 @@ def _head(draws: int, took: dict[str, float]) -> dict[str, object]:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             versions[package] = "not installed"
-    command = "python benchmarks/corrector.py " + " ".join(sys.argv[1:])
+    command, root = "python benchmarks/corrector.py " + " ".join(sys.argv[1:]), OUT.parents[2]
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=root, capture_output=True, text=True)
     machine = f"{platform.machine()}, {os.cpu_count()} cores"
-    head = {"command": command.strip(), "draws": draws, "versions": versions, "machine": machine}
+    head = {
+        "command": command.strip(),
+        "commit": commit.stdout.strip() or "unknown",
+        "draws": draws,
+        "versions": versions,
+        "machine": machine,
+    }
     return {**head, "seconds": took}
 
 

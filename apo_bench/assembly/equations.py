@@ -172,6 +172,8 @@ class Pattern:
     """(m, 4): the corners of the smaller face, homogeneous, in the frame of its own part."""
     laid: NDArray[np.bool_]
     """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
+    freed: tuple[int, ...]
+    """The operations whose motion parameters occur, the most recent first."""
 
 
 @remembered
@@ -199,6 +201,9 @@ def pattern(assembly: Assembly) -> Pattern:
         onto=np.array([b.plane for _, b in pairs]).reshape(-1, 4),
         corners=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in corners)]),
         laid=np.array(laid, dtype=np.bool_),
+        freed=tuple(
+            sorted({k - len(parts) for _, _, word in chosen for k, _ in word if k >= len(parts)}, reverse=True)
+        ),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
-from apo_bench.assembly.equations import largest
+from apo_bench.assembly.equations import largest, pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.ending import refused_correction, status_sentence
@@ -132,7 +132,7 @@ class ContactCorrector:
             goals=found.goals,
             status=status,
             sentence=status_sentence(status, observation.gap_m, of) + doubts,
-            freed=asked.system.variables(len(observation.goals)),
+            freed=pattern(observation.assembly).freed,
             gap_before_m=largest(asked.gaps(observation.goals)),
             gap_after_m=largest(solved.gaps),
             rank=directions,

@@ -21,7 +21,7 @@ from apo_bench.correction.consistency import (
     p_value,
     suspects,
 )
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
 from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.whitened import scales
@@ -72,8 +72,7 @@ class Problem:
             found: The nearest goals without inequalities, if they are known already.
         """
         chosen = kept & self.exact
-        part = self.compact if chosen.all() else self.compact.among(chosen)
-        slack_m = self.slack_m[np.repeat(chosen, 3)]
+        part, slack_m = self._equal(chosen)
         found = self.solver(part, self.observation.goals, self.L) if found is None else found
         gaps = self.gaps(found.goals)
         chi_square, freedom, shared = correction_length(part, self.observation.goals, self.L, found, slack_m)
@@ -97,7 +96,16 @@ class Problem:
         return contact_suspects(self.observation.assembly, kept, self._test, relation)
 
     def _test(self, kept: NDArray[np.bool_]) -> Consistency:
-        return self.solve(kept).test
+        if kept[~self.exact].any():
+            return self.solve(kept).test
+        part, slack_m = self._equal(kept & self.exact)
+        found = self.solver(part, self.observation.goals, self.L)
+        chi_square, freedom, _ = correction_length(part, self.observation.goals, self.L, found, slack_m)
+        return Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL)
+
+    def _equal(self, chosen: NDArray[np.bool_]) -> tuple[CompactEquations, Array]:
+        """The equations of the contacts that are chosen, (c,), and the slack of each, [m]."""
+        return self.compact if chosen.all() else self.compact.among(chosen), self.slack_m[np.repeat(chosen, 3)]
 
     def _pull(self, kept: NDArray[np.bool_]) -> Array:
         """How hard each contact pulls at the goals, (c,), by the multipliers of its equations."""
@@ -126,6 +134,6 @@ def problem(observation: Observation, solver: Solver) -> Problem:
     L = scales(observation.covariance)
     plain = equations(observation.assembly, observation.start, observation.goals)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
-    every = compact_equations(system, len(observation.goals))
+    every = compact_assembly(observation.assembly, system)
     slack_m = fit_deviation(observation.assembly, observation.play_m)
     return Problem(observation, system, every, exact, inequalities, L, slack_m, solver)

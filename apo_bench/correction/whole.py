@@ -134,7 +134,6 @@ def layout(assembly: Assembly, play_m: float) -> Layout | None:
     if (low != high).any() or 6 * n > LARGEST_DENSE:
         return None
     k = known.letters - len(assembly.solids)
-    occurring = np.unique(k[(k >= 0) & (k < n)])
     plane = np.array(known.plane)
     plane[:, 3] -= low
     return Layout(
@@ -148,5 +147,5 @@ def layout(assembly: Assembly, play_m: float) -> Layout | None:
         laid=known.laid.astype(np.intp),
         moments=corner_moments(known),
         slack_m=np.array(fit_deviation(assembly, play_m)),
-        freed=tuple(int(i) for i in occurring[::-1]),
+        freed=known.freed,
     )

@@ -51,29 +51,33 @@ def _series() -> Array:
 
 GENERATORS = _generators()
 """A twist xi is the matrix X = sum_i xi_i GENERATORS[i], (6, 4, 4)."""
-_TO_MATRIX = GENERATORS.reshape(6, 16)
+_TO_MATRIX = np.ascontiguousarray(GENERATORS[:, :3].reshape(6, 12))
 _TO_ADJOINT = _adjoints().reshape(6, 36)
 SERIES = _series()
-_ONE4, _ONE6, _SUM = np.eye(4), np.eye(6), np.ones(3)
+_ONE4, _ONE6, _SUM, _POWERS = np.eye(4), np.eye(6), np.ones(3), np.arange(float(_TERMS))
 
 
 def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     """exp(xi), (*, 4, 4), and J_r in exp(xi + d) = exp(xi) exp(J_r d + O(d^2)), (*, 6, 6), of twists (*, 6).
 
-    The matrix of a twist satisfies a polynomial of degree four, its adjoint matrix one of degree five, so three and
-    four powers of them suffice (Bullo and Murray, "Proportional derivative (PD) control on the Euclidean group",
-    1995). Twists of more than two whole turns are beyond the series.
+    The adjoint matrix of a twist satisfies a polynomial of degree five, so four powers of it suffice (Bullo and Murray,
+    "Proportional derivative (PD) control on the Euclidean group", 1995); exp(xi) = 1 + A^t X, with A the rotational
+    block of J_r. Twists of more than two whole turns are beyond the series.
     """
     xi = np.asarray(twist, dtype=np.float64)
     lead = xi.shape[:-1]
     q = (xi[..., 3:] * xi[..., 3:]) @ _SUM
     series = SERIES[: _SHORT if (q < 1.0).all() else _TERMS]
-    f = ((q[..., None] ** np.arange(len(series))) @ series)[..., None, None]
-    B, C, a, b, c, d = (f[..., i, :, :] for i in range(6))
-    X = (xi @ _TO_MATRIX).reshape(*lead, 4, 4)
-    ad = (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
-    X2, ad2 = X @ X, ad @ ad
-    return _ONE4 + X + (B * _ONE4 + C * X) @ X2, _ONE6 + a * ad + (b * _ONE6 + c * ad + d * ad2) @ ad2
+    f = ((q[..., None] ** _POWERS[: len(series)]) @ series[:, 2:])[..., None, None]
+    a, b, c, d = (f[..., i, :, :] for i in range(4))
+    X, ad = (xi @ _TO_MATRIX).reshape(*lead, 3, 4), (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
+    ad2 = ad @ ad
+    J = a * ad + (b * _ONE6 + c * ad + d * ad2) @ ad2
+    J += _ONE6
+    T = np.zeros((*lead, 4, 4))
+    np.matmul(np.swapaxes(J[..., :3, :3], -1, -2), X, out=T[..., :3, :])
+    T += _ONE4
+    return T, J
 
 
 def right_jacobian(twist: ArrayLike) -> Array:

@@ -1,8 +1,7 @@
 """Every solver behind one shape: `prepare(task)` may build what it likes; what it returns is timed.
 
 The equations of a draw are one `Equations` object that all share, built before the clock runs. `newton` is the frozen
-yardstick: the paper's Newton with the package's own settings, all goals free. Whatever a peer needs to have been built
-from Python objects (a factor graph) is built before the clock runs too, in its favour.
+yardstick: the paper's Newton with the package's own settings, all goals free.
 """
 
 from __future__ import annotations
@@ -12,8 +11,6 @@ from typing import NamedTuple
 
 from apo_bench.assembly.equations import Equations
 from apo_bench.geometry.arrays import Array
-from benchmarks.corrector_bench.draws import factors
-from benchmarks.corrector_bench.equations_in_z import InZ
 from benchmarks.corrector_bench.problems import Problem
 
 
@@ -27,10 +24,6 @@ class Task(NamedTuple):
     covariance: Array
     """(n, 6, 6)."""
 
-    @property
-    def in_z(self) -> InZ:
-        return InZ(self.system, self.seen, factors(self.covariance))
-
 
 Run = Callable[[], Array]
 """Solves the task; corrected goals (n, 4, 4)."""
@@ -39,9 +32,9 @@ Peer = Callable[[Task], Run]
 
 def peers() -> dict[str, Peer]:
     """Name -> how to prepare it."""
-    from benchmarks.corrector_bench import own, peers_gtsam, peers_scipy
+    from benchmarks.corrector_bench import own
 
-    return {"newton": newton, **own.PEERS, **peers_scipy.PEERS, **peers_gtsam.PEERS}
+    return {"newton": newton, **own.PEERS}
 
 
 def newton(task: Task) -> Run:

@@ -12,10 +12,11 @@ from apo_bench.assembly.equations import equations
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
-from benchmarks.corrector_bench import suite_walls
+from benchmarks.corrector_bench import door, suite_door, suite_walls
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.measures import free_basis, freedom_error, lengths, quality, spread
 from benchmarks.corrector_bench.own import corrected, observation
+from benchmarks.corrector_bench.page import page
 from benchmarks.corrector_bench.part import part
 from benchmarks.corrector_bench.peers import Task, newton, peers
 from benchmarks.corrector_bench.problems import problem
@@ -160,7 +161,41 @@ def test_a_peer_runs_in_a_process_of_its_own() -> None:
     assert ran.goals.shape == (2, 3, 4, 4)
     assert ran.ms.shape == (2, 2)
     assert (ran.ms > 0).all()
-    assert {"contact", "newton", "scipy trf", "gtsam qr"} <= set(peers())
+    assert {"contact", "newton"} <= set(peers())
+
+
+def test_every_way_through_the_door_is_timed_on_every_draw() -> None:
+    ways = [door.YARDSTICK, door.UNCOMPILED, door.CONTACT, "scipy"]
+    ms, gaps = (np.array(x) for x in door.each("fig2", ways, 2))
+    assert ms.shape == gaps.shape == (2, 4)
+    assert (ms > 0.0).all()
+    assert (gaps < door.OPEN_M).all()
+    ms, gaps = (np.array(x) for x in door.rounds("fig2", [], 1))
+    assert ms.shape == gaps.shape == (door.ROUNDS, 2)
+    assert (gaps < door.OPEN_M).all()
+
+
+def test_a_way_that_raises_or_leaves_a_contact_open_is_not_timed() -> None:
+    assert suite_door.fault(np.array([1e-9, 2e-9])) == ""
+    assert suite_door.fault(np.array([np.nan, np.nan])) == "no solution"
+    assert suite_door.fault(np.array([1e-9, 9.8e-3, np.nan])) == "fails on 2 of 3 draws: up to 9.8 mm open"
+
+
+def test_the_page_lists_what_was_missed_and_what_failed() -> None:
+    rows = [
+        Row("P1", "fig2", "`contact`", 1.2, "<= 1.3", "", {"ms": 0.5}),
+        Row("P1", "fig3", "`contact`", 1.4, "<= 1.3", "", {"ms": 0.6}),
+        Row("P3", "fig2", "peer", None, "", "no solution"),
+        Row("Q1", "fig2 2/1", "gap, mm", 2e-12, "<= 1e-9"),
+        Row("Q1", "fig3 2/1", "gap, mm", 3e-12, "<= 1e-9"),
+    ]
+    head = {"command": "python", "commit": "abc", "draws": 3, "versions": {"numpy": "2"}, "machine": "here"}
+    text = page(head, rows)
+    assert "3 of 4 targets are met." in text
+    assert "- Missed, fig3: `contact`: 1.4, asked <= 1.3" in text
+    assert "| `contact` | 1.3 | 1.200 (0.50) | 1.400 (0.60) |  |" in text
+    assert "| peer |  | no solution |  |  |" in text
+    assert "| gap, mm | <= 1e-9 | 3e-12 | fig2 2/1, fig3 2/1 |" in text
 
 
 @pytest.mark.slow

@@ -17,8 +17,11 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations, Pattern
+from apo_bench.assembly.equations import Equations, Pattern, pattern
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.twist import GENERATORS
 
 _GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
@@ -64,6 +67,13 @@ class CompactEquations:
             points=self.points[..., contacts, :, :],
         )
 
+    def placed(self, start: Array, plane: Array, points: Array) -> CompactEquations:
+        """The same words with other constants, planes and points; what is known of the words goes along."""
+        one = replace(self, start=start, plane=plane, points=points)
+        for known in ("_once", "_sides", "_signed_columns", "_rows"):
+            one.__dict__[known] = getattr(self, known)
+        return one
+
     def residual(self, T: Array) -> Array:
         """e of every equation, (*, 3 c), at the goals T, (*, n, 4, 4), [m]."""
         e = self._behind(self._factors(T))[..., 0, :, :, :] @ self.plane[:, :, None]
@@ -86,13 +96,13 @@ class CompactEquations:
         for j in range(w):
             np.matmul(forms[..., j, :, :, :], F[..., j, :, :], out=forms[..., j + 1, :, :, :])
         e = behind[..., 0, :, :, :] @ self.plane[:, :, None]
-        side, number = self._sides
-        fG = forms[..., side, number, 0, :] @ _GENERATORS
-        p = behind[..., side, number, :, :]
+        lead = F.shape[:-4]
+        fG = forms.reshape(*lead, (w + 1) * c, 4).take(self._sides, axis=-2) @ _GENERATORS
+        p = behind.reshape(*lead, (w + 1) * c, 3, 4).take(self._sides, axis=-3)
         signed = np.zeros((*B.shape[:-3], 2, self.n + 1, 6, 6))
         signed[..., 0, : self.n, :, :] = np.swapaxes(B, -1, -2)
         np.negative(signed[..., 0, :, :, :], out=signed[..., 1, :, :, :])
-        scaled = signed[..., self._signs, self.columns, :, :]
+        scaled = signed.reshape(*B.shape[:-3], 2 * (self.n + 1), 6, 6).take(self._signed_columns, axis=-3)
         return e.reshape(*e.shape[:-3], 3 * c), scaled @ (fG.reshape(*p.shape[:-2], 6, 4) @ np.swapaxes(p, -1, -2))
 
     def words(self, T: Array) -> Array:
@@ -121,20 +131,29 @@ class CompactEquations:
         return not bool(((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] < self.n)).any())
 
     @cached_property
-    def _sides(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Up to where each letter is counted to the plane, (c, w), and the number of each contact, (c, 1)."""
+    def _sides(self) -> NDArray[np.intp]:
+        """(c, w): where the points and planes of each letter stand among those of all, (w + 1, c)."""
         c, w = self.letters.shape
-        return np.arange(w) + ~self.inverse, np.arange(c)[:, None]
+        return (np.arange(w) + ~self.inverse) * c + np.arange(c)[:, None]
 
     @cached_property
-    def _signs(self) -> NDArray[np.intp]:
-        """(c, w): 1 where the sign changes."""
-        return self.inverse.astype(np.intp)
+    def _signed_columns(self) -> NDArray[np.intp]:
+        """(c, w): the column of each letter, behind all columns where the sign changes."""
+        return self.columns + self.inverse * (self.n + 1)
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
         """(c, w): where each letter stands among all matrices and then their inverses."""
-        return self.letters + self._signs * (len(self.start) + self.n + 1)
+        return self.letters + self.inverse * (len(self.start) + self.n + 1)
+
+    @cached_property
+    def _constants(self) -> Array:
+        """(2 (p + n + 1), 4, 4): all matrices and then their inverses, of the goals only the last row."""
+        p, n = len(self.start), self.n
+        stack = np.zeros((2, p + n + 1, 4, 4))
+        stack[:, p:, 3, 3], stack[:, p + n] = 1.0, _ONE
+        stack[0, :p], stack[1, :p] = self.start, pose.inverse(self.start)
+        return stack.reshape(-1, 4, 4)
 
     def _behind(self, F: Array) -> Array:
         """(everything from letter j on) v, (*, w + 1, c, 3, 4)."""
@@ -149,12 +168,11 @@ class CompactEquations:
         """Every letter of every word, (*, c, w, 4, 4)."""
         p, n = len(self.start), self.n
         stack = np.empty((*T.shape[:-3], 2 * (p + n + 1), 4, 4))
-        stack[..., :p, :, :], stack[..., p : p + n, :, :], stack[..., p + n, :, :] = self.start, T, _ONE
-        there, back = stack[..., : p + n + 1, :, :], stack[..., p + n + 1 :, :, :]
-        back[..., :3, :3] = np.swapaxes(there[..., :3, :3], -1, -2)
-        back[..., :3, 3:] = -back[..., :3, :3] @ there[..., :3, 3:]
-        back[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
-        return stack[..., self._rows, :, :]
+        stack[:] = self._constants
+        stack[..., p : p + n, :, :], back = T, stack[..., 2 * p + n + 1 : 2 * (p + n) + 1, :, :]
+        back[..., :3, :3] = np.swapaxes(T[..., :3, :3], -1, -2)
+        back[..., :3, 3:] = -back[..., :3, :3] @ T[..., :3, 3:]
+        return stack.take(self._rows, axis=-3)
 
 
 def compact_equations(system: Equations, n: int) -> CompactEquations:
@@ -166,6 +184,25 @@ def compact_equations(system: Equations, n: int) -> CompactEquations:
     plane[system.contact] = system.plane
     points = moments(system.vertex[:, :3], system.contact, len(letters))
     return CompactEquations(system.start, letters, columns, system.inverse, plane, points, n)
+
+
+def compact_assembly(assembly: Assembly, system: Equations) -> CompactEquations:
+    """`compact_equations` of all equations of an assembly; what does not depend on goals is worked out once."""
+    known, base = pattern(assembly), _words_alone(assembly)
+    points, rows = np.array(base.points), known.laid[known.contact]
+    if rows.any():
+        number = (np.cumsum(known.laid) - 1)[known.contact[rows]]
+        points[known.laid] = moments(system.vertex[rows, :3], number, int(np.count_nonzero(known.laid)))
+    return base.placed(system.start, system.plane[known.begin[:-1]], points)
+
+
+@remembered
+def _words_alone(assembly: Assembly) -> CompactEquations:
+    """The words of an assembly, all parts at the origin, and its corners as they are."""
+    known, p, n = pattern(assembly), len(assembly.solids), len(assembly)
+    k = known.letters - p
+    columns, start = np.where((k >= 0) & (k < n), k, n), np.tile(_ONE, (p, 1, 1))
+    return CompactEquations(start, known.letters, columns, known.inverse, known.plane, corner_moments(known), n)
 
 
 def corner_moments(known: Pattern) -> Array:

@@ -50,6 +50,7 @@ _RULE = (
     manifold.MOST_TURNS,
     manifold.STEP,
     manifold.SURE,
+    manifold.NEXT,
     manifold.DAMPING,
     manifold.FALL,
     manifold.SQUARED_GAP_FLOOR,

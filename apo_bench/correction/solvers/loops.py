@@ -25,8 +25,8 @@ _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
 _Words = tuple[_Index, _Index, _Index]
 """Letters, columns and inverse (0 or 1) of `CompactEquations`, each (c, w)."""
-_Rule = tuple[int, float, float, float, float, float, float, float]
-"""MOST_TURNS, STEP, SURE, DAMPING, FALL, SQUARED_GAP_FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
+_Rule = tuple[int, float, float, float, float, float, float, float, float]
+"""MOST_TURNS, STEP, SURE, NEXT, DAMPING, FALL, SQUARED_GAP_FLOOR, LARGEST_TURN, SMALLEST of `manifold`."""
 _SHORT = 9
 """Terms of the series of exp that are enough below one radian."""
 
@@ -60,7 +60,7 @@ def solve_each(
         trace: (b, TURNS, 2), overwritten: the largest |e| and the largest step of each turn.
         ended: (b,), overwritten: the number of turns.
     """
-    turns, step_size, sure, damp, fall, floor, largest_turn, smallest = rule
+    turns, step_size, sure, next_size, damp, fall, floor, largest_turn, smallest = rule
     b, n, c, w, p = len(observed), observed.shape[1], len(plane), words[0].shape[1], len(start)
     m, soft = 3 * c, len(soft_m) > 0
     width, slot, first, begin, users = ordered(words, p + n, n)
@@ -102,7 +102,7 @@ def solve_each(
             for i in range(6 * n):
                 size = worse(size, abs(step[i]))
             trace[o, turn, 0], trace[o, turn, 1] = gap, size
-            rest[o] = size < step_size or (size < sure and size * size < step_size * before)
+            rest[o] = size < step_size or (size < sure and size * size < next_size * before)
             if not finite[o]:
                 break
             share = 1.0 if rest[o] else step_share(Lo, step, largest_turn, smallest)

@@ -29,9 +29,10 @@ from apo_bench.geometry.twist import exp_and_jacobian
 
 MOST_TURNS = 60
 STEP = 1e-7
-"""The solver rests when its next step would be shorter in every component, in standard deviations."""
-SURE = 1e-5
-"""Steps shorter than this shrink by a constant factor."""
+"""The solver rests after a step that is shorter in every component, in standard deviations."""
+SURE, NEXT = 1e-6, 1e-9
+"""Steps shorter than the first shrink by a constant factor: it rests, too, if the next one would be shorter than the
+second. Longer ones are not trusted, since rounding turns redundant contacts into noise there."""
 DAMPING = 0.05
 """mu, per mean square of the rows of J and per mean square of the gaps in that unit."""
 FALL = 0.3
@@ -128,7 +129,7 @@ def _many(system: CompactEquations, observed: Array, L: Array, soft_m: Array | N
 
 def settles(size: Array, before: Array) -> NDArray[np.bool_]:
     """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor."""
-    return np.asarray((size < STEP) | ((size < SURE) & (size * size < STEP * before)))
+    return np.asarray((size < STEP) | ((size < SURE) & (size * size < NEXT * before)))
 
 
 class _Going(NamedTuple):

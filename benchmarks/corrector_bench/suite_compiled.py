@@ -1,0 +1,49 @@
+"""Q8: the compiled corrector gives the goals of the one that is not compiled, in every scenario of the package."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import apo_bench
+from apo_bench.assembly.goals import Observation
+from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.geometry import pose
+from benchmarks.corrector_bench.draws import LEVELS
+from benchmarks.corrector_bench.rows import Row
+
+SCENARIOS = (
+    *("block_on_block", "bridge_cycle", "carried_bridge", "fixture_alignment"),
+    *("pocket_table", "stick_in_tower", "stick_on_castles", "vanished_fixture"),
+)
+PLAYS_M = (0.0, 0.25e-3)
+FIRST = 30_000
+
+
+def suite(draws: int) -> list[Row]:
+    """A quarter of the draws of every scenario at each level and play."""
+    return [_row(level, max(3, draws // 4)) for level in ("2/1", "5/3", "10/8")]
+
+
+def _row(level: str, draws: int) -> Row:
+    plain = apo_bench.ContactCorrector(solver=nearest_goals)
+    off, otherwise, count = 0.0, 0, 0
+    for name in SCENARIOS:
+        for seed in range(FIRST, FIRST + draws):
+            seen = _drawn(name, level, seed)
+            a, b = apo_bench.correct(seen, plain), apo_bench.correct(seen)
+            otherwise += (a.status, a.rank, a.sentence, a.dropped) != (b.status, b.rank, b.sentence, b.dropped)
+            off, count = max(off, 1e3 * float(np.abs(a.goals - b.goals).max())), count + 1
+    what = "goals compiled against not compiled, all scenarios, mm"
+    return Row("Q8", level, what, off, "<= 1e-9", "", {"draws": count, "other status, rank or sentence": otherwise})
+
+
+def _drawn(name: str, level: str, seed: int) -> Observation:
+    """Noise of a covariance of its own for every operation, not diagonal; parts that fit with and without play."""
+    rng, of = np.random.default_rng([seed, 4]), apo_bench.load_scenario(name)
+    mm, degrees = LEVELS[level]
+    n = len(of.assembly)
+    sigma = np.repeat([1e-3 * mm, np.radians(degrees)], 3) * rng.uniform(0.5, 1.5, size=(n, 1))
+    L = sigma[:, :, None] * (np.tril(rng.normal(scale=0.2, size=(n, 6, 6)), -1) + np.eye(6))
+    goals = of.goals @ pose.exp((L @ rng.standard_normal((n, 6, 1)))[..., 0])
+    everything, play_m = np.ones(n, dtype=np.bool_), PLAYS_M[seed % 2]
+    return Observation(of.assembly, of.start, goals, L @ np.swapaxes(L, 1, 2), everything, play_m=play_m)
