@@ -47,14 +47,12 @@ class Draws(NamedTuple):
 
 
 def drawn(noise: Noise, trials: int = TRIALS) -> Draws:
-    shown, unit, seen = scenes.shown(CYCLE), [], []
-    for seed in range(trials):
-        made = observe(shown, noise, np.random.default_rng(seed))
-        xi = pose.log(pose.inverse(CYCLE.goals) @ made.goals)
-        L = np.linalg.cholesky(made.covariance)
-        unit.append(np.linalg.solve(L, xi[..., None])[..., 0] * made.seen[:, None])
-        seen.append(made.seen)
-    return Draws(np.array(unit), np.array(seen, dtype=np.float64))
+    shown = scenes.shown(CYCLE)
+    made = [observe(shown, noise, np.random.default_rng(seed)) for seed in range(trials)]
+    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([one.goals for one in made]))
+    L = np.linalg.cholesky(np.array([one.covariance for one in made]))
+    seen = np.array([one.seen for one in made], dtype=np.float64)
+    return Draws(np.linalg.solve(L, xi[..., None])[..., 0] * seen[..., None], seen)
 
 
 def bias(draws: Draws) -> float:

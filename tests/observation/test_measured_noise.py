@@ -76,13 +76,11 @@ def see(name: str, seed: int, level: Level = LEVEL) -> Observation:
 
 def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
     """Body twists in units of what was stated, (draws, n, 6), and which were seen, (draws, n)."""
-    noise, shown, unit, there = make_noise(name, LEVEL), scenes.shown(TOWER), [], []
-    for seed in range(draws):
-        seen = observe(shown, noise, np.random.default_rng(seed))
-        xi = pose.log(pose.inverse(TOWER.goals) @ seen.goals)
-        unit.append(np.linalg.solve(np.linalg.cholesky(seen.covariance), xi[..., None])[..., 0])
-        there.append(seen.seen)
-    return np.array(unit), np.array(there)
+    noise, shown = make_noise(name, LEVEL), scenes.shown(TOWER)
+    seen = [observe(shown, noise, np.random.default_rng(seed)) for seed in range(draws)]
+    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([one.goals for one in seen]))
+    L = np.linalg.cholesky(np.array([one.covariance for one in seen]))
+    return np.linalg.solve(L, xi[..., None])[..., 0], np.array([one.seen for one in seen])
 
 
 def test_no_bias_and_the_covariance_that_is_stated(names: tuple[str, str]) -> None:
