@@ -8,6 +8,7 @@ import apo_bench
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.geometry import pose
+from apo_bench.scenario.scenario import Scenario
 from benchmarks.corrector_bench.draws import LEVELS
 from benchmarks.corrector_bench.rows import Row
 
@@ -27,9 +28,9 @@ def suite(draws: int) -> list[Row]:
 def _row(level: str, draws: int) -> Row:
     plain = apo_bench.ContactCorrector(solver=nearest_goals)
     off, otherwise, count = 0.0, 0, 0
-    for name in SCENARIOS:
+    for of in map(apo_bench.load_scenario, SCENARIOS):
         for seed in range(FIRST, FIRST + draws):
-            seen = _drawn(name, level, seed)
+            seen = _drawn(of, level, seed)
             a, b = apo_bench.correct(seen, plain), apo_bench.correct(seen)
             otherwise += (a.status, a.rank, a.sentence, a.dropped) != (b.status, b.rank, b.sentence, b.dropped)
             off, count = max(off, 1e3 * float(np.abs(a.goals - b.goals).max())), count + 1
@@ -37,9 +38,9 @@ def _row(level: str, draws: int) -> Row:
     return Row("Q8", level, what, off, "<= 1e-9", "", {"draws": count, "other status, rank or sentence": otherwise})
 
 
-def _drawn(name: str, level: str, seed: int) -> Observation:
+def _drawn(of: Scenario, level: str, seed: int) -> Observation:
     """Noise of a covariance of its own for every operation, not diagonal; parts that fit with and without play."""
-    rng, of = np.random.default_rng([seed, 4]), apo_bench.load_scenario(name)
+    rng = np.random.default_rng([seed, 4])
     mm, degrees = LEVELS[level]
     n = len(of.assembly)
     sigma = np.repeat([1e-3 * mm, np.radians(degrees)], 3) * rng.uniform(0.5, 1.5, size=(n, 1))
