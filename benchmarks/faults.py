@@ -5,7 +5,7 @@
 Every copy has one error out of `fault_list.py`, and the tests of its room are run in it, up to the first that fails:
 those of `tests/ROOM` that `make test` runs, one after the other. In a copy without an error they must all pass, so
 every room is run once as it is. What was noticed, by which test and after how long, is printed; `--write` writes it, to
-`results/faults.json`. Ends with exit code 1 if an error is not noticed, and if one cannot be made any more, as its text
+`results/faults.json`, in the place of what is kept there of the same errors and rooms. Ends with exit code 1 if an error is not noticed, and if one cannot be made any more, as its text
 is not in its file exactly once. The checkout itself is never changed.
 """
 
@@ -22,7 +22,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -74,7 +74,8 @@ def main() -> int:
         how = "NOT NOTICED" if one.passed else f"noticed after {one.seconds:.0f} s by {one.by}"
         print(f"{number:2} {fault.file}: {fault.what}: {how}")
     if asked.write:
-        asked.write.write_text(json.dumps(summary(sound, found), indent=1) + "\n", encoding="utf-8")
+        kept = json.loads(asked.write.read_text(encoding="utf-8")) if asked.write.exists() else {}
+        asked.write.write_text(json.dumps(summary(sound, found, kept), indent=1) + "\n", encoding="utf-8")
     return int(any(one.passed for _, one in found) or not all(whole.passed for whole in sound.values()))
 
 
@@ -144,21 +145,28 @@ def tested(place: Path, room: str) -> Ran:
     return Ran(not ended.returncode, by[1] if by else ended.stdout.splitlines()[-1], seconds)
 
 
-def summary(sound: dict[str, Ran], found: Sequence[tuple[tuple[int, Fault], Ran]]) -> dict[str, Any]:
-    """What is written."""
+def summary(
+    sound: Mapping[str, Ran], found: Sequence[tuple[tuple[int, Fault], Ran]], kept: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What is written: errors and rooms that were run now, and of those that were not what was kept."""
     head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
-    return {
+    made = {
         "command": "python -m benchmarks." + " ".join([Path(sys.argv[0]).stem, *sys.argv[1:]]),
         "commit": head.stdout.strip(),
+    }
+    errors = {error["number"]: error for error in kept.get("faults", ())} | {
+        number: {"number": number, **fault._asdict(), "noticed": not one.passed, "by": one.by, "seconds": one.seconds}
+        | made
+        for (number, fault), one in found
+    }
+    rooms = {
+        room: {"passed": one.passed, "tests": one.by, "seconds": one.seconds} | made for room, one in sound.items()
+    }
+    return {
         "python": platform.python_version(),
-        "noticed": sum(not one.passed for _, one in found),
-        "faults": [
-            {"number": number, **fault._asdict(), "noticed": not one.passed, "by": one.by, "seconds": one.seconds}
-            for (number, fault), one in found
-        ],
-        "without_an_error": {
-            room: {"passed": one.passed, "tests": one.by, "seconds": one.seconds} for room, one in sound.items()
-        },
+        "noticed": sum(error["noticed"] for error in errors.values()),
+        "faults": [errors[number] for number in sorted(errors)],
+        "without_an_error": {**kept.get("without_an_error", {}), **rooms},
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from scipy.optimize import nnls
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation
+from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
+from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -164,18 +167,20 @@ def test_one_wall_may_be_the_nominal_face() -> None:
         assert -1e-12 <= made.goals[0, 2, 3] <= 1e-3 + 1e-12
 
 
+@pytest.mark.parametrize("method", ["contact", ContactCorrector(solver=nearest_goals)], ids=["as it comes", "plain"])
 @pytest.mark.parametrize("play_mm", [0.0, 0.25, 1.0])
-def test_contact_puts_parts_that_fit_one_play_lower(play_mm: float) -> None:
+def test_contact_puts_parts_that_fit_one_play_lower(play_mm: float, method: Any) -> None:
+    """Compiled where that can be, and as it is without Numba."""
     scene, L = scenes.stick_on_castles(), scales(3, 2.0, 1.0)
     floors = [c for c in scene.assembly.operations[2].contacts if c.environment.face == "sfl"]
     assembly = replace(scene.assembly, gaps={c: Gap("contact") for c in floors})
     goals = twisted(scene.goals, L, np.random.default_rng(3))
-    made = correct(look(assembly, scene, goals, L, 1e-3 * play_mm), "contact")
+    made = correct(look(assembly, scene, goals, L, 1e-3 * play_mm), method)
     assert (made.ok, made.rank) == (True, 13)
     assert_allclose(made.goals[2, 2, 3], 0.04 - 1e-3 * play_mm, rtol=0, atol=1e-12)
     assert made.gap_after_m <= 1e-12
     assert made.gap_before_m > 1e-4
-    centred = correct(look(scene.assembly, scene, goals, L, 1e-3 * play_mm), "contact")
+    centred = correct(look(scene.assembly, scene, goals, L, 1e-3 * play_mm), method)
     assert_allclose(centred.goals[2, 2, 3], 0.04, rtol=0, atol=1e-12)
 
 
