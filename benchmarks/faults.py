@@ -5,8 +5,10 @@
 Every copy has one error out of `fault_list.py`, and the tests of its room are run in it, up to the first that fails:
 those of `tests/ROOM` that `make test` runs, one after the other. In a copy without an error they must all pass, so
 every room is run once as it is. What was noticed, by which test and after how long, is printed; `--write` writes it, to
-`results/faults.json`, in the place of what is kept there of the same errors and rooms. Ends with exit code 1 if an error is not noticed, and if one cannot be made any more, as its text
-is not in its file exactly once. The checkout itself is never changed.
+`results/faults.json`, in the place of what is kept there of the same errors and rooms. Ends with exit code 1 if an
+error is not noticed, and if one cannot be made any more, as its text is not in its file exactly once. The checkout
+itself is never changed. Some tests look for processes that they started, so rooms are run together (`--workers`) only
+to look for errors that nobody notices.
 """
 
 from __future__ import annotations
