@@ -2,13 +2,14 @@
 
 Prints a table of targets, what was measured and whether it was met, and writes every number as JSON. Draws are
 synthetic and Gaussian around an exactly consistent truth; each peer runs in a process of its own with a time limit.
-GTSAM, pyceres and Numba are measured if they are installed. A run of all suites also writes the page
-`docs/results/corrector.md`.
+GTSAM, pyceres and Numba are measured if they are installed. The page
+`docs/results/corrector.md` is written too. Suites that `--only` leaves out stay as they were, with their commit.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import platform
 import subprocess
@@ -16,6 +17,7 @@ import sys
 import time
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 sys.path.pop(0)  # this folder, whose coverage.py Numba takes for another
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -25,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from benchmarks.corrector_bench import suite_door, suite_quality
 from benchmarks.corrector_bench.page import page
 from benchmarks.corrector_bench.part import part
-from benchmarks.corrector_bench.rows import Row, printed, written
+from benchmarks.corrector_bench.rows import Row, printed, records, save
 
 OUT = Path(__file__).resolve().parent / "results" / "corrector.json"
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "corrector.md"
@@ -44,23 +46,30 @@ PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam", "pyceres")
 
 
 def main() -> int:
-    given = _arguments()
-    rows, took = list[Row](), dict[str, float]()
+    given, commit, rows = _arguments(), _commit(), list[Row]()
+    suites = _kept(given.out)
     for suite in given.only:
         start = time.monotonic()
         found = _measured(suite, given.draws)
-        took[suite] = round(time.monotonic() - start, 1)
-        print(f"\n{suite} ({took[suite]:.0f} s)\n{printed(found)}", flush=True)
+        seconds = round(time.monotonic() - start, 1)
+        print(f"\n{suite} ({seconds:.0f} s)\n{printed(found)}", flush=True)
         rows += found
-        written(rows, given.out, _head(given.draws, took))
-    if tuple(given.only) == SUITES:
-        PAGE.write_text(page(_head(given.draws, took), rows), encoding="utf-8")
+        suites[suite] = {"commit": commit, "draws": given.draws, "seconds": seconds, "rows": records(found)}
+        document = {**_machine(), "suites": {name: suites[name] for name in SUITES if name in suites}}
+        save(document, given.out)
+        if given.out == OUT:
+            PAGE.write_text(page(document), encoding="utf-8")
     missed = [row for row in rows if row.met is False]
     judged = sum(row.met is not None for row in rows)
     print(f"\n{judged - len(missed)} of {judged} targets met; every number is in {given.out}")
     if missed:
         print(printed(missed))
     return 0
+
+
+def _kept(path: Path) -> dict[str, Any]:
+    """Suites of an earlier run, which stay as they are unless they are run again; each names its commit."""
+    return dict(json.loads(path.read_text(encoding="utf-8")).get("suites", {})) if path.is_file() else {}
 
 
 def _arguments() -> argparse.Namespace:
@@ -79,24 +88,19 @@ def _measured(suite: str, draws: int) -> list[Row]:
     return part(suite, draws, APART[suite])
 
 
-def _head(draws: int, took: dict[str, float]) -> dict[str, object]:
+def _machine() -> dict[str, object]:
     versions = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             versions[package] = "not installed"
-    command, root = "python benchmarks/corrector.py " + " ".join(sys.argv[1:]), OUT.parents[2]
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=root, capture_output=True, text=True)
-    machine = f"{platform.machine()}, {os.cpu_count()} cores"
-    head = {
-        "command": command.strip(),
-        "commit": commit.stdout.strip() or "unknown",
-        "draws": draws,
-        "versions": versions,
-        "machine": machine,
-    }
-    return {**head, "seconds": took}
+    return {"versions": versions, "machine": f"{platform.machine()}, {os.cpu_count()} cores"}
+
+
+def _commit() -> str:
+    asked = ["git", "describe", "--always", "--dirty"]
+    return subprocess.run(asked, cwd=OUT.parent, capture_output=True, text=True).stdout.strip() or "unknown"
 
 
 if __name__ == "__main__":

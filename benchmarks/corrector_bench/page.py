@@ -6,27 +6,31 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.corrector_bench.problems import FIGURES
-from benchmarks.corrector_bench.rows import Row
+from benchmarks.corrector_bench.rows import Row, restored
 
 TIMES = ("P1", "P2", "P4", "P3")
 """Rows of the table of times, in its order."""
 
 
-def page(head: Mapping[str, Any], rows: Sequence[Row]) -> str:
-    """Markdown out of what a run says of itself and its rows."""
-    versions = ", ".join(f"{package} {version}" for package, version in head["versions"].items())
+def page(document: Mapping[str, Any]) -> str:
+    """Markdown out of `benchmarks/results/corrector.json`."""
+    versions = ", ".join(f"{package} {version}" for package, version in document["versions"].items())
+    suites = document["suites"]
+    rows = [row for suite in suites.values() for row in restored(suite["rows"])]
+    runs = ", ".join(f"{name} at `{suite['commit']}` with {suite['draws']}" for name, suite in suites.items())
     missed = [row for row in rows if row.met is False]
     judged = sum(row.met is not None for row in rows)
     return "\n".join(
         [
             "# The corrector in numbers",
             "",
-            f"Written by `{head['command']}` at commit `{head['commit']}`: Fig. 2, 3 and 6 of the paper, "
-            f"{head['draws']} draws each at 2 mm and 1 degree (others where it is said), Gaussian around an exactly "
-            "consistent truth; "
-            f"{versions}; {head['machine']}. Every number is in `benchmarks/results/corrector.json`.",
+            "Written by `python benchmarks/corrector.py` on Fig. 2, 3 and 6 of the paper, at 2 mm and 1 degree where "
+            "nothing else is said; observations are Gaussian around an exactly consistent truth. Suites, each with its "
+            f"commit and its draws per figure: {runs}. "
+            f"{versions}; {document['machine']}. Every number is in `benchmarks/results/corrector.json`.",
             "",
             f"{judged - len(missed)} of {judged} targets are met." + ("" if missed else " None is missed."),
+            "",
             *_missed(missed),
             "",
             "## Time of a correction",
@@ -86,4 +90,4 @@ def _worst(rows: Iterable[Row]) -> Iterable[str]:
         said = f"{low:.3g} to {high:.3g}" if ".." in target else f"{high if target.startswith('<=') else low:.3g}"
         names = [row.problem for row in group]
         where = ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more"
-        yield f"| {what} | {target.replace('..', 'to')} | {said} | {where} |"
+        yield f"| {what.replace('|', chr(92) + '|')} | {target.replace('..', 'to')} | {said} | {where} |"

@@ -41,15 +41,28 @@ class Row(NamedTuple):
 
 def written(rows: Iterable[Row], path: Path, head: Mapping[str, Any]) -> None:
     """The rows as JSON, `head` (versions, command) before them; numbers that are not finite become null or text."""
-    table = [{**row._asdict(), "detail": dict(row.detail), "met": row.met} for row in rows]
+    save({**head, "rows": records(rows)}, path)
+
+
+def save(document: Mapping[str, Any], path: Path) -> None:
+    """Anything as JSON, as `written` does."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(_plain({**head, "rows": table}), indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(_plain(document), indent=1) + "\n", encoding="utf-8")
+
+
+def records(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """Rows as mappings, with whether the target was met."""
+    return [{**row._asdict(), "detail": dict(row.detail), "met": row.met} for row in rows]
 
 
 def read(path: Path) -> list[Row]:
     """The rows of a file."""
-    rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
-    return [Row(**{field: row[field] for field in Row._fields}) for row in rows]
+    return restored(json.loads(path.read_text(encoding="utf-8"))["rows"])
+
+
+def restored(records: Iterable[Mapping[str, Any]]) -> list[Row]:
+    """Rows out of mappings."""
+    return [Row(**{field: record[field] for field in Row._fields}) for record in records]
 
 
 def printed(rows: Iterable[Row]) -> str:

@@ -21,7 +21,7 @@ from benchmarks.corrector_bench.part import part
 from benchmarks.corrector_bench.peers import Task, newton, peers
 from benchmarks.corrector_bench.problems import problem
 from benchmarks.corrector_bench.reference import optimum
-from benchmarks.corrector_bench.rows import Row, printed, read, written
+from benchmarks.corrector_bench.rows import Row, printed, read, records, written
 from benchmarks.corrector_bench.runner import process, run
 from benchmarks.corrector_bench.suite_wrong import redundant, shifted
 
@@ -189,8 +189,9 @@ def test_the_page_lists_what_was_missed_and_what_failed() -> None:
         Row("Q1", "fig2 2/1", "gap, mm", 2e-12, "<= 1e-9"),
         Row("Q1", "fig3 2/1", "gap, mm", 3e-12, "<= 1e-9"),
     ]
-    head = {"command": "python", "commit": "abc", "draws": 3, "versions": {"numpy": "2"}, "machine": "here"}
-    text = page(head, rows)
+    suite = {"commit": "abc", "draws": 3, "rows": records(rows)}
+    text = page({"versions": {"numpy": "2"}, "machine": "here", "suites": {"door": suite}})
+    assert "door at `abc` with 3" in text
     assert "3 of 4 targets are met." in text
     assert "- Missed, fig3: `contact`: 1.4, asked <= 1.3" in text
     assert "| `contact` | 1.3 | 1.200 (0.50) | 1.400 (0.60) |  |" in text
