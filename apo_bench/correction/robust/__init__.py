@@ -1,0 +1,1 @@
+"""Correction when some observations are grossly wrong, or missing."""
