@@ -18,6 +18,9 @@ from apo_bench.correction.solvers.sparse import incidence, sparse_solver
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
 
+_SURE, _NEXT = 1e-5, 1e-7
+"""As `SURE` and `NEXT`: rounding of thousands of operations is larger."""
+
 
 def nearest_goals_sparse(
     system: CompactEquations, observed: Array, L: Array, soft_m: Array | None = None
@@ -42,7 +45,7 @@ def nearest_goals_sparse(
         step = solve(added, blocks, where.times(blocks, z) - e) - z
         length = float(np.abs(step).max(initial=0.0))
         trace.append(SolverTurn(float(np.abs(e).max(initial=0.0)), length))
-        rest = bool(settles(np.array(length), np.array(before)))
+        rest = bool(settles(np.array(length), np.array(before), _SURE, _NEXT))
         z = z + (step if rest else shortened_step(step[None], L[None])[0])
         D, Jr = exp_and_jacobian((L @ z.reshape(n, 6, 1))[..., 0])
         T, B, before = observed @ D, Jr @ L, length

@@ -127,9 +127,9 @@ def _many(system: CompactEquations, observed: Array, L: Array, soft_m: Array | N
     return _sorted(system, observed, done, tuple(trace))
 
 
-def settles(size: Array, before: Array) -> NDArray[np.bool_]:
+def settles(size: Array, before: Array, sure: float = SURE, following: float = NEXT) -> NDArray[np.bool_]:
     """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor."""
-    return np.asarray((size < STEP) | ((size < SURE) & (size * size < NEXT * before)))
+    return np.asarray((size < STEP) | ((size < sure) & (size * size < following * before)))
 
 
 class _Going(NamedTuple):
