@@ -36,7 +36,7 @@ degrees.
 
 `tests/observation/test_laws.py` and, for what is measured, `tests/observation/test_measured_noise.py` hold all of them
 to the same laws: over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice
-of the world frame; what was not seen is carried out by `contact-robust` alone; what was seen reaches the robot bit for bit.
+of the world frame; what was not seen says so; what was seen reaches the robot bit for bit.
 
 Pictures show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part.
 The line is the Gaussian with the stated covariance. Densities are logarithmic, and the outermost bins hold all that is

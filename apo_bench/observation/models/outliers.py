@@ -55,7 +55,7 @@ class Outliers:
         ),
         notes=(
             f"A missed operation has the pose at which its part was seen last, or started, with "
-            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods carry nothing out then",
+            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods refuse it",
             "At level 0 nothing is missed",
         ),
     )
