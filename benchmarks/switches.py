@@ -83,17 +83,10 @@ def under(environment: Mapping[str, str]) -> Kernels | str:
 
 
 def switches(own: Kernels) -> Iterator[Switch | str]:
-    """Every switch that took, or a sentence on one that is not run, given the kernels without any."""
-    for name in BLAS:
-        found = under({"OPENBLAS_CORETYPE": name}) if own.blas else "neither NumPy nor SciPy uses OpenBLAS"
-        if isinstance(found, str):
-            yield f"{name} is not run: {found}"
-        elif {one.lower() for one in found.blas} != {name.lower()}:
-            yield f"{name} is not run: OpenBLAS takes {' and '.join(sorted(set(found.blas)))} for it on this processor"
-        elif found.blas == own.blas:
-            yield f"{name} is not run again: it is what OpenBLAS takes on this processor by itself"
-        else:
-            yield Switch(f"OpenBLAS {name}", {"OPENBLAS_CORETYPE": name}, found)
+    """Every switch that took, or a sentence on one that is not run, given the kernels without any.
+
+    The first is the one under which Numba compiles anew, which takes longest.
+    """
     plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(own.numpy), "NUMBA_CPU_NAME": "generic"}
     found = under(plain)
     if isinstance(found, str):
@@ -104,6 +97,16 @@ def switches(own: Kernels) -> Iterator[Switch | str]:
         yield "vector features off is not run again: NumPy and Numba use none on this processor"
     else:
         yield Switch("vector features of NumPy and Numba off", plain, found)
+    for name in BLAS:
+        found = under({"OPENBLAS_CORETYPE": name}) if own.blas else "neither NumPy nor SciPy uses OpenBLAS"
+        if isinstance(found, str):
+            yield f"{name} is not run: {found}"
+        elif {one.lower() for one in found.blas} != {name.lower()}:
+            yield f"{name} is not run: OpenBLAS takes {' and '.join(sorted(set(found.blas)))} for it on this processor"
+        elif found.blas == own.blas:
+            yield f"{name} is not run again: it is what OpenBLAS takes on this processor by itself"
+        else:
+            yield Switch(f"OpenBLAS {name}", {"OPENBLAS_CORETYPE": name}, found)
 
 
 def taken(own: Kernels) -> Iterator[Switch]:

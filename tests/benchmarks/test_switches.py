@@ -34,7 +34,7 @@ def test_a_switch_is_one_whose_kernels_run_in_both_libraries(monkeypatch: pytest
         "Nehalem": replace(OWN, blas=("Nehalem", "SkylakeX")),
         "Cooperlake": "a process under it ended with -4",
     }
-    haswell, zen, own, half, dead, plain = found(monkeypatch, OWN, kernels, BARE)
+    plain, haswell, zen, own, half, dead = found(monkeypatch, OWN, kernels, BARE)
     assert haswell == Switch("OpenBLAS Haswell", {"OPENBLAS_CORETYPE": "Haswell"}, kernels["Haswell"])
     assert zen == "Zen is not run: OpenBLAS takes Haswell for it on this processor"
     assert own == "SkylakeX is not run again: it is what OpenBLAS takes on this processor by itself"
@@ -60,8 +60,8 @@ def test_where_there_is_nothing_to_switch_nothing_is_run(monkeypatch: pytest.Mon
     """Neither OpenBLAS nor Numba nor any feature above the least, as on some machines that are not x86."""
     none = Kernels((), (), ())
     assert found(monkeypatch, none, {"Haswell": OWN}, none) == [
-        "Haswell is not run: neither NumPy nor SciPy uses OpenBLAS",
         "vector features off is not run again: NumPy and Numba use none on this processor",
+        "Haswell is not run: neither NumPy nor SciPy uses OpenBLAS",
     ]
 
 
