@@ -30,6 +30,7 @@ from apo_bench.trial.stages import observe_recording, record_demonstration
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "profile.json"
+TIMES = ROOT / "benchmarks" / "results" / "trial_times.json"
 PAGE = ROOT / "docs" / "results" / "speed.md"
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 METHODS = ("none", "paper", "paper-track")
@@ -141,6 +142,7 @@ def page(found: dict[str, Any]) -> list[str]:
             for s in shares
         ),
         "",
+        *compared(),
         "The functions in which a replay of `pocket_table` at full fidelity spends most time themselves, as the "
         "profiler sees them (it slows Python down, not the physics):",
         "",
@@ -148,6 +150,27 @@ def page(found: dict[str, Any]) -> list[str]:
         *found["profile"],
         "```",
     ]
+
+
+def compared() -> list[str]:
+    """What `trial_times.py` measured last, if anything."""
+    if not TIMES.exists():
+        return []
+    found = json.loads(TIMES.read_text(encoding="utf-8"))
+    lines = [
+        f"A whole trial with its demonstration, at {found['before']} and at {found['after']}, in turn in one run "
+        f"(`{found['command']}`): the four examples, `none`, `paper` and `contact` at level 1, careless humans.",
+        "",
+        "| fidelity | trials | median seconds | median ratio | in CPU time | real-time factor | verdicts that differ |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for fidelity, f in found["fidelities"].items():
+        seconds, factors = (" to ".join(f"{x:g}" for x in f[name]) for name in ("wall_s", "real_time_factor"))
+        lines.append(
+            f"| {fidelity} | {f['trials']} | {seconds} | {f['wall_ratio']:.2f} | {f['cpu_ratio']:.2f} | {factors} "
+            f"| {f['verdicts_differ']} |"
+        )
+    return [*lines, ""]
 
 
 if __name__ == "__main__":
