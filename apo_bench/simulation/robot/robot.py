@@ -68,7 +68,7 @@ class Robot:
         self._handled: int | None = None
         self.peak_force_n = 0.0
         self._find_joints()
-        self._net = np.zeros((3, self.model.nsensordata))
+        self._net, self._felt = np.zeros((3, self.model.nsensordata)), np.zeros(3)
         self.data: Any = initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self.arm.home
         self.data.qpos[self._fingers] = self.arm.opening_m
@@ -81,6 +81,7 @@ class Robot:
         self._names = (*scene.work.free, *scene.work.fixed)
         self._forces = self.data.sensordata
         self._on_arm = self._forces.reshape(-1, 3)[len(scene.work.free) :]
+        self._on_arm_flat = self._forces[3 * len(scene.work.free) :]
 
     def follow(self, line: Trajectory, guard: Guard | None = None) -> float:
         """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.
@@ -267,12 +268,12 @@ class Robot:
         if guard is None:
             self._run_free(rows)
             return len(targets)
-        a, b, c = guard.way.tolist()
+        (a, b, c), newton, feel = guard.way.tolist(), guard.newton, self._feel
         for i, row in enumerate(rows, start=1):
             ctrl[:] = row
             step(model, data)
-            x, y, z = self._feel()
-            if -(x * a + y * b + z * c) > guard.newton:
+            x, y, z = feel()
+            if -(x * a + y * b + z * c) > newton:
                 self._look()
                 return i
             if i % every == 0:
@@ -298,9 +299,10 @@ class Robot:
         if has_failed(self.data):
             raise Halt(self.stage, "unstable_simulation")
         self._feel()
-        struck, force = self._hardest_blow()
-        if force > _COLLISION_N:
-            raise Halt(self.stage, "collision", struck)
+        if self._on_arm_flat @ self._on_arm_flat > _COLLISION_N**2:
+            struck, force = self._hardest_blow()
+            if force > _COLLISION_N:
+                raise Halt(self.stage, "collision", struck)
         if self.watch is not None:
             self.watch(self.data)
 
@@ -309,8 +311,10 @@ class Robot:
 
         What the parts of a group exert on each other cancels. The largest so far is remembered.
         """
-        x, y, z = f = (self._net @ self._forces).tolist()
-        self.peak_force_n = max(self.peak_force_n, math.sqrt(x * x + y * y + z * z))
+        x, y, z = f = np.dot(self._net, self._forces, self._felt).tolist()
+        size = math.sqrt(x * x + y * y + z * z)
+        if size > self.peak_force_n:
+            self.peak_force_n = size
         return f
 
     def _hardest_blow(self) -> tuple[str, float]:

@@ -129,7 +129,8 @@ class Kinematics:
         self.configuration.update(self._full)
         for _ in range(turns):
             error: Any = self._task.compute_error(self.configuration)
-            if np.abs(error[:3]).max() < self.POSITION_M and np.abs(error[3:]).max() < self.ANGLE_RAD:
+            off = error.tolist()
+            if all(abs(x) < self.POSITION_M for x in off[:3]) and all(abs(x) < self.ANGLE_RAD for x in off[3:]):
                 found = self.configuration.q[self.adr]
                 return np.array(found)
             step = self._step()
@@ -145,7 +146,7 @@ class Kinematics:
         Without limits the programme is a linear system. Where its solution keeps them, it is that of the programme too.
         """
         H, c = self._task.compute_qp_objective(self.configuration)
-        H.flat[:: len(c) + 1] += self.DAMPING
+        np.einsum("ii->i", H)[:] += self.DAMPING
         step: Array = np.linalg.solve(H, -c)
         low, high = self.GAIN * (self._range - self.configuration.q)
         if (step >= low).all() and (step <= high).all():
