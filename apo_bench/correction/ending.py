@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.opposing import looking_away
 from apo_bench.correction.solvers.newton import Solution
 from apo_bench.records import outcomes
 
@@ -23,6 +26,22 @@ def solver_status(found: Solution, left_m: float, gap_m: float) -> str:
 def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str:
     """What a status means; `of` says which contacts were looked at."""
     return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
+
+
+def opposing(observation: Observation, made: Correction) -> Correction:
+    """A correction as it is; `inconsistent` in place of `converged` where faces that should touch look the same way."""
+    if not made.ok:
+        return made
+    away = looking_away(observation.assembly, observation.start, made.goals)
+    if made.dropped:
+        away &= observation.assembly.without(made.dropped)
+    if not away.any():
+        return made
+    contact = observation.assembly.relations()[int(np.argmax(away))].contact
+    said = (
+        f"the faces of {contact} look the same way at the goals that were found; a part was probably seen turned over"
+    )
+    return replace(made, status="inconsistent", sentence=said, covariance=None)
 
 
 def refused_correction(observation: Observation) -> Correction:

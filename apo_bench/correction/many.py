@@ -13,6 +13,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
+from apo_bench.correction.ending import opposing
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, corner_moments
 from apo_bench.correction.solvers.inequalities import demanded
 from apo_bench.correction.solvers.manifold import NearestGoals
@@ -48,9 +49,9 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
             f"observation {odd + 1} is of another assembly, start or play than observation 1; "
             "correct those together that share them."
         )
-    return tuple(
-        made for i in range(0, len(observations), BATCH) for made in _chunk(observations[i : i + BATCH], corrector)
-    )
+    batches = (observations[i : i + BATCH] for i in range(0, len(observations), BATCH))
+    found = [made for some in batches for made in _chunk(some, corrector)]
+    return tuple(opposing(one, made) for one, made in zip(observations, found, strict=True))
 
 
 def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:

@@ -17,9 +17,10 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.opposing import looking_away
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
 from apo_bench.correction.contact import contact_apply
-from apo_bench.correction.robust.inferred import contact_ends, inferred_goals
+from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.whitened import scales
 from apo_bench.errors import InputError
@@ -30,8 +31,6 @@ from apo_bench.geometry.twist import right_jacobian
 INLIER, BROAD, GROSS = 0, 1, 2
 States = tuple[int, ...]
 """One of these for each operation."""
-_OPPOSED = -0.5
-"""Cosine between the normals of faces that touch, at most."""
 UNKNOWN = np.diag(np.repeat([0.05, 0.5], 3) ** 2)
 """(6, 6): how far the goal of a gross operation may be from what its contacts say of it, [m, rad]."""
 UNKNOWN.flags.writeable = False
@@ -118,13 +117,8 @@ def hypothesis(observation: Observation, states: States, model: OutlierModel) ->
 
 
 def faces_oppose(observation: Observation, goals: Array) -> bool:
-    """Whether the faces of every contact look at each other at the goals, (n, 4, 4): the equations do not ask that."""
-    ends = contact_ends(observation.assembly)
-    if not ends:
-        return True
-    turns = seen_system(observation).words(goals)[:, :3, :3]
-    a, b = (np.array([one.normals[side] for one in ends]) for side in (0, 1))
-    return bool((np.einsum("ci,cij,cj->c", a, turns, b) < _OPPOSED).all())
+    """Whether the faces of every contact look at each other at the goals, (n, 4, 4)."""
+    return not looking_away(observation.assembly, observation.start, goals).any()
 
 
 def seen_system(observation: Observation) -> CompactEquations:

@@ -1,0 +1,62 @@
+"""No corrector of the package calls goals right at which faces that touch look the same way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.opposing import looking_away
+from apo_bench.assembly.placement import placements
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.many import correct_many
+from apo_bench.geometry import pose
+from tests.correction.robust.test_robust import SCENARIOS, look, shown
+
+TURNS = [[135, 0, 0], [180, 0, 0], [0, 135, 0], [0, 180, 0], [180, 0, 90], [0, 180, 90]]
+
+
+def turned(name, k, turn, seed=0):
+    """Operation k seen turned in its own frame, [degrees]."""
+    observation = look(name, seed)
+    goals = np.array(observation.goals)
+    goals[k] = goals[k] @ pose.at((0.0, 0.0, 0.0), turn)
+    return replace(observation, goals=goals)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name):
+    scenario, layout, _ = shown(name)
+    assembly = scenario.assembly
+    assert not looking_away(assembly, layout.start, layout.goals).any()
+    goals = np.array(layout.goals)
+    goals[-1] = goals[-1] @ pose.at((0.0, 0.0, 0.0), (180.0, 0.0, 0.0))
+    both = looking_away(assembly, layout.start, np.array([layout.goals, goals]))
+    assert not both[0].any()
+    for k, (operation, at) in enumerate(
+        zip(assembly.operations, placements(assembly, layout.start, goals), strict=True)
+    ):
+        for m, e in operation.contacts:
+            i = next(i for i, r in enumerate(assembly.relations()) if r.contact == (m, e) and r.made == k)
+            cosine = (at[m.part][:3, :3] @ assembly.face(m).normal) @ (at[e.part][:3, :3] @ assembly.face(e).normal)
+            assert both[1, i] == (cosine > -0.5)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_nothing_converges_where_a_part_was_seen_turned_over(name):
+    """All operations, all turns; what the solver turns back is right, what it leaves upside down is said."""
+    scenario, layout, _ = shown(name)
+    seen = [turned(name, k, turn) for k in range(len(scenario.assembly)) for turn in TURNS]
+    for made in correct_many(seen):
+        assert not made.ok or not looking_away(scenario.assembly, layout.start, made.goals).any()
+    for corrector in ("paper", "contact-drop", "snap", "contact-robust"):
+        for one in seen[::11]:
+            made = correct(one, corrector)
+            kept = scenario.assembly.without(made.dropped)
+            assert not made.ok or not looking_away(scenario.assembly, layout.start, made.goals)[kept].any()
+
+
+def test_a_cube_upside_down_inside_the_table_is_no_solution():
+    found = correct(turned("block_on_block", 1, [180, 0, 0]))
+    assert (found.status, found.covariance) == ("inconsistent", None)
+    assert "look the same way at the goals that were found" in found.sentence
+    assert correct(turned("block_on_block", 1, [180, 0, 0]), "contact-robust").ok
