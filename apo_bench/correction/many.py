@@ -10,6 +10,7 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import Equations, equations, pattern
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
@@ -51,7 +52,10 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
         )
     batches = (observations[i : i + BATCH] for i in range(0, len(observations), BATCH))
     found = [made for some in batches for made in _chunk(some, corrector)]
-    return tuple(opposing(one, made) for one, made in zip(observations, found, strict=True))
+    away = looking_away(observations[0].assembly, observations[0].start, np.array([made.goals for made in found]))
+    for i in map(int, np.flatnonzero(away.any(axis=1))):
+        found[i] = opposing(observations[i], found[i])
+    return tuple(found)
 
 
 def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
