@@ -8,14 +8,15 @@ says this of its goal alone. The operation of which most is said is inferred fir
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from itertools import permutations, product
+from itertools import permutations
+from itertools import product as pairs
 from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly.topology import Assembly, product
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.remembered import remembered
@@ -94,31 +95,24 @@ def contact_ends(assembly: Assembly) -> tuple[Ends, ...]:
 
 def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collection[int]) -> list[_Said]:
     """What contacts say of operation k that depend on no other operation of those left."""
-    known, p = pattern(assembly), len(start)
-    poses = np.concatenate([start, goals, np.eye(4)[None]])
-    others = [p + j for j in left if j != k]
-    found = []
-    for i, ends in enumerate(contact_ends(assembly)):
-        letters = known.letters[i]
-        (places,) = np.nonzero(letters == p + k)
-        if len(places) != 1 or np.isin(letters, others).any():
+    p, poses, found = len(start), np.concatenate([start, goals]), list[_Said]()
+    others = {p + other for other in left if other != k}
+    for word, ends in zip(pattern(assembly).words, contact_ends(assembly), strict=True):
+        letters = [letter for letter, _ in word]
+        if letters.count(p + k) != 1 or others.intersection(letters):
             continue
-        j = int(places[0])
-        F = [pose.inverse(poses[x]) if back else poses[x] for x, back in zip(letters, known.inverse[i], strict=True)]
-        before, behind = pose.inverse(_product(F[:j])), _product(F[j + 1 :])
+        j = letters.index(p + k)
+        before, behind, inverted = (
+            pose.inverse(product(word[:j], poses)),
+            product(word[j + 1 :], poses),
+            word[j].inverse,
+        )
         a = before[:3, :3] @ ends.normals[0], pose.apply(before, ends.middles[0][None])[0]
         b = behind[:3, :3] @ ends.normals[1], pose.apply(behind, ends.middles[1][None])[0]
-        (own, at), (other, there) = (a, b) if known.inverse[i, j] else (b, a)
-        beside = behind[:3, :3] if known.inverse[i, j] else before[:3, :3]
+        (own, at), (other, there) = (a, b) if inverted else (b, a)
+        beside = behind[:3, :3] if inverted else before[:3, :3]
         found.append(_Said(own, at, -other, there, beside, ends.reach_m))
     return found
-
-
-def _product(matrices: Sequence[Array]) -> Array:
-    T = np.eye(4)
-    for F in matrices:
-        T = T @ F
-    return T
 
 
 def _rank(told: Sequence[_Said]) -> int:
@@ -165,7 +159,7 @@ def _nearest(H: Array) -> Array:
 def _quarter_turns() -> list[Array]:
     """The 24 rotations of a cube."""
     found = []
-    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+    for order, signs in pairs(permutations(range(3)), pairs((1.0, -1.0), repeat=3)):
         Q = np.zeros((3, 3))
         Q[range(3), order] = signs
         if np.linalg.det(Q) > 0.0:
