@@ -11,9 +11,10 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.solid import Solid
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.near import Obstacle, obstacle
 from apo_bench.simulation.scene.scene import Scene
 
 _STAND_OFF_M = 0.012
@@ -28,16 +29,6 @@ _MOST_LEFT_M = 0.1
 """A grip is changed so near to the goal that the part already lies in what it was put into."""
 _HEIGHT = 0.65
 """Height of the tip over the part's lowest point, as a part of its height."""
-
-
-class Obstacle(NamedTuple):
-    """A part that rests while another is moved."""
-
-    boxes: tuple[Box, ...]
-    T: Array
-    low: Array
-    """The lowest corner of the upright box around it, (3,), world, [m]."""
-    high: Array
 
 
 class RestingPart(NamedTuple):
@@ -67,11 +58,7 @@ class Grips(NamedTuple):
 
 def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
     """Every part but these, where it is believed to be."""
-    return tuple(
-        Obstacle(solid.boxes, T := poses[part], *upright_bounds(solid.boxes, T[:3, :3], T[:3, 3]))
-        for part, solid in solids.items()
-        if part not in without
-    )
+    return tuple(obstacle(solid.boxes, poses[part]) for part, solid in solids.items() if part not in without)
 
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:

@@ -37,10 +37,18 @@ _Span = tuple[int, int]
 
 
 class Obstacle(NamedTuple):
-    """A part that rests."""
+    """A part that rests while another is moved."""
 
     boxes: tuple[Box, ...]
     T: Array
+    low: Array
+    """The lowest corner of the upright box around it, (3,), world, [m]."""
+    high: Array
+
+
+def obstacle(boxes: tuple[Box, ...], T: Array) -> Obstacle:
+    """A part that rests at T."""
+    return Obstacle(boxes, T, *upright_bounds(boxes, T[:3, :3], T[:3, 3]))
 
 
 class Moving(NamedTuple):
@@ -75,7 +83,7 @@ def near_spans(
     others = [part for part in (*world.free, *world.fixed) if part not in held]
     if not _still(world, data, others):
         return [(0, n)]
-    obstacles = [Obstacle(scene.boxes[part], _pose(world, data, part)) for part in others]
+    obstacles = [obstacle(scene.boxes[part], _pose(world, data, part)) for part in others]
     far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
     looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(far))), n))
     near = _near(moving, obstacles, line, s[looks], near_m[len(held) > 1])
@@ -95,7 +103,7 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
     R, start = line.start[:3, :3], line.start[:3, 3]
     tips, near = start + s[:, None] * (line.end[:3, 3] - start), np.zeros(len(s), dtype=np.bool_)
     turns = float(np.linalg.norm(line.turn)) > _UPRIGHT
-    bounds = np.array([upright_bounds(boxes, T[:3, :3], T[:3, 3]) for boxes, T in obstacles])
+    bounds = np.array([(each.low, each.high) for each in obstacles])
     for boxes, T_tip in moving:
         low, high = upright_bounds(boxes, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
         if turns:
@@ -109,7 +117,9 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
             look = may[:, i] & ~near
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
-                near[look] = intrusion_depths(boxes, R @ T_tip[:3, :3], at, *obstacles[i]) > -margin
+                near[look] = (
+                    intrusion_depths(boxes, R @ T_tip[:3, :3], at, obstacles[i].boxes, obstacles[i].T) > -margin
+                )
     return near
 
 
