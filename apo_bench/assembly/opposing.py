@@ -14,7 +14,7 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
 
-_LEVEL = -0.5
+OPPOSING = -0.5
 """Cosine between the normals of two faces that look at each other, at most."""
 
 
@@ -41,4 +41,4 @@ def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.b
     n = np.broadcast_to(known.plane[:, None, :3], (*lead, len(rows), 1, 3))
     for j in range(rows.shape[1]):
         n = n @ turned[..., rows[:, j], :, :]
-    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > _LEVEL)
+    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > OPPOSING)

@@ -96,7 +96,7 @@ def p_value(chi_square: float, freedom: int) -> float:
 
 
 def correction_length(
-    system: CompactEquations, observed: Array, L: Array, found: NearestGoals, slack_m: Array
+    system: CompactEquations, observed: Array, L: Array, found: NearestGoals, slack_m: Array, begin: Array | None = None
 ) -> tuple[float, int, NearestGoals | None]:
     """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
 
@@ -106,6 +106,7 @@ def correction_length(
         seen: (n, 4, 4), the goals that were seen.
         L: (n, 6, 6), their covariance is L L^t.
         slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
+        begin: As of `nearest_goals`.
     """
     freedom = jacobian_rank(found.Jt)
     if not found.finite:
@@ -114,7 +115,7 @@ def correction_length(
     if holds and not slack_m.any():
         return float(found.z @ found.z), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
-    relaxed = nearest_goals(system, observed, L, soft)
+    relaxed = nearest_goals(system, observed, L, soft, begin)
     asked = soft > 0.0
     over = relaxed.e[asked] / soft[asked]
     return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed

@@ -16,11 +16,12 @@ from apo_bench.assembly.correction_record import Consistency, Correction, Iterat
 from apo_bench.assembly.equations import largest, pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.consistency import TEST_LEVEL
-from apo_bench.correction.ending import refused_correction, status_sentence
+from apo_bench.correction.ending import opposing, refused_correction, status_sentence
 from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
 from apo_bench.correction.problem import Problem, Solved, Solver, problem
 from apo_bench.correction.solvers import compiled
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
+from apo_bench.correction.starts import best_start, turned_words
 from apo_bench.correction.whole import correct_compiled, layout
 from apo_bench.errors import InputError
 
@@ -40,6 +41,8 @@ class ContactCorrector:
     test passes."""
     level: float = TEST_LEVEL
     """The test fails if the p-value is below: the share of false alarms."""
+    elsewhere: bool = True
+    """Whether other starts are tried where what was seen leads to no solution, or far."""
     solver: Solver | None = None
     """What finds the nearest goals; None stands for `compiled.nearest_goals_compiled` where Numba is installed and can
     keep what it compiles, else for `manifold.nearest_goals`. They give the same goals but for rounding."""
@@ -83,8 +86,11 @@ class ContactCorrector:
         if not observation.seen.all():
             return refused_correction(observation)
         asked = problem(observation, self.chosen_solver())
-        every = asked.without(())
-        solved = first = asked.solve(every, found)
+        every, before_m = asked.without(()), largest(asked.gaps(observation.goals))
+        first = asked.solve(every, found)
+        if self.elsewhere:
+            asked, first = best_start(asked, first)
+        solved = first
         test = replace(first.test, level=self.level)
         lost = not first.found.at_rest and largest(first.gaps) <= observation.gap_m
         if not test.passes and self.doubt != "apply" and first.found.finite and not lost:
@@ -98,7 +104,7 @@ class ContactCorrector:
             kept = asked.without(dropped)
             solved = asked.solve(kept)
             after = replace(solved.test, level=self.level)
-        return self._report(asked, solved, kept, test, after, dropped)
+        return opposing(observation, self._report(asked, solved, kept, test, after, dropped, before_m))
 
     def chosen_solver(self) -> Solver:
         """What finds the nearest goals here."""
@@ -119,6 +125,7 @@ class ContactCorrector:
         test: Consistency,
         after: Consistency,
         dropped: tuple[str, ...],
+        before_m: float,
     ) -> Correction:
         observation, found = asked.observation, solved.found
         known = freedom(found.Jt)
@@ -131,9 +138,9 @@ class ContactCorrector:
         return Correction(
             goals=found.goals,
             status=status,
-            sentence=status_sentence(status, observation.gap_m, of) + doubts,
+            sentence=status_sentence(status, observation.gap_m, of) + turned_words(asked, found.goals) + doubts,
             freed=pattern(observation.assembly).freed,
-            gap_before_m=largest(asked.gaps(observation.goals)),
+            gap_before_m=before_m,
             gap_after_m=largest(solved.gaps),
             rank=directions,
             trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),

@@ -13,6 +13,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
+from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.ending import opposing
 from apo_bench.correction.own_code.returned import RIGID, check_correction, check_near
 from apo_bench.errors import InputError, failed, kind
@@ -74,7 +75,7 @@ def checked_corrector(given: Any) -> Any:
 def _admitted(found: Any, observation: Observation, chosen: Any, name: str) -> Correction:
     """What a corrector returned, as a `Correction` that makes sense."""
     if isinstance(found, Correction) and _ours(chosen) and _ours(getattr(chosen, "solver", None) or chosen):
-        return opposing(observation, found)
+        return found if isinstance(chosen, ContactCorrector) else opposing(observation, found)
     if not isinstance(found, Correction):
         return goals_as_given(
             observation, _bare(found, len(observation.goals), name), "the corrector returned goals and no status"

@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import Equations, equations, pattern
+from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.opposing import looking_away
-from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
-from apo_bench.correction.ending import opposing
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, corner_moments
+from apo_bench.correction.solvers.batch import compact_many
 from apo_bench.correction.solvers.inequalities import demanded
 from apo_bench.correction.solvers.manifold import NearestGoals
 from apo_bench.correction.solvers.whitened import scales
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
 
 BATCH = 64
 """Observations that are solved together: more would leave the cache of the processor."""
@@ -51,11 +45,7 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
             "correct those together that share them."
         )
     batches = (observations[i : i + BATCH] for i in range(0, len(observations), BATCH))
-    found = [made for some in batches for made in _chunk(some, corrector)]
-    away = looking_away(observations[0].assembly, observations[0].start, np.array([made.goals for made in found]))
-    for i in map(int, np.flatnonzero(away.any(axis=1))):
-        found[i] = opposing(observations[i], found[i])
-    return tuple(found)
+    return tuple(made for some in batches for made in _chunk(some, corrector))
 
 
 def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
@@ -67,28 +57,6 @@ def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> 
     solve = corrector.chosen_solver()
     found = solve(compact_many(observations[0].assembly, system, goals).among(exact), goals, L)
     return [corrector.given(one, _one(found, i)) for i, one in enumerate(observations)]
-
-
-def compact_many(assembly: Assembly, system: Equations, goals: Array) -> CompactEquations:
-    """The compact equations of many observations, goals (b, n, 4, 4), each with the vertices that it gives itself.
-
-    Vertices of the environment's face are the same for all; those of the manipulated face are laid onto the other one
-    at each observation's own goals, which takes their centre and axes along, since it is an affine map.
-
-    Args:
-        system: The equations of one of them.
-    """
-    one, known = compact_equations(system, goals.shape[1]), pattern(assembly)
-    laid = known.laid
-    points = np.array(np.broadcast_to(one.points, (len(goals), *one.points.shape)))
-    if laid.any():
-        own = corner_moments(known)[laid]
-        back = pose.inverse(one.among(laid).words(goals))
-        there = own @ np.swapaxes(back, -1, -2)
-        plane = known.onto[laid]
-        points[:, laid] = there
-        points[:, laid, :, :3] -= (there @ plane[:, :, None]) * plane[:, None, :3]
-    return replace(one, points=points)
 
 
 def _odd_one(observations: Sequence[Observation]) -> int | None:

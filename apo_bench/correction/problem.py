@@ -24,7 +24,7 @@ from apo_bench.correction.consistency import (
 from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
 from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
-from apo_bench.correction.solvers.whitened import scales
+from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry.arrays import Array
 
 Solver = Callable[[CompactEquations, Array, Array], NearestGoals]
@@ -58,6 +58,8 @@ class Problem:
     slack_m: Array
     """(3 c,): what the play of parts that fit leaves, for the test."""
     solver: Solver
+    begin: Array | None = None
+    """(6 n,): the correction that is begun with, in standard deviations; None stands for no correction."""
 
     def solve(self, kept: NDArray[np.bool_], found: NearestGoals | None = None) -> Solved:
         """The nearest goals by the contacts that are `kept`, (c,), and the test of their correction.
@@ -73,11 +75,11 @@ class Problem:
         """
         chosen = kept & self.exact
         part, slack_m = self._equal(chosen)
-        found = self.solver(part, self.observation.goals, self.L) if found is None else found
+        found = self._nearest(part) if found is None else found
         gaps = self.gaps(found.goals)
-        chi_square, freedom, shared = correction_length(part, self.observation.goals, self.L, found, slack_m)
+        chi_square, freedom, shared = self._length(part, found, slack_m)
         if found.finite and largest(gaps[chosen]) > self.observation.gap_m:
-            found = shared or nearest_goals(part, self.observation.goals, self.L, np.hypot(slack_m, SOFT_M))
+            found = shared or self._nearest(part, np.hypot(slack_m, SOFT_M))
             gaps = self.gaps(found.goals)
         elif found.finite and kept[~self.exact].any():
             inequalities = self.inequalities.among(kept[~self.exact])
@@ -99,9 +101,19 @@ class Problem:
         if kept[~self.exact].any():
             return self.solve(kept).test
         part, slack_m = self._equal(kept & self.exact)
-        found = self.solver(part, self.observation.goals, self.L)
-        chi_square, freedom, _ = correction_length(part, self.observation.goals, self.L, found, slack_m)
+        chi_square, freedom, _ = self._length(part, self._nearest(part), slack_m)
         return Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL)
+
+    def _nearest(self, part: CompactEquations, soft_m: Array | None = None) -> NearestGoals:
+        """The nearest goals by some of the equations, demanded or given a standard deviation each, [m]."""
+        if soft_m is None and self.begin is None:
+            return self.solver(part, self.observation.goals, self.L)
+        return nearest_goals(part, self.observation.goals, self.L, soft_m, self.begin)
+
+    def _length(
+        self, part: CompactEquations, found: NearestGoals, slack_m: Array
+    ) -> tuple[float, int, NearestGoals | None]:
+        return correction_length(part, self.observation.goals, self.L, found, slack_m, self.begin)
 
     def _equal(self, chosen: NDArray[np.bool_]) -> tuple[CompactEquations, Array]:
         """The equations of the contacts that are chosen, (c,), and the slack of each, [m]."""
@@ -112,7 +124,7 @@ class Problem:
         chosen = kept & self.exact
         soft = np.hypot(self.slack_m, SOFT_M)[np.repeat(chosen, 3)]
         pull = np.zeros((len(self.compact), 3))
-        relaxed = nearest_goals(self.compact.among(chosen), self.observation.goals, self.L, soft)
+        relaxed = self._nearest(self.compact.among(chosen), soft)
         pull[chosen] = (relaxed.e / soft).reshape(-1, 3)
         return np.asarray((pull * pull).sum(axis=1))
 
@@ -125,15 +137,20 @@ class Problem:
         return violations(self.system, self.exact, self.inequalities, goals)
 
 
-def problem(observation: Observation, solver: Solver) -> Problem:
+def problem(observation: Observation, solver: Solver, at: Array | None = None) -> Problem:
     """What an observation asks.
+
+    Args:
+        at: Goals, (n, 4, 4), at which vertices are laid onto the other face of their contact and which solvers begin
+            with; None stands for those that were seen.
 
     Raises:
         InputError: The covariance of an operation is not positive definite.
     """
     L = scales(observation.covariance)
-    plain = equations(observation.assembly, observation.start, observation.goals)
+    plain = equations(observation.assembly, observation.start, observation.goals if at is None else at)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     every = compact_assembly(observation.assembly, system)
     slack_m = fit_deviation(observation.assembly, observation.play_m)
-    return Problem(observation, system, every, exact, inequalities, L, slack_m, solver)
+    begin = None if at is None else correction_to(observation.goals, L, at)
+    return Problem(observation, system, every, exact, inequalities, L, slack_m, solver, begin)

@@ -17,6 +17,7 @@ from scipy.special import chdtrc
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.opposing import OPPOSING
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
 from apo_bench.correction.ending import status_sentence
@@ -24,6 +25,7 @@ from apo_bench.correction.posterior import UNCLEAR
 from apo_bench.correction.solvers.compact import CompactEquations, corner_moments
 from apo_bench.correction.solvers.compiled import Kernels, solved
 from apo_bench.correction.solvers.manifold import LARGEST_DENSE, NearestGoals, SolverTurn
+from apo_bench.correction.starts import turned_far
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.remembered import remembered
 
@@ -56,12 +58,14 @@ def correct_compiled(
     loops.prepared(faces, words, known.moments, goals, covariance, vertex, points, L, before, definite)
     system = CompactEquations(start, known.letters, known.columns, known.inverse, known.plane, points, n)
     found, turns = solved(loops, system, goals, L, None)
-    after, rank, clear, posterior = np.empty(b), np.empty(b, np.intp), np.empty(b, np.bool_), np.empty((b, n, 6, 6))
-    loops.rated(faces, words, vertex, found.goals, found.Jt, found.B, UNCLEAR, after, rank, clear, posterior)
+    after, cosine, rank = np.empty(b), np.empty(b), np.empty(b, np.intp)
+    clear, posterior = np.empty(b, np.bool_), np.empty((b, n, 6, 6))
+    loops.rated(faces, words, vertex, found.goals, found.Jt, found.B, UNCLEAR, after, cosine, rank, clear, posterior)
     chi_square = _lengths(loops, system, goals, L, found, known.slack_m)
     p = np.where(rank > 0, chdtrc(np.maximum(rank, 1), chi_square), 1.0)
     holds = np.abs(found.e).max(axis=1, initial=0.0) <= SOFT_M
-    simple = definite & found.finite & found.at_rest & clear & holds & (trusting | (p >= level))
+    trusted = (cosine <= OPPOSING) & ~turned_far(goals, found.goals)
+    simple = definite & found.finite & found.at_rest & clear & holds & trusted & (trusting | (p >= level))
     made = []
     numbers = (before, after, rank, chi_square, p, turns.ended, simple)
     for i, (one, values) in enumerate(zip(observations, zip(*(x.tolist() for x in numbers), strict=True), strict=True)):

@@ -14,7 +14,8 @@ from apo_bench.assembly.equations import equations, pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.many import BATCH, compact_many, correct_many
+from apo_bench.correction.many import BATCH, correct_many
+from apo_bench.correction.solvers.batch import compact_many
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

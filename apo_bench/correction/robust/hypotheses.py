@@ -19,7 +19,7 @@ from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
-from apo_bench.correction.contact import contact_apply
+from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.whitened import scales
@@ -29,6 +29,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
 INLIER, BROAD, GROSS = 0, 1, 2
+_as_begun = ContactCorrector("apply", elsewhere=False)
+"""Goals of gross operations come from contacts already."""
 States = tuple[int, ...]
 """One of these for each operation."""
 UNKNOWN = np.diag(np.repeat([0.05, 0.5], 3) ** 2)
@@ -113,7 +115,7 @@ def hypothesis(observation: Observation, states: States, model: OutlierModel) ->
         if state == GROSS:
             covariance[k] = UNKNOWN
     widened = replace(observation, goals=goals, covariance=covariance, seen=np.ones(len(states), dtype=np.bool_))
-    return Hypothesis(states, widened, contact_apply(widened), model)
+    return Hypothesis(states, widened, (_as_begun if any(states) else contact_apply)(widened), model)
 
 
 def faces_oppose(observation: Observation, goals: Array) -> bool:

@@ -41,6 +41,7 @@ HELPERS = (
     loops_around.product,
     loops_around.dropped,
     loops_around.largest,
+    loops_around.between,
     loops_around.rooted,
     loops_around.spanned,
     loops_around.spread,

@@ -23,13 +23,16 @@ _SURE, _NEXT = 1e-5, 1e-7
 
 
 def nearest_goals_sparse(
-    system: CompactEquations, observed: Array, L: Array, soft_m: Array | None = None
+    system: CompactEquations, observed: Array, L: Array, soft_m: Array | None = None, begin: Array | None = None
 ) -> NearestGoals:
     """Sparse `manifold.nearest_goals` of one set of goals (n, 4, 4); the Jacobian of the result is sparse, too."""
     n, m = system.n, 3 * len(system)
     where = incidence(system)
     solve = sparse_solver(where)
     z, T, B = np.zeros(6 * n), observed, L
+    if begin is not None:
+        D, Jr = exp_and_jacobian((L @ begin.reshape(n, 6, 1))[..., 0])
+        z, T, B = begin, observed @ D, Jr @ L
     before, trace, rest, finite = np.inf, list[SolverTurn](), False, True
     blocks = np.zeros((len(where.contact), 6, 3))
     for turn in range(MOST_TURNS):

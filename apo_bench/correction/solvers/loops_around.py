@@ -74,11 +74,12 @@ def rated(
     B: _Array,
     unclear: tuple[float, float],
     after: _Array,
+    cosine: _Array,
     rank: _Index,
     clear: NDArray[np.bool_],
     covariance: _Array,
 ) -> None:
-    """The gaps that a solution leaves, the rank of its contacts, and how uncertain its goals still are.
+    """What a solution leaves: gaps, whether faces oppose, the rank of its contacts, how uncertain its goals still are.
 
     An orthonormal basis Q of the row space of J comes from Gram and Schmidt, the longest row that is left next, each
     direction made orthogonal twice (Giraud et al., 2005). What is free is all else: cov(z) = P = 1 - Q^t Q
@@ -88,18 +89,20 @@ def rated(
         goals: (b, n, 4, 4), Jt (b, 6 n, 3 c) and B (b, n, 6, 6) as in `NearestGoals`.
         unclear: Squared lengths in parts of the largest; a row that is left between them makes the rank unclear.
         after: (b,), overwritten: the largest |e| of all contacts, [m].
+        cosine: (b,), overwritten: the largest between the normals of two faces that touch, -1 of no contacts.
         rank: (b,), overwritten.
         clear: (b,), overwritten: whether rank and covariance can be relied on.
         covariance: (b, n, 6, 6), overwritten: of the body twist at each goal.
     """
-    start, plane, _, _, begin, _ = faces
+    start, plane, onto, _, begin, _ = faces
     size, m = Jt.shape[1], Jt.shape[2]
     M, W, Q = np.zeros((3, 4)), np.zeros((m, size)), np.zeros((size, size))
     P, K = np.zeros((size, size)), np.zeros((6, size))
     for o in range(len(goals)):
-        after[o] = 0.0
+        after[o], cosine[o] = 0.0, -1.0
         for i in range(len(plane)):
             product(words, i, start, goals[o], M)
+            cosine[o] = max(cosine[o], between(plane[i], M, onto[i]))
             after[o] = largest(after[o], plane[i], M, vertex[o, begin[i] : begin[i + 1]])
         for q in range(size):
             for r in range(m):
@@ -177,6 +180,15 @@ def largest(known: float, plane: _Array, M: _Array, vertex: _Array) -> float:
         if e > known or math.isnan(e):
             known = e
     return known
+
+
+def between(plane: _Array, M: _Array, onto: _Array) -> float:
+    """The cosine between the normals of the two faces of a contact."""
+    t = 0.0
+    for r in range(3):
+        for d in range(3):
+            t += plane[r] * M[r, d] * onto[d]
+    return t
 
 
 def rooted(C: _Array, L: _Array) -> bool:

@@ -76,7 +76,9 @@ class NearestGoals:
     """The turns of the observation that took longest."""
 
 
-def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
+def nearest_goals(
+    system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None, begin: Array | None = None
+) -> NearestGoals:
     """Change all goals as little as the contacts ask for.
 
     Args:
@@ -84,16 +86,17 @@ def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Arra
         L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad].
         soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
+        begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
     """
     lead, n = goals.shape[:-3], system.n
     if not lead and 6 * n > LARGEST_DENSE:
         from apo_bench.correction.solvers.large import nearest_goals_sparse
 
-        return nearest_goals_sparse(system, goals, L, soft_m)
+        return nearest_goals_sparse(system, goals, L, soft_m, begin)
     b = math.prod(lead)
     observed = goals.reshape(b, n, 4, 4)
     scale = np.broadcast_to(L, (*lead, n, 6, 6)).reshape(b, n, 6, 6)
-    found = _many(system, observed, scale, soft_m)
+    found = _many(system, observed, scale, soft_m, None if begin is None else begin.reshape(b, 6 * n))
     if lead == (b,):
         return found
     names = ("goals", "z", "e", "Jt", "B", "at_rest", "finite")
@@ -101,10 +104,16 @@ def nearest_goals(system: CompactEquations, goals: Array, L: Array, soft_m: Arra
     return NearestGoals(**{name: x.reshape((*lead, *x.shape[1:])) for name, x in shaped.items()}, trace=found.trace)
 
 
-def _many(system: CompactEquations, observed: Array, L: Array, soft_m: Array | None) -> NearestGoals:
+def _many(
+    system: CompactEquations, observed: Array, L: Array, soft_m: Array | None, begin: Array | None
+) -> NearestGoals:
     """(b, n, 4, 4) goals; observations that rest are left alone while the others go on."""
     b, n = len(observed), system.n
-    now = _Going(np.arange(b), system, observed, L, observed, L, np.zeros((b, 6 * n)), np.full(b, np.inf))
+    z, T, B = np.zeros((b, 6 * n)), observed, L
+    if begin is not None:
+        D, Jr = exp_and_jacobian((L @ begin.reshape(b, n, 6, 1))[..., 0])
+        z, T, B = begin, observed @ D, Jr @ L
+    now = _Going(np.arange(b), system, observed, L, T, B, z, np.full(b, np.inf))
     done, trace = list[tuple[NDArray[np.intp], tuple[Any, ...]]](), list[SolverTurn]()
     for turn in range(MOST_TURNS):
         e, blocks = now.system.blocks(now.T, now.B)

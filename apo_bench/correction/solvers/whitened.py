@@ -47,6 +47,12 @@ def whitened(observation: Observation) -> Whitened:
     return Whitened(observation.goals, scales(observation.covariance))
 
 
+def correction_to(observed: Array, L: Array, goals: Array) -> Array:
+    """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n)."""
+    xi = pose.log(pose.inverse(observed) @ goals)
+    return np.asarray(np.linalg.solve(L, xi[..., None]).reshape(*goals.shape[:-3], 6 * len(L)))
+
+
 def scales(covariance: Array) -> Array:
     """L with L L^t = covariance, (n, 6, 6).
 

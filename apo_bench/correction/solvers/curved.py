@@ -1,0 +1,56 @@
+"""The shortest correction where contacts bend as much as the correction is long: Newton's method.
+
+`manifold` takes a step to the shortest z on the linearised contacts. Where these bend about what was seen, as for a
+part that was seen upside down, of which every turn is about as far, its steps shrink by a percent only. The second
+derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions says where they lead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.manifold import STEP, shortened_step
+from apo_bench.correction.solvers.whitened import correction_to
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import exp_and_jacobian
+
+_TURNS = 30
+_RANK = 1e-5
+"""Singular values below this part of the largest one are rounding: the contacts hold almost."""
+_APART = 1e-5
+"""Standard deviations between two derivatives whose difference is taken."""
+_FLAT = 1e-6
+"""Curvature along a free direction, at least: 1 where contacts do not bend."""
+
+
+def descended(system: CompactEquations, observed: Array, L: Array, goals: Array) -> Array:
+    """The nearest goals near consistent ones, (n, 4, 4).
+
+    Args:
+        observed: (n, 4, 4), what was seen, world frame, [m].
+        L: (n, 6, 6), L L^t the covariance of the body twists, [m, rad].
+    """
+    z = correction_to(observed, L, goals)
+    for _ in range(_TURNS):
+        e, Jt = _linearised(system, observed, L, z)
+        U, w, Vt = np.linalg.svd(Jt)
+        rank = int(np.count_nonzero(w > _RANK * w[0]))
+        N, U, w, Vt = U[:, rank:], U[:, :rank], w[:rank], Vt[:rank]
+        multipliers, towards = -Vt.T @ (U.T @ z / w), -U @ (Vt @ e / w)
+        _, beside = _linearised(system, observed, L, z + _APART * N.T)
+        bent = N + ((beside - Jt) @ multipliers).T / _APART
+        curvature, axes = np.linalg.eigh((N.T @ bent + bent.T @ N) / 2.0)
+        slope = axes.T @ (N.T @ z + bent.T @ towards)
+        step = towards - N @ (axes @ (slope / np.maximum(np.abs(curvature), _FLAT)))
+        z = z + shortened_step(step[None], L[None])[0]
+        if np.abs(step).max() < STEP:
+            break
+    return np.asarray(observed @ exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])[0])
+
+
+def _linearised(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+    """e, (*, 3 c), [m], and its derivative by z, transposed, (*, 6 n, 3 c)."""
+    D, Jr = exp_and_jacobian((L @ z.reshape(*z.shape[:-1], len(L), 6, 1))[..., 0])
+    e, blocks = system.blocks(observed @ D, Jr @ L)
+    return e, system.gathered(blocks)

@@ -1,0 +1,86 @@
+"""Other starts: a part that was seen turned comes right side up; no local minimum is taken for the nearest goals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.equations import equations, largest_gap
+from apo_bench.assembly.opposing import looking_away
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.many import correct_many
+from apo_bench.correction.solvers.compact import compact_equations
+from apo_bench.correction.solvers.curved import descended
+from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.whitened import correction_to, scales
+from apo_bench.geometry import pose
+from tests.correction.robust.test_robust import SCENARIOS, fixed_error_mm, look, shown
+
+UPSIDE_DOWN = ([135, 0, 0], [180, 0, 0], [0, 135, 0], [0, 180, 0])
+
+
+def turned(name, k, turn, seed=0):
+    """Operation k seen turned in its own frame, [degrees]."""
+    observation = look(name, seed)
+    goals = np.array(observation.goals)
+    goals[k] = goals[k] @ pose.at((0.0, 0.0, 0.0), turn)
+    return replace(observation, goals=goals)
+
+
+def length(observation, goals):
+    return np.linalg.norm(correction_to(observation.goals, scales(observation.covariance), goals))
+
+
+@pytest.mark.parametrize(("name", "k"), [("block_on_block", 1), ("bridge_cycle", 2), ("pocket_table", 3)])
+@pytest.mark.parametrize("turn", UPSIDE_DOWN)
+def test_a_part_seen_upside_down_is_turned_back(name, k, turn):
+    seen = turned(name, k, turn)
+    found = correct(seen)
+    assert found.ok
+    assert f"seen turned: operation {k + 1} by 1" in found.sentence
+    assert not found.test.passes
+    assert fixed_error_mm(name, 0, found) < 3.0
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
+    """At 40 mm and degrees half of the corrections that begin with what was seen are, or end nowhere."""
+    _, layout, _ = shown(name, 3)
+    for seen in (look(name, 3, 25.0), look(name, 3, 40.0)):
+        found = correct(seen)
+        assert found.ok
+        assert length(seen, found.goals) <= length(seen, layout.goals)
+        assert largest_gap(seen.assembly, seen.start, found.goals) <= seen.gap_m
+
+
+def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
+    for name in SCENARIOS:
+        seen = look(name, 1, 4.0)
+        one, other = correct(seen), correct(seen, ContactCorrector(elsewhere=False))
+        assert one.goals.tolist() == other.goals.tolist()
+        assert one.sentence == other.sentence
+
+
+def test_many_at_once_find_the_same():
+    seen = [turned("bridge_cycle", 2, turn) for turn in UPSIDE_DOWN]
+    for many, one in zip(correct_many(seen), map(correct, seen), strict=True):
+        assert (many.status, many.sentence) == (one.status, one.sentence)
+        assert many.goals.tolist() == one.goals.tolist()
+
+
+def test_where_contacts_bend_newton_ends_where_small_steps_would():
+    """A cube seen upside down: each turn of it is about as far, so small steps shrink by a percent only."""
+    seen = turned("block_on_block", 1, [180, 0, 0])
+    L = scales(seen.covariance)
+    goals = correct(seen).goals
+    system = compact_equations(equations(seen.assembly, seen.start, goals), 2)
+    beside = goals.copy()
+    beside[1] = beside[1] @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))
+    assert length(seen, beside) > length(seen, goals)
+    there = descended(system, seen.goals, L, beside)
+    assert length(seen, there) == pytest.approx(length(seen, goals), rel=1e-9)
+    creeping = nearest_goals(system, seen.goals, L, None, correction_to(seen.goals, L, beside))
+    assert not creeping.at_rest
+    assert length(seen, creeping.goals) > length(seen, there)
+    assert not looking_away(seen.assembly, seen.start, there).any()
