@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.topology import Assembly
+from apo_bench.correction.play import plays
 from apo_bench.correction.posterior import jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
+from apo_bench.correction.solvers.manifold import SMALLEST, NearestGoals, nearest_goals
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.remembered import remembered
 
@@ -30,6 +31,8 @@ MOST_SUSPECTS = 64
 """Relations that are left out in turn; of more, those that pull hardest."""
 _Measure = Callable[[NDArray[np.bool_]], Consistency]
 """The test of a correction by some of the contacts, (c,)."""
+ROUNDING = 1e-13
+"""Part of the largest diagonal entry that is added to all: redundant contacts without play have no other."""
 SOFT_M = 0.05e-3
 """Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured."""
 
@@ -81,8 +84,7 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
 
     A row stands for all vertices of its contact, so it is off by as much as they are together.
     """
-    fits = np.array([assembly.is_fit(relation.contact) for relation in assembly.relations()], dtype=np.bool_)
-    each = np.where(fits, play_m / sqrt(3.0), 0.0) * np.sqrt(np.diff(pattern(assembly).begin))
+    each = play_m / sqrt(3.0) * np.sqrt(plays(assembly) * np.diff(pattern(assembly).begin))
     return frozen(np.repeat(each, 3))
 
 
@@ -96,7 +98,13 @@ def p_value(chi_square: float, freedom: int) -> float:
 
 
 def correction_length(
-    system: CompactEquations, observed: Array, L: Array, found: NearestGoals, slack_m: Array, begin: Array | None = None
+    system: CompactEquations,
+    observed: Array,
+    L: Array,
+    found: NearestGoals,
+    slack_m: Array,
+    correlated: Array | None = None,
+    begin: Array | None = None,
 ) -> tuple[float, int, NearestGoals | None]:
     """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
 
@@ -106,6 +114,7 @@ def correction_length(
         seen: (n, 4, 4), the goals that were seen.
         L: (n, 6, 6), their covariance is L L^t.
         slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
+        correlated: (3 c, 3 c), the covariance of the equations that has these deviations, [m^2]; None: independent.
         begin: As of `nearest_goals`.
     """
     freedom = jacobian_rank(found.Jt)
@@ -114,8 +123,23 @@ def correction_length(
     holds = found.at_rest and np.abs(found.e).max(initial=0.0) <= SOFT_M
     if holds and not slack_m.any():
         return float(found.z @ found.z), freedom, None
+    if holds and correlated is not None:
+        return float(softened_length(found.z[None], found.Jt[None], correlated)[0]), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
     relaxed = nearest_goals(system, observed, L, soft, begin)
     asked = soft > 0.0
     over = relaxed.e[asked] / soft[asked]
     return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed
+
+
+def softened_length(z: Array, Jt: Array, S: Array) -> Array:
+    """The squared length, (b,), of corrections z, (b, 6 n), if equations may be off by covariance S, (3 c, 3 c), [m^2].
+
+    Near z equations are linear in the little that play leaves, so the shortest sum of what is left of z and of what
+    equations are off by is r^t (J J^t + S)^-1 r, with r = J z what the observation was off by.
+    """
+    J = np.swapaxes(Jt, 1, 2)
+    A, r = J @ Jt + S, J @ z[..., None]
+    diagonal = A.reshape(len(A), -1)[:, :: A.shape[1] + 1]
+    diagonal += ROUNDING * diagonal.max(axis=1, initial=SMALLEST)[:, None]
+    return np.asarray((r * np.linalg.solve(A, r)).sum(axis=(1, 2)))

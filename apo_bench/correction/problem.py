@@ -21,6 +21,7 @@ from apo_bench.correction.consistency import (
     p_value,
     suspects,
 )
+from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
 from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
@@ -57,6 +58,8 @@ class Problem:
     """(n, 6, 6)."""
     slack_m: Array
     """(3 c,): what the play of parts that fit leaves, for the test."""
+    correlated: Array | None
+    """(3 c, 3 c), as of `fit_covariance`."""
     solver: Solver
     begin: Array | None = None
     """(6 n,): the correction that is begun with, in standard deviations; None stands for no correction."""
@@ -77,7 +80,7 @@ class Problem:
         part, slack_m = self._equal(chosen)
         found = self._nearest(part) if found is None else found
         gaps = self.gaps(found.goals)
-        chi_square, freedom, shared = self._length(part, found, slack_m)
+        chi_square, freedom, shared = self._length(chosen, found)
         if found.finite and largest(gaps[chosen]) > self.observation.gap_m:
             found = shared or self._nearest(part, np.hypot(slack_m, SOFT_M))
             gaps = self.gaps(found.goals)
@@ -100,8 +103,8 @@ class Problem:
     def _test(self, kept: NDArray[np.bool_]) -> Consistency:
         if kept[~self.exact].any():
             return self.solve(kept).test
-        part, slack_m = self._equal(kept & self.exact)
-        chi_square, freedom, _ = self._length(part, self._nearest(part), slack_m)
+        part, _ = self._equal(kept & self.exact)
+        chi_square, freedom, _ = self._length(kept & self.exact, self._nearest(part))
         return Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL)
 
     def _nearest(self, part: CompactEquations, soft_m: Array | None = None) -> NearestGoals:
@@ -110,10 +113,12 @@ class Problem:
             return self.solver(part, self.observation.goals, self.L)
         return nearest_goals(part, self.observation.goals, self.L, soft_m, self.begin)
 
-    def _length(
-        self, part: CompactEquations, found: NearestGoals, slack_m: Array
-    ) -> tuple[float, int, NearestGoals | None]:
-        return correction_length(part, self.observation.goals, self.L, found, slack_m, self.begin)
+    def _length(self, chosen: NDArray[np.bool_], found: NearestGoals) -> tuple[float, int, NearestGoals | None]:
+        """As `correction_length`, by the contacts that are chosen, (c,)."""
+        part, slack_m = self._equal(chosen)
+        rows, S = np.repeat(chosen, 3), self.correlated
+        S = S if S is None or chosen.all() else S[np.ix_(rows, rows)]
+        return correction_length(part, self.observation.goals, self.L, found, slack_m, S, self.begin)
 
     def _equal(self, chosen: NDArray[np.bool_]) -> tuple[CompactEquations, Array]:
         """The equations of the contacts that are chosen, (c,), and the slack of each, [m]."""
@@ -153,4 +158,5 @@ def problem(observation: Observation, solver: Solver, at: Array | None = None) -
     every = compact_assembly(observation.assembly, system)
     slack_m = fit_deviation(observation.assembly, observation.play_m)
     begin = None if at is None else correction_to(observation.goals, L, at)
-    return Problem(observation, system, every, exact, inequalities, L, slack_m, solver, begin)
+    correlated = fit_covariance(observation.assembly, observation.play_m)
+    return Problem(observation, system, every, exact, inequalities, L, slack_m, correlated, solver, begin)

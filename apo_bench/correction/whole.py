@@ -19,8 +19,9 @@ from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.opposing import OPPOSING
 from apo_bench.assembly.topology import Assembly
-from apo_bench.correction.consistency import SOFT_M, fit_deviation
+from apo_bench.correction.consistency import SOFT_M, softened_length
 from apo_bench.correction.ending import status_sentence
+from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.posterior import UNCLEAR
 from apo_bench.correction.solvers.compact import CompactEquations, corner_moments
 from apo_bench.correction.solvers.compiled import Kernels, solved
@@ -61,7 +62,8 @@ def correct_compiled(
     after, cosine, rank = np.empty(b), np.empty(b), np.empty(b, np.intp)
     clear, posterior = np.empty(b, np.bool_), np.empty((b, n, 6, 6))
     loops.rated(faces, words, vertex, found.goals, found.Jt, found.B, UNCLEAR, after, cosine, rank, clear, posterior)
-    chi_square = _lengths(loops, system, goals, L, found, known.slack_m)
+    S = known.correlated
+    chi_square = (found.z * found.z).sum(axis=1) if S is None else softened_length(found.z, found.Jt, S)
     p = np.where(rank > 0, chdtrc(np.maximum(rank, 1), chi_square), 1.0)
     holds = np.abs(found.e).max(axis=1, initial=0.0) <= SOFT_M
     trusted = (cosine <= OPPOSING) & ~turned_far(goals, found.goals)
@@ -91,18 +93,6 @@ def correct_compiled(
     return made
 
 
-def _lengths(
-    loops: Kernels, system: CompactEquations, goals: Array, L: Array, found: NearestGoals, slack_m: Array
-) -> Array:
-    """The squared length of every correction, (b,), what the play of parts that fit leaves taken off."""
-    z, over = found.z, np.zeros((len(goals), 0))
-    asked = slack_m > 0.0
-    if asked.any():
-        relaxed, _ = solved(loops, system, goals, L, slack_m)
-        z, over = relaxed.z, relaxed.e[:, asked] / slack_m[asked]
-    return np.asarray((z * z).sum(axis=1) + (over * over).sum(axis=1))
-
-
 def _one(found: NearestGoals, i: int, trace: list[list[float]]) -> NearestGoals:
     turns = tuple(SolverTurn(gap_m, step) for gap_m, step in trace)
     arrays = (found.goals[i], found.z[i], found.e[i], found.Jt[i], found.B[i], found.at_rest[i], found.finite[i])
@@ -125,8 +115,8 @@ class Layout:
     laid: NDArray[np.intp]
     moments: Array
     """(c, 3, 4): what stands for the corners of each contact."""
-    slack_m: Array
-    """(3 c,)."""
+    correlated: Array | None
+    """(3 c, 3 c), as of `fit_covariance`."""
     freed: tuple[int, ...]
 
 
@@ -150,6 +140,6 @@ def layout(assembly: Assembly, play_m: float) -> Layout | None:
         begin=known.begin,
         laid=known.laid.astype(np.intp),
         moments=corner_moments(known),
-        slack_m=np.array(fit_deviation(assembly, play_m)),
+        correlated=fit_covariance(assembly, play_m),
         freed=known.freed,
     )
