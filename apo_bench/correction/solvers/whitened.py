@@ -48,9 +48,16 @@ def whitened(observation: Observation) -> Whitened:
 
 
 def correction_to(observed: Array, L: Array, goals: Array) -> Array:
-    """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n)."""
-    xi = pose.log(pose.inverse(observed) @ goals)
-    return np.asarray(np.linalg.solve(L, xi[..., None]).reshape(*goals.shape[:-3], 6 * len(L)))
+    """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n).
+
+    Args:
+        L: (n, 6, 6), or (n, 6, 6 n) of all twists together.
+    """
+    xi, unknowns = pose.log(pose.inverse(observed) @ goals), 6 * len(L)
+    lead = goals.shape[:-3]
+    if L.shape[-1] == unknowns:
+        return np.asarray(np.linalg.solve(L.reshape(unknowns, unknowns), xi.reshape(*lead, unknowns, 1))[..., 0])
+    return np.asarray(np.linalg.solve(L, xi[..., None]).reshape(*lead, unknowns))
 
 
 def scales(covariance: Array) -> Array:
