@@ -106,6 +106,11 @@ class Correction:
     Contacts that are walls are not counted, so with walls it is an upper bound."""
     dropped: tuple[str, ...] = ()
     """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
+    left_out: tuple[int, ...] = ()
+    """Operations of which nothing that was seen is believed, counted from 0: their goals are inferred."""
+    believed: Observation | None = None
+    """What was corrected in place of the observation, which the posterior is of: without outliers, with further looks;
+    None if it was the observation."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))

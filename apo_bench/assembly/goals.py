@@ -14,6 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array, frozen
@@ -91,6 +92,8 @@ class Observation:
     """Largest |e| at which the contact equations count as solved, [m]."""
     play_m: float = 0.0
     """How far from nominal a contact of parts that fit may really be: their clearance per side, [m]."""
+    outliers: OutlierModel | None = None
+    """How often observations of this kind are worse than they say; None if that is not known."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)

@@ -24,6 +24,17 @@ def numbers(text: str, option: str) -> tuple[float, ...]:
         ) from error
 
 
+def whole_numbers(text: str, option: str) -> tuple[int, ...]:
+    """`0,2,4` as whole numbers."""
+    found = words(text, option)
+    try:
+        return tuple(int(word) for word in found)
+    except ValueError as error:
+        raise InputError(
+            f"{option} {text} was given; whole numbers with commas between them are allowed: 0,2,4."
+        ) from error
+
+
 def words(text: str, option: str) -> tuple[str, ...]:
     """`oracle,none` as its entries."""
     found = tuple(word.strip() for word in text.split(","))

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from apo_bench.cli.arguments import numbers, path_given, words
+from apo_bench.cli.arguments import numbers, path_given, whole_numbers, words
 from apo_bench.records.run.replay_command import milli, number
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import LEVEL, SETTINGS
@@ -63,7 +63,8 @@ def axis_option(info: SettingInfo) -> str:
 
 def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
     """What was given for an axis: `0,0.5,1` or `none,contact`."""
-    return (words if info.is_text else numbers)(text, f"--{axis_option(info)}")
+    read = words if info.is_text else whole_numbers if info.is_whole else numbers
+    return read(text, f"--{axis_option(info)}")
 
 
 def shown_default(info: SettingInfo) -> str:

@@ -117,6 +117,7 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         asked = f"level {level}, careless {row['careless']:g}, seed {row['seed']}"
         asked += ", range finder" if row["eye"] == RANGE else f", {row['noise']} noise" * (row["noise"] != "isotropic")
         asked += f", relations {row['relations']}" * (row["relations"] != "given")
+        asked += f", {row['looks']} looks allowed" * bool(row["looks"])
     lines = [
         ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
         ("trial", asked),

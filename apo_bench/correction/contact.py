@@ -106,6 +106,14 @@ class ContactCorrector:
             after = replace(solved.test, level=self.level)
         return opposing(observation, self._report(asked, solved, kept, test, after, dropped, before_m))
 
+    def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
+        """Correct an observation by all contacts but those of some relations."""
+        asked = problem(observation, self.chosen_solver())
+        kept = asked.without(dropped)
+        solved = asked.solve(kept)
+        test = replace(solved.test, level=self.level)
+        return self._report(asked, solved, kept, test, test, dropped)
+
     def chosen_solver(self) -> Solver:
         """What finds the nearest goals here."""
         if self.solver is not None:

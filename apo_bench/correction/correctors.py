@@ -11,6 +11,7 @@ import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.look import Look, LookingCorrector
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.contact import ContactCorrector
@@ -32,12 +33,14 @@ class CorrectorMisbehaved(InputError):
     """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
 
 
-def correct(observation: Observation, corrector: Any = "contact") -> Correction:
+def correct(observation: Observation, corrector: Any = "contact", look: Look | None = None) -> Correction:
     """What the corrector makes of an observation.
 
     Args:
         corrector: A name out of `CORRECTORS`, `"package.module:name"`, or a callable `Observation -> Correction`;
             bare goals (n, 4, 4) in place of a `Correction` are measured and wrapped.
+        look: Sees operations again. It is handed to the method `looking(observation, look)` of a corrector that has
+            one, which is called in place of the corrector itself; any other gets nothing.
 
     Raises:
         InputError: There is no such corrector, or the observation makes no sense.
@@ -47,7 +50,9 @@ def correct(observation: Observation, corrector: Any = "contact") -> Correction:
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     try:
-        return _admitted(chosen(observation), observation, chosen, name)
+        asks = look is not None and isinstance(chosen, LookingCorrector)
+        found = chosen.looking(observation, look) if asks else chosen(observation)
+        return _admitted(found, observation, chosen, name)
     except InputError as error:
         if _ours(chosen) or isinstance(error, CorrectorMisbehaved):
             raise

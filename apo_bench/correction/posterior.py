@@ -103,6 +103,7 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
 
     if correction.covariance is None or not correction.ok:
         return None
+    observation = correction.believed or observation
     L = np.linalg.cholesky(observation.covariance)
     xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
     system = compact_equations(

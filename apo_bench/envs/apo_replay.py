@@ -20,6 +20,7 @@ from apo_bench.envs.nullable import predicted_info, whole
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records.row import Predicted
 from apo_bench.records.settings import RANGE, USUAL, TrialSettings, check, level_pair, refuse_noise
@@ -30,6 +31,7 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import (
     Recording,
     demonstration_failure,
+    looks_at,
     observation_failure,
     observe_recording,
     predicted_outcome,
@@ -111,6 +113,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
     - `arm`: by name, or an `Arm`.
     - `timestep_s`: of the physics.
+    - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
     - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
       display; `human` opens a window when the replay begins.
 
@@ -135,15 +138,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         arm: str | Arm = TrialSettings.arm,
         timestep_s: float = TrialSettings.timestep_s,
         eye: str = TrialSettings.eye,
+        looks: int = TrialSettings.looks,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
         check("eye", eye)
+        check("looks", looks)
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
-        self._eye, self._model = eye, USUAL if noise is None else noise
+        self._eye, self._model, self._allowed = eye, USUAL if noise is None else noise, looks
         self._usual = self._now = Settings(Level(*level_pair(level, eye)), careless, clearance_mm)
         self._noise = self._usual_noise = make_noise(self._model, self._usual.level)
         self._scene = build_scene(
@@ -165,6 +170,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._trial: int | None = None
         self._recording: Recording | None = None
         self._seen: Observation | None = None
+        self._look: Looks | None = None
         self._aim: Plan | None = None
         self._refused: Outcome | None = None
         self._over = False
@@ -187,6 +193,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if self._seen is None:
             raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
         return self._seen
+
+    @property
+    def look(self) -> Looks:
+        """Sees operations of this episode again, as often as `looks` says.
+
+        Raises:
+            ResetNeeded: There is no episode yet.
+        """
+        if self._look is None:
+            raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
+        return self._look
 
     @property
     def trial(self) -> int:
@@ -219,6 +236,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._trial, recording = self._watch_human(seed)
         noise = range_sensor(self._scene, recording, self._now.level.mm) if self._eye == RANGE else self._noise
         self._seen = observe_recording(recording, noise, self._trial)
+        self._look = looks_at(recording, noise, self._trial, self._allowed)
         self._recording = replace(recording, images=None)
         self.aim(self._seen.goals)
         self._refused, self._over = observation_failure(self._seen), False

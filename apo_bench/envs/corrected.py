@@ -49,7 +49,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Watch another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
-        made = self._correct(self._base.seen, self._corrector)
+        made = self._correct(self._base.seen, self._corrector, self._base.look)
         if made.ok:
             self._base.aim(made.goals, made.schedule, made.targets)
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.records.short_names import METHODS
+from apo_bench.records.short_names import LOOKING, METHODS
 
 _SEARCH = "search"
 """What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
@@ -57,6 +57,11 @@ def as_seen(method: str) -> bool:
 def knows_relations(method: str) -> bool:
     """Whether a method is told what touches what: whether it has a corrector."""
     return not knows_truth(method) and not as_seen(method)
+
+
+def may_look(method: str) -> bool:
+    """Whether a method can ask to see operations again."""
+    return parsed(method).plan in LOOKING
 
 
 def is_own(method: object) -> bool:

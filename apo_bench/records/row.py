@@ -16,10 +16,12 @@ from apo_bench.records.key import KEY
 from apo_bench.records.outcomes import CODES, STAGES
 from apo_bench.records.settings import (
     LARGEST_SEED,
+    SETTINGS,
     CarelessnessValue,
     ClearanceMm,
     Eye,
     Fidelity,
+    LooksAllowed,
     Name,
     NoiseLevel,
     Seed,
@@ -86,6 +88,8 @@ class Row(TypedDict, total=False):
     """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
     method: Name
     """Who planned: `oracle`, `none`, `search` or a corrector."""
+    looks: LooksAllowed | None
+    """How often a corrector that can ask was allowed to look at operations again."""
     seed: Seed
     """Number of the trial: trials of one seed meet the same layout, human and noise."""
     salt: Name | None
@@ -151,6 +155,10 @@ class Row(TypedDict, total=False):
     """Contacts that the test suspects."""
     dropped: list[Name] | None
     """Contacts that the corrector left out."""
+    left_out: list[_Operation] | None
+    """Operations of which nothing that was seen was believed, or nothing was seen, and that were inferred."""
+    seen_again: _Count | None
+    """How often operations were looked at again, all together; null where no corrector was asked."""
     wrong_relation: Name | None
     """The contact that is wrong, where wrong ones were given."""
     inside_95: bool | None
@@ -184,7 +192,8 @@ ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_ext
 """Column -> its type, with the range that it may have."""
 _NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
 """What every row says, besides its key."""
-REQUIRED = ("schema", *KEY, *_NEEDED)
+_LATER = {info.column for info in SETTINGS.values() if info.later}
+REQUIRED = ("schema", *(column for column in KEY if column not in _LATER), *_NEEDED)
 """Without them a line is no row; what else a row does not say is null, or as usual."""
 
 

@@ -15,13 +15,13 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import InputError
-from apo_bench.records.method import checked_method
+from apo_bench.records.method import checked_method, is_own, parsed
 from apo_bench.records.relations import checked_relations
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/6"
+ROW = "apo-bench/row/7"
 Eye = Literal["noise", "range"]
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"
@@ -41,6 +41,7 @@ NoiseLevel = Annotated[float, Meta(ge=0.0, le=50.0)]
 CarelessnessValue = Annotated[float, Meta(ge=0.0, le=10.0)]
 ClearanceMm = Annotated[float, Meta(ge=0.0, le=5.0)]
 Seed = Annotated[int, Meta(ge=0, le=LARGEST_SEED)]
+LooksAllowed = Annotated[int, Meta(ge=0, le=100)]
 TimestepS = Annotated[float, Meta(gt=0.0, le=1.0)]
 LEVEL = SettingInfo(
     "Noise: mm and degrees, standard deviation",
@@ -168,6 +169,17 @@ class TrialSettings:
     )
     """Who plans: `oracle`, `none`, `search`, a corrector by name, or `module:name`; with `+search` the robot feels for
     holes besides."""
+    looks: LooksAllowed = field(
+        default=0,
+        metadata=about(
+            "How often a corrector that can ask may look at operations again",
+            called="number of looks",
+            key=True,
+            axis="looks",
+            later=True,
+        ),
+    )
+    """How often a corrector that can ask may look at operations again; each look has the errors of the first."""
     seed: Seed = field(default=0, metadata=about("Number of the trial", called="seed", key=True))
     """Number of the trial: trials of one seed meet the same layout, human and noise."""
     salt: Salt | None = field(
@@ -204,6 +216,7 @@ class TrialSettings:
             if info.spelled is not None:
                 object.__setattr__(self, info.name, info.spelled(getattr(self, info.name)))
         check_together(self.fidelity, self.grasp)
+        check_asks(self.method, self.looks)
         if self.eye == RANGE:
             if self.noise not in (USUAL, RANGE):
                 refuse_noise(self.noise)
@@ -240,6 +253,17 @@ def check_together(fidelity: str, *grasps: str) -> None:
         raise InputError(
             "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
             "use the grasp friction, or full."
+        )
+
+
+def check_asks(method: str, looks: int) -> None:
+    """Raise an `InputError` if looks are allowed to a corrector that nobody could answer."""
+    plan = parsed(method).plan
+    if looks and is_own(plan):
+        raise InputError(
+            f"a number of looks of {looks} was given with the method '{plan}', which runs in a process of its own and "
+            "cannot ask from there; leave it out, or hand the corrector over in Python: apo_bench.correct(observation, "
+            "corrector, look)."
         )
 
 

@@ -28,6 +28,8 @@ CORRECTORS = MappingProxyType(
     }
 )
 """The correctors that need an observation and nothing else."""
+LOOKING = ("contact-robust",)
+"""Correctors that can ask to see operations again."""
 SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.settling:settle"})
 """Correctors that need a simulator; `correct` does not know them, a trial does."""
 METHODS = ("oracle", "none", *CORRECTORS, *SIMULATED)

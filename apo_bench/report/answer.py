@@ -18,6 +18,8 @@ from apo_bench.statistics.summary import Summary
 
 _AGAINST = ("none", "paper", "contact")
 """The best method is compared with these; if none of them was tried, with the next best."""
+_Who = tuple[str, int]
+"""A method, and how often it might look again."""
 _Results = Mapping[tuple[Any, ...], bool]
 """All that a trial is of but the method, its seed last -> success."""
 
@@ -29,42 +31,49 @@ def answer(rows: Iterable[Row], found: Summary) -> str:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
     best, *others = _ranked(results)
     count, (low, high) = len(results[best]), _rate_interval(results[best])
-    said = f"`{best}` succeeds in {percent(sum(results[best].values()) / count)} of its {count:,} trials "
+    said = f"{_named(best)} succeeds in {percent(sum(results[best].values()) / count)} of its {count:,} trials "
     said += f"(95 %: {100 * low:.1f} to {100 * high:.1f} %)"
-    half = [h for h in found.half_levels if h.setting.method == best and h.setting.relations == "given"]
+    curves = [h for h in found.half_levels if h.setting.relations == "given"]
+    half = [h for h in curves if (h.setting.method, h.setting.looks) == best]
     said += f" and in half of them or more {_reach(half)}" if half else ""
-    known = [m for m in _AGAINST if m in results and m != best] or others[:1]
+    known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
     compared = [words for words in (_compared(best, m, results) for m in known) if words]
     return f"{said}; at the same seeds it succeeds {' and '.join(compared)}." if compared else f"{said}."
 
 
-def _results(rows: Iterable[Row]) -> dict[str, dict[tuple[Any, ...], bool]]:
-    names = [name for name in Place._fields if name not in ("method", "relations", "fidelity")]
-    right: dict[str, dict[tuple[Any, ...], bool]] = {}
-    wrong: dict[str, dict[tuple[Any, ...], bool]] = {}
+def _named(who: _Who) -> str:
+    """`contact`, or `contact-robust` with 2 more looks."""
+    method, looks = who
+    return f"`{method}`" + (f" with {looks} more look{'s' * (looks > 1)}" if looks else "")
+
+
+def _results(rows: Iterable[Row]) -> dict[_Who, dict[tuple[Any, ...], bool]]:
+    names = [name for name in Place._fields if name not in ("method", "relations", "fidelity", "looks")]
+    right: dict[_Who, dict[tuple[Any, ...], bool]] = {}
+    wrong: dict[_Who, dict[tuple[Any, ...], bool]] = {}
     for row in rows:
         if row["success"] is not None and row["level"] is not None and not knows_truth(row["method"]):
             told = row["relations"] if knows_relations(row["method"]) else "given"
             kept = right if told == "given" else wrong
             key = (*(look_up(row, name) for name in names), row.get("fidelity"), told, row["seed"])
-            kept.setdefault(row["method"], {})[key] = row["success"]
+            kept.setdefault((row["method"], row.get("looks") or 0), {})[key] = row["success"]
     return right or wrong
 
 
-def _ranked(results: Mapping[str, _Results]) -> list[str]:
+def _ranked(results: Mapping[_Who, _Results]) -> list[_Who]:
     """The best first, by trials that all have that were tried in half of all places or more."""
     most = max(map(len, results.values()))
-    widely = [method for method in results if 2 * len(results[method]) >= most]
-    common = set.intersection(*(set(results[method]) for method in widely))
+    widely = [who for who in results if 2 * len(results[who]) >= most]
+    common = set.intersection(*(set(results[who]) for who in widely))
 
-    def rate(method: str) -> float:
-        own = [results[method][key] for key in common] or list(results[method].values())
+    def rate(who: _Who) -> float:
+        own = [results[who][key] for key in common] or list(results[who].values())
         return sum(own) / len(own)
 
-    return sorted(widely, key=lambda method: (-rate(method), rank(method), method))
+    return sorted(widely, key=lambda who: (-rate(who), rank(who[0]), who))
 
 
-def _compared(ours: str, other: str, results: Mapping[str, _Results]) -> str:
+def _compared(ours: _Who, other: _Who, results: Mapping[_Who, _Results]) -> str:
     """`more often than `none` by 41.2 points (95 %: 38.9 to 43.4)`; nothing where they have no trial in common."""
     a, b = results[ours], results[other]
     both = {key: float(a[key]) - float(b[key]) for key in a if key in b}
@@ -76,9 +85,9 @@ def _compared(ours: str, other: str, results: Mapping[str, _Results]) -> str:
     if low > 0 or high < 0:
         more = "more" if mean > 0 else "less"
         low, high = sorted((abs(low), abs(high)))
-        return f"{more} often than `{other}` by {abs(mean):.1f} points (95 %: {low:.1f} to {high:.1f})"
+        return f"{more} often than {_named(other)} by {abs(mean):.1f} points (95 %: {low:.1f} to {high:.1f})"
     between = f"{mean:+.1f} points, 95 %: {low:+.1f} to {high:+.1f}"
-    return f"as often as `{other}`, as far as {len(apart)} seeds tell ({between})"
+    return f"as often as {_named(other)}, as far as {len(apart)} seeds tell ({between})"
 
 
 def _by_seed(results: Mapping[tuple[Any, ...], float]) -> list[float]:

@@ -42,7 +42,7 @@ from apo_bench.statistics.times import read_timing, times, work
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
-PNG = ("success_over_level", "success_over_tightness", "recognised")
+PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "recognised")
 """Figures that are also kept as PNG."""
 FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confusion", "times")
 """Tables that are also kept as files; those of the last two kinds, and what was recognised, if there is any."""

@@ -11,7 +11,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.records.row import Row
 from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
@@ -112,7 +112,7 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
 
 def place_of_reference(place: Place, reference: str) -> Place:
     """The cell that a cell is compared with."""
-    other = place._replace(method=reference)
+    other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
     return other if knows_relations(reference) else other._replace(relations="given")
 
 

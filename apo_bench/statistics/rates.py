@@ -1,5 +1,5 @@
-"""Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp
-and fidelity."""
+"""Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp,
+fidelity and number of looks."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ class Place(NamedTuple):
     method: str
     grasp: str = TrialSettings.grasp
     fidelity: str = TrialSettings.fidelity
+    looks: int = TrialSettings.looks
 
 
 class Interval(NamedTuple):
@@ -78,6 +79,7 @@ class Cell:
     method: str
     grasp: str
     fidelity: str
+    looks: int
     trials: int
     """Trials that count: those whose demonstration was right."""
     successes: int
@@ -151,11 +153,11 @@ def place_of(row: Row) -> Place | None:
     """The cell of a row; None for a measured demonstration, which has no level."""
     if row["level"] is None:
         return None
-    said: Row = row if "fidelity" in row else row | {"fidelity": "full"}
-    return Place._make(_PLACE(said))
+    return Place._make(_PLACE(row if row.keys() >= _USUAL.keys() else {**_USUAL, **row}))
 
 
 _PLACE = itemgetter(*Place._fields)
+_USUAL = {"fidelity": TrialSettings.fidelity, "looks": TrialSettings.looks}
 
 
 def by_place(rows: Iterable[Row]) -> dict[Place, dict[int, Row]]:
@@ -221,4 +223,4 @@ def _cell(key: Place, rows: list[Row]) -> Cell:
 def order(k: Place) -> tuple[Any, ...]:
     """How cells are sorted: by what is asked, then by method (`oracle` first), then by level."""
     where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
-    return (*where, k.grasp, k.fidelity != "full", rank(k.method), k.method, k.level, k.level_deg)
+    return (*where, k.grasp, k.fidelity != "full", k.looks, rank(k.method), k.method, k.level, k.level_deg)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
-from apo_bench.records.method import as_seen, knows_relations, knows_truth
+from apo_bench.records.method import as_seen, knows_relations, knows_truth, may_look
 from apo_bench.records.settings import RANGE, USUAL
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Place, rank_relations
@@ -23,11 +23,13 @@ class Setting(NamedTuple):
     careless: float
     grasp: str
     fidelity: str
+    looks: int = 0
 
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
 
-        The oracle meets neither noise nor carelessness, and it and `none` are not told any relations.
+        The oracle meets neither noise nor carelessness, it and `none` are not told any relations, and few methods can
+        ask to look again.
         """
         ceiling = knows_truth(cell.method)
         return (
@@ -35,6 +37,7 @@ class Setting(NamedTuple):
             == (self.scenario, self.clearance_mm, self.grasp, self.fidelity)
             and (ceiling or (cell.noise, cell.careless) == (self.noise, self.careless))
             and (not knows_relations(cell.method) or cell.relations == self.relations)
+            and (not may_look(cell.method) or cell.looks == self.looks)
         )
 
     def title(self) -> str:
@@ -53,6 +56,8 @@ class Setting(NamedTuple):
             said.append(f"{self.grasp} grasp")
         if self.fidelity != "full":
             said.append(f"fidelity {self.fidelity}")
+        if self.looks:
+            said.append(f"{self.looks} more look{'s' * (self.looks > 1)}")
         return said
 
 
@@ -63,13 +68,12 @@ def cell_place(item: Any) -> Place:
 
 
 def settings(cells: Iterable[Any]) -> list[Setting]:
-    """The settings of cells, sorted by scenario first; the oracle alone makes one only if nothing else is there."""
+    """The settings of cells, sorted by scenario first; a cell makes its own only if no other setting holds it."""
     places = [cell_place(cell) for cell in cells]
-    found = {setting_of(p) for p in places if knows_relations(p.method)}
-    told_right = {s._replace(relations="given") for s in found}
-    found |= {setting_of(p) for p in places if as_seen(p.method) and setting_of(p) not in told_right}
-    covered = {_site(s) for s in found}
-    found |= {setting_of(p) for p in places if knows_truth(p.method) and _site(p) not in covered}
+    found = set[Setting]()
+    for meets_all in (may_look, knows_relations, as_seen, knows_truth):
+        own = {setting_of(p): p for p in places if meets_all(p.method)}
+        found |= {s for s, p in own.items() if not any(other.holds(p) for other in found)}
     return sorted(found, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
 
 
@@ -105,7 +109,7 @@ def level_unit(noise: str) -> str:
 
 def setting_of(p: Place) -> Setting:
     """The setting that a place belongs to by itself."""
-    return Setting(p.scenario, p.clearance_mm, p.noise, p.relations, p.careless, p.grasp, p.fidelity)
+    return Setting(p.scenario, p.clearance_mm, p.noise, p.relations, p.careless, p.grasp, p.fidelity, p.looks)
 
 
 def _site(x: Place | Setting) -> tuple[Any, ...]:

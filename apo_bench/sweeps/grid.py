@@ -11,7 +11,7 @@ from typing import Any, final
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import (
     LEVEL,
@@ -34,7 +34,7 @@ AXES = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 _MAY_BE_EMPTY = ("clearance_mm", "noise")
 SHARED = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
-_BY_RULE = ("scenario", "careless", "clearance_mm", "eye", "noise", "relations", "method")
+_BY_RULE = ("scenario", "careless", "clearance_mm", "eye", "noise", "relations", "looks", "method")
 _PLAIN = tuple(info for info in SETTINGS.values() if info.axis and info.name not in _BY_RULE)
 """Settings that every trial has, the oracle too."""
 
@@ -63,13 +63,15 @@ class SweepSettings:
     eyes: tuple[str, ...] = (TrialSettings.eye,)
     """Noise models are those of the eye `noise`."""
     grasps: tuple[str, ...] = (TrialSettings.grasp,)
+    looks: tuple[int, ...] = (TrialSettings.looks,)
+    """Methods that cannot ask run once, with none."""
     arm: str = TrialSettings.arm
     timestep_s: float = TrialSettings.timestep_s
     fidelity: str = TrialSettings.fidelity
 
     def __post_init__(self) -> None:
         for info in AXES:
-            given = map(_plain, getattr(self, info.axis))
+            given = map(_whole if info.is_whole else _plain, getattr(self, info.axis))
             values = tuple(dict.fromkeys(map(info.spelled, given) if info.spelled else given))
             if not values and info.name not in _MAY_BE_EMPTY:
                 raise InputError(f"no {info.axis} were given for the sweep; at least one is needed.")
@@ -147,7 +149,7 @@ def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: 
 
     The oracle meets neither noise nor carelessness: it runs once per seed and grasp, recorded at level 0,
     carelessness 0 and the first noise model or eye. Neither it nor `none` asks what touches what: both are recorded
-    with relations as given.
+    with relations as given. Methods that cannot ask to see operations again are recorded with no looks.
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
@@ -164,7 +166,7 @@ def _per_seed(grid: SweepSettings) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
     ways = sum(len(_ways(eye, grid.noises)) for eye in grid.eyes)
     told = sum(
-        len(grid.relations) if knows_relations(method) else 1 for method in grid.methods if not knows_truth(method)
+        len(_relations(grid, method)) * len(_looks(grid, method)) for method in grid.methods if not knows_truth(method)
     )
     trials = len(grid.careless) * len(grid.levels) * ways * told + sum(map(knows_truth, grid.methods))
     return (
@@ -194,22 +196,37 @@ def _trials(
     same |= {"scenario": given, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
 
     def trial(
-        method: str, level: _Level, careless: float, way: tuple[str, str], relations: str, plain: Sequence[Any]
+        method: str,
+        level: _Level,
+        careless: float,
+        way: tuple[str, str],
+        told: tuple[str, int],
+        plain: Sequence[Any],
     ) -> TrialSettings:
         mm, deg = level_pair(level, way[0])
         eye, noise = way
         others: dict[str, Any] = {info.name: value for info, value in zip(_PLAIN, plain, strict=True)}
         others |= {"level_mm": mm, "level_deg": deg, "careless": careless, "eye": eye, "noise": noise}
-        return TrialSettings(**same, **others, relations=relations, method=method)
+        return TrialSettings(**same, **others, relations=told[0], looks=told[1], method=method)
 
     ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]
     plain = list(product(*(getattr(grid, info.axis) for info in _PLAIN)))
     for method, others in product(filter(knows_truth, grid.methods), plain):
-        yield trial(method, 0.0, 0.0, ways[0], TrialSettings.relations, others)
+        yield trial(method, 0.0, 0.0, ways[0], (TrialSettings.relations, TrialSettings.looks), others)
     for others, careless, level, way, method in product(plain, grid.careless, grid.levels, ways, grid.methods):
         if not knows_truth(method):
-            for relations in grid.relations if knows_relations(method) else (TrialSettings.relations,):
-                yield trial(method, level, careless, way, relations, others)
+            for told in product(_relations(grid, method), _looks(grid, method)):
+                yield trial(method, level, careless, way, told, others)
+
+
+def _relations(grid: SweepSettings, method: str) -> tuple[str, ...]:
+    """What a method is told of the contacts: once the right ones if it asks for none."""
+    return grid.relations if knows_relations(method) else (TrialSettings.relations,)
+
+
+def _looks(grid: SweepSettings, method: str) -> tuple[int, ...]:
+    """How often a method may look again: never if it cannot ask."""
+    return grid.looks if may_look(method) else (TrialSettings.looks,)
 
 
 def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:
@@ -222,6 +239,12 @@ def _described(grid: SweepSettings, loaded: Mapping[str, Scenario]) -> dict[str,
     own = {loaded[given].name: loaded[given].clearance_mm for given in grid.scenarios}
     clearances = {name: list(grid.clearances_mm or (clearance,)) for name, clearance in own.items()}
     return {**values, "scenarios": list(own), "clearances_mm": clearances}
+
+
+def _whole(value: Any) -> Any:
+    """A whole number as rows spell it; what is none is refused where it is checked."""
+    number = isinstance(value, Real) and not isinstance(value, bool) and float(value).is_integer()
+    return int(value) if number else value
 
 
 def _plain(value: Any) -> Any:

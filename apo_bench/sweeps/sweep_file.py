@@ -87,6 +87,8 @@ def _value(key: str, node: JsonNode) -> Any:
     if _SEVERAL[key].is_text:
         return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
     low, high = _SEVERAL[key].range
+    if _SEVERAL[key].is_whole:
+        return tuple(_count(entry, low, high) for entry in _entries(node, key, "whole numbers"))
     read = _level if key == LEVEL.axis else partial(JsonNode.number, low=low, high=high)
     return tuple(read(entry) for entry in _entries(node, key, "numbers"))
 

@@ -32,11 +32,11 @@ def confidence(
 def _test(correction: Correction | None) -> Row:
     if correction is None:
         return {}
-    dropped: Row = {"dropped": list(correction.dropped)}
+    out: Row = {"dropped": list(correction.dropped), "left_out": [k + 1 for k in correction.left_out]}
     test = correction.test
     if test is None:
-        return dropped
-    return dropped | {
+        return out
+    return out | {
         "chi_square": _finite(test.chi_square),
         "chi_square_freedom": int(test.freedom),
         "p_value": _finite(test.p_value),

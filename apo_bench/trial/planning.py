@@ -9,6 +9,7 @@ from typing import Any, final
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.assembly.look import Look
 from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
@@ -31,7 +32,11 @@ class MethodResult:
 
 
 def apply_method(
-    method: Any, observation: Observation, truth: Array | None, corrector_input: Observation | None = None
+    method: Any,
+    observation: Observation,
+    truth: Array | None,
+    corrector_input: Observation | None = None,
+    look: Look | None = None,
 ) -> MethodResult:
     """What a method would have the robot do.
 
@@ -41,13 +46,14 @@ def apply_method(
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
         corrector_input: What a corrector gets in place of `observation`, where its relations are wrong. The plan has
             the right ones all the same: what is executed are goals.
+        look: What a corrector that can ask sees operations again by.
     """
     if isinstance(method, str) and method == "oracle" and truth is not None:
         return _uncorrected(observation, truth, None)
     if isinstance(method, str) and method == "none":
         return _uncorrected(observation, observation.goals, observation_failure(observation))
     given = observation if corrector_input is None else corrector_input
-    correction = correct_named(given, with_simulated(method))
+    correction = correct_named(given, with_simulated(method), look)
     return MethodResult(
         plan=correction.plan(observation) if correction.ok else None,
         failure=None if correction.ok else Outcome("correct", correction.status, None, correction.sentence),

@@ -13,9 +13,11 @@ import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Layout, Observation, Plan
 from apo_bench.assembly.reached import Outcome, ReplayResult
+from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.judging.verdict import Verdict, judge
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import predict
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from apo_bench.depth_camera.range_sensor import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
-LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV = range(6)
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS = range(7)
 """Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
 
 
@@ -90,6 +92,22 @@ def range_sensor(scene: Scene, recording: Recording, level_mm: float) -> RangeSe
 def observe_recording(recording: Recording, noise: Noise, seed: int, salt: Salt | None = None) -> Observation:
     """What a noise model makes of the demonstration of a trial."""
     return observe(recording.demonstration, noise, stream(seed, OBSERVATION, salt))
+
+
+def looks_at(
+    recording: Recording,
+    noise: Noise,
+    seed: int,
+    allowed: int,
+    salt: Salt | None = None,
+    assembly: Assembly | None = None,
+) -> Looks:
+    """Looks at the demonstration of a trial that was observed once.
+
+    Args:
+        assembly: As in `Looks`.
+    """
+    return Looks(recording.demonstration, noise, stream(seed, LOOKS, salt), allowed, assembly)
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:

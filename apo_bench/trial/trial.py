@@ -12,6 +12,7 @@ from apo_bench.assembly.reached import Snapshot
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.records.method import knows_relations, knows_truth, parsed
@@ -32,6 +33,7 @@ from apo_bench.trial.stages import (
     Attempt,
     Recording,
     demonstration_failure,
+    looks_at,
     observe_recording,
     predicted_outcome,
     range_sensor,
@@ -77,8 +79,11 @@ def run_trial(
     if recording.demonstration.code != "ok":
         return asked | result(demonstration_failure(recording.demonstration), success=None)
     truth = recording.layout.goals
-    observation = observe_recording(recording, noise_of(settings, scene, recording), settings.seed, settings.salt)
-    return asked | _row(settings, scene, observation, truth, truth, method, watch, cache)
+    noise = noise_of(settings, scene, recording)
+    observation = observe_recording(recording, noise, settings.seed, settings.salt)
+    given = _corrector_input(settings, observation, truth)
+    look = looks_at(recording, noise, settings.seed, settings.looks, settings.salt, given.assembly)
+    return asked | _row(settings, scene, observation, given, truth, truth, method, watch, cache, look)
 
 
 def noise_of(settings: TrialSettings, scene: Scene, recording: Recording) -> Noise:
@@ -117,7 +122,8 @@ def run_measured(
     content = content_hash(scene.scenario, settings.scenario, scene.arm.mjcf)
     asked = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)
-    return asked | _row(settings, scene, observation, reference, None, method, watch, None)
+    given = _corrector_input(settings, observation, None)
+    return asked | _row(settings, scene, observation, given, reference, None, method, watch, None, None)
 
 
 def nominal_where_seen(nominal: Array, observation: Observation) -> Array:
@@ -133,21 +139,25 @@ def _row(
     settings: TrialSettings,
     scene: Scene,
     observation: Observation,
+    given: Observation,
     reference: Array,
     truth: Array | None,
     method: Any,
     watch: Any,
     cache: ReplayCache | None,
+    look: Looks | None,
 ) -> Row:
     """What the method made of the observation, and what came of its plan.
 
     Args:
+        given: What a corrector gets in its place.
         reference: (n, 4, 4) goals that are right for the judge.
         truth: (n, 4, 4) goals of the layout; None if they are not known.
     """
-    given = _corrector_input(settings, observation, truth)
-    made = apply_method(method or parsed(settings.method).plan, observation, truth, given)
+    made = apply_method(method or parsed(settings.method).plan, observation, truth, given, look)
     row = _outcome(settings, scene, made, reference, truth, watch, cache) | confidence(made, observation, given, truth)
+    if made.correction is not None:
+        row |= {"seen_again": look.seen_again if look else 0}
     if knows_relations(settings.method):
         row |= cast(Row, count_contacts(observation.assembly, given.assembly))
     return row

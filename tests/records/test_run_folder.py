@@ -44,7 +44,7 @@ def run(**changed: Any) -> dict[str, Any]:
 
 
 def row(seed: int) -> dict[str, Any]:
-    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "given", "none", seed)
+    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "given", "none", 0, seed)
     ended = {"demonstration": "ok", **result(Outcome("done", "ok", None, "all was done"), success=True)}
     ended |= {"sim_seconds": 20.0, "extra_operations": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
@@ -296,12 +296,12 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
         (
             "trials.jsonl",
             json.dumps(row(1) | {"schema": "apo-bench/row/4"}) + "\n",
-            "this version writes 'apo-bench/row/6'",
+            "this version writes 'apo-bench/row/7'",
         ),
         (
             "trials.jsonl",
             json.dumps(row(1) | {"schema": "apo-bench/row/9"}) + "\n",
-            "apo-bench/row/5, apo-bench/row/6 can be read",
+            "apo-bench/row/6, apo-bench/row/7 can be read",
         ),
         ("trials.jsonl", "{}\n", "line 1, field schema: it is missing"),
         ("trials.jsonl", "[1, 2]\n", "line 1: an object is needed, a list was given"),

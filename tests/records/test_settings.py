@@ -38,7 +38,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
         column = ROW_FIELDS[SETTINGS[name].column]
         if not SETTINGS[name].choices and name != "salt":
             assert column in (kind, kind | None)
-    assert set(KEY) < set(REQUIRED)
+    assert set(KEY) - set(REQUIRED) == {info.column for info in SETTINGS.values() if info.later} == {"looks"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
@@ -59,7 +59,7 @@ def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
 def test_the_environment_has_the_same_defaults() -> None:
     defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
     here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
-    assert here == ["careless", "eye", "grasp", "arm", "timestep_s"]
+    assert here == ["careless", "eye", "grasp", "arm", "looks", "timestep_s"]
     assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
     assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
 
@@ -74,6 +74,8 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
     ("wrong", "said"),
     [
         ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
+        ({"looks": 101}, "a number of looks of 101 was given; whole numbers from 0 to 100 are allowed."),
+        ({"looks": 1, "method": "m:f"}, "a number of looks of 1 was given with the method 'm:f', which runs in a process of its own"),
         ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
         ({"careless": "much"}, "a carelessness of 'much' was given; a number from 0 to 10 is allowed"),
         (

@@ -73,6 +73,7 @@ def correction_message(correction: Correction) -> CorrectorMessage:
         "test": _test_form(correction.test),
         "test_after": _test_form(correction.test_after),
         "dropped": [str(name) for name in _several(correction.dropped)],
+        "left_out": [int(k) for k in _several(correction.left_out)],
     }
     possible = {"goals": correction.goals, "targets": correction.targets, "covariance": correction.covariance}
     return form, {name: array for name, array in possible.items() if array is not None}
@@ -102,6 +103,7 @@ def parse_correction(form: MessageForm, arrays: Arrays) -> Correction:
             test_after=_test(form["test_after"]),
             covariance=arrays.get("covariance"),
             dropped=tuple(map(_text, form["dropped"])),
+            left_out=tuple(map(_whole, form["left_out"])),
         )
     except (ValueError, TypeError, KeyError, IndexError, OverflowError) as error:
         raise GarbledMessage("the message is no correction") from error

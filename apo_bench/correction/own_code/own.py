@@ -11,6 +11,7 @@ from typing import Any, final
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.look import Look
 from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
 from apo_bench.correction.own_code.forms import observation_message, parse_correction
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
@@ -88,14 +89,14 @@ class OwnCorrectors:
         self.close()
 
 
-def correct_named(observation: Observation, corrector: Any) -> Correction:
-    """Correct an observation; a corrector named as `module:name` runs in a process of its own.
+def correct_named(observation: Observation, corrector: Any, look: Look | None = None) -> Correction:
+    """Correct an observation; a corrector named as `module:name` runs in a process of its own, and cannot look again.
 
     Raises:
         InputError: There is no such corrector, or the observation makes no sense.
     """
     with OwnCorrectors() as own:
-        return correct(observation, own.find(corrector))
+        return correct(observation, own.find(corrector), look)
 
 
 def check_correctors(methods: Iterable[str], limit_s: float = CORRECTOR_LIMIT_S) -> set[str]:

@@ -1,8 +1,8 @@
 """Which observations are outliers is part of the estimate: hypotheses of that, and how likely what was seen makes them.
 
-Each operation is an inlier, seen with the stated noise; broad, seen with some times that; or gross, so that what was
-seen says nothing. Given the states, what contacts leave at the observation is Gaussian, with covariance J C J^t and
-what play and curvature add, so states are compared by the likelihood of that; what no contact tells does not count.
+Given the states of all views, what contacts leave at the observation is Gaussian, with covariance J C J^t and what
+play and curvature add, so hypotheses are compared by the likelihood of that; what no contact tells does not count. A
+relation may be wrong in place of an observation: its faces are then anywhere.
 """
 
 from __future__ import annotations
@@ -15,88 +15,104 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations
+from apo_bench.assembly.equations import equations, pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.opposing import looking_away
+from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
 from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.robust.inferred import inferred_goals
+from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, State, Views, merged
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.whitened import scales
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
-INLIER, BROAD, GROSS = 0, 1, 2
 _as_begun = ContactCorrector("apply", elsewhere=False)
-"""Goals of gross operations come from contacts already."""
-States = tuple[int, ...]
-"""One of these for each operation."""
+"""Goals of operations that are left out come from contacts already."""
+States = tuple[State, ...]
+"""Those of the views of each operation."""
 UNKNOWN = np.diag(np.repeat([0.05, 0.5], 3) ** 2)
-"""(6, 6): how far the goal of a gross operation may be from what its contacts say of it, [m, rad]."""
+"""(6, 6): how far the goal of an operation that was left out may be from what its contacts say of it, [m, rad]."""
 UNKNOWN.flags.writeable = False
+_WRONG_M = 0.05
+"""Faces that a wrong relation names may be so far apart."""
 
 
 @final
-@dataclass(frozen=True)
-class OutlierModel:
-    """How often observations are worse than their covariance says."""
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What there is to explain."""
 
-    gross: float = 0.1
-    """Part of the operations of which what was seen says nothing."""
-    broad: float = 0.03
-    """Part that is seen with `times` the stated deviation."""
-    times: float = 10.0
-
-    def __post_init__(self) -> None:
-        rates = (self.gross, self.broad, 1.0 - self.gross - self.broad)
-        if not all(0.0 < rate < 1.0 for rate in rates):
-            raise InputError(
-                f"rates of {self.gross!r} gross and {self.broad!r} broad were given; both must be above 0, together "
-                "below 1."
-            )
-        if not 1.0 < self.times < np.inf:
-            raise InputError(f"times={self.times!r} was given; a broad observation needs a finite number above 1.")
-
-    def surprise(self, states: States) -> float:
-        """-2 log of the probability of states, beside that of inliers alone."""
-        rates = (1.0 - self.gross - self.broad, self.broad, self.gross)
-        return -2.0 * float(sum(np.log(rates[state] / rates[INLIER]) for state in states))
+    observation: Observation
+    """The first look: assembly, start poses and play are those of all."""
+    views: Views
+    model: OutlierModel
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """States, and what comes of them."""
+    """What is believed, and what comes of that."""
 
+    case: Case
     states: States
+    dropped: tuple[str, ...]
+    """Relations that are not believed."""
     observation: Observation
-    """What was seen, gross operations as contacts say, with covariances that the states widen."""
+    """Views merged, and operations of which none is believed where contacts say, with `UNKNOWN`."""
     correction: Correction
-    model: OutlierModel
+
+    @property
+    def left_out(self) -> tuple[int, ...]:
+        """Operations of which no view is believed."""
+        return unbelieved(self.states)
+
+    @property
+    def doubts(self) -> bool:
+        """Whether anything is not believed as it was stated."""
+        return bool(self.dropped) or any(one != INLIER for state in self.states for one in state) or () in self.states
 
     @cached_property
     def badness(self) -> float:
-        """-2 log of how likely states and observation are together, but for a constant; infinite if no solution."""
-        test = self.correction.test
-        if not self.correction.ok or test is None or not faces_oppose(self.observation, self.correction.goals):
+        """-2 log of how likely states and views are together, but for a constant; infinite if there is no solution."""
+        made, observation = self.correction, self.observation
+        if not made.ok or made.test is None or not self._faces_oppose():
             return np.inf
-        L = scales(self.observation.covariance)
-        xi = pose.log(pose.inverse(self.observation.goals) @ self.correction.goals)
-        system = seen_system(self.observation)
-        _, blocks = system.blocks(self.correction.goals, right_jacobian(xi) @ L)
+        wide = np.array(observation.covariance)
+        wide[list(self.left_out)] = ROOM
+        system = seen_system(observation)
+        xi = pose.log(pose.inverse(observation.goals) @ made.goals)
+        _, blocks = system.blocks(made.goals, right_jacobian(xi) @ scales(wide))
         Jt = system.gathered(blocks)
-        soft = np.hypot(fit_deviation(self.observation.assembly, self.observation.play_m), SOFT_M)
+        soft, false = soft_deviation(observation), np.zeros(Jt.shape[1])
+        if self.dropped:
+            wrong = np.repeat(~observation.assembly.without(self.dropped), 3)
+            each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
+            soft = np.where(wrong, each, soft)
+            false = np.where(wrong, system.blocks(made.goals, scales(wide))[0] / each, 0.0)
         S = Jt.T @ Jt + np.diag(soft * soft)
-        return float(test.chi_square + np.linalg.slogdet(S)[1] + self.model.surprise(self.states))
+        unlikely = made.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
+        model, states = self.case.model, zip(self.case.views, self.states, strict=True)
+        surprise = sum(merged(views, state, model).surprise for views, state in states)
+        return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
 
-    def at(self, goals: Array, gross: Sequence[int]) -> Hypothesis:
-        """The same with gross operations inferred to lead elsewhere, to these of goals (n, 4, 4)."""
+    def at(self, goals: Array, unknown: Sequence[int]) -> Hypothesis:
+        """The same with the inferred goals of some operations elsewhere, at these of goals (n, 4, 4)."""
         there = np.array(self.observation.goals)
-        there[list(gross)] = goals[list(gross)]
+        there[list(unknown)] = goals[list(unknown)]
         moved = replace(self.observation, goals=there)
-        return replace(self, observation=moved, correction=contact_apply(moved))
+        return replace(self, observation=moved, correction=_corrected(moved, self.dropped))
+
+    def stands_at(self, goals: Array) -> bool:
+        """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
+        observation = self.observation
+        away = looking_away(observation.assembly, observation.start, goals)
+        return not (away & observation.assembly.without(self.dropped)).any()
+
+    def _faces_oppose(self) -> bool:
+        return self.stands_at(self.correction.goals)
 
     @property
     def p_value(self) -> float:
@@ -104,23 +120,31 @@ class Hypothesis:
         return self.correction.test.p_value if self.correction.test and np.isfinite(self.badness) else 0.0
 
 
-def hypothesis(observation: Observation, states: States, model: OutlierModel) -> Hypothesis:
-    """Solve for the goals that are most likely with these states."""
-    gross = [k for k, state in enumerate(states) if state == GROSS]
-    goals = inferred_goals(observation, gross).goals if gross else observation.goals
-    covariance = np.array(observation.covariance)
-    for k, state in enumerate(states):
-        if state == BROAD:
-            covariance[k] *= model.times**2
-        if state == GROSS:
+def unbelieved(states: States) -> tuple[int, ...]:
+    """Operations of which no view is believed."""
+    return tuple(k for k, state in enumerate(states) if all(one == GROSS for one in state))
+
+
+def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
+    """Solve for the goals that are most likely with these states, and without these relations."""
+    believed = believed_observation(case, states)
+    return Hypothesis(case, states, dropped, believed, _corrected(believed, dropped))
+
+
+def believed_observation(case: Case, states: States) -> Observation:
+    """Views merged, and what is not believed inferred."""
+    first = case.observation
+    goals, covariance, unknown = np.array(first.goals), np.array(first.covariance), list[int]()
+    for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
+        found = merged(views, state, case.model)
+        if found.goal is None:
+            unknown.append(k)
             covariance[k] = UNKNOWN
-    widened = replace(observation, goals=goals, covariance=covariance, seen=np.ones(len(states), dtype=np.bool_))
-    return Hypothesis(states, widened, (_as_begun if any(states) else contact_apply)(widened), model)
-
-
-def faces_oppose(observation: Observation, goals: Array) -> bool:
-    """Whether the faces of every contact look at each other at the goals, (n, 4, 4)."""
-    return not looking_away(observation.assembly, observation.start, goals).any()
+        else:
+            goals[k], covariance[k] = found.goal, found.covariance
+    seen = np.ones(len(states), dtype=np.bool_)
+    believed = replace(first, goals=goals, covariance=covariance, seen=seen)
+    return replace(believed, goals=inferred_goals(believed, unknown).goals) if unknown else believed
 
 
 def seen_system(observation: Observation) -> CompactEquations:
@@ -128,3 +152,12 @@ def seen_system(observation: Observation) -> CompactEquations:
     return compact_equations(
         equations(observation.assembly, observation.start, observation.goals), len(observation.goals)
     )
+
+
+def soft_deviation(observation: Observation) -> Array:
+    """How far each equation may be from nominal, (3 c,), [m]."""
+    return np.hypot(fit_deviation(observation.assembly, observation.play_m), SOFT_M)
+
+
+def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:
+    return contact_apply.leaving_out(observation, dropped) if dropped else contact_apply(observation)

@@ -17,11 +17,15 @@ from apo_bench.io.plain_text import CONTROL, clean
 from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.run.fields import RUN_FIELDS, TIMING_FIELDS, Said
-from apo_bench.records.run.verdicts import MEANING
-from apo_bench.records.settings import RANGE, ROW, SETTINGS, TrialSettings
+from apo_bench.records.run.verdicts import MEANING, has_both_verdicts
+from apo_bench.records.settings import RANGE, SETTINGS, TrialSettings
 
 _USUAL: Mapping[str, Any] = MappingProxyType(
-    {info.column: info.default for name, info in SETTINGS.items() if not info.key and name not in ("eye", "salt")}
+    {
+        info.column: info.default
+        for name, info in SETTINGS.items()
+        if (info.later or not info.key) and name not in ("eye", "salt")
+    }
 )
 """What a row that does not say means."""
 _NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye")
@@ -160,7 +164,7 @@ def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
     for names in _TOGETHER:
         if len({row.get(name) is None for name in names}) > 1:
             return names[0], f"{' and '.join(names)} are null together, or none of them is"
-    if row["schema"] == ROW and (row.get("as_demonstrated") is None) != (row["success"] is None):
+    if has_both_verdicts(row["schema"]) and (row.get("as_demonstrated") is None) != (row["success"] is None):
         return "as_demonstrated", "success and as_demonstrated are null together, or none of them is"
     if row.get("as_demonstrated") and not row["success"]:
         return "as_demonstrated", "it is true, so success is needed to be true as well"

@@ -33,10 +33,19 @@ def _one_verdict(row: Row) -> Row:
 
 
 MEANING: Mapping[str, Callable[[Row], Row]] = MappingProxyType(
-    {**{f"apo-bench/row/{version}": _one_verdict for version in (2, 3, 4, 5)}, ROW: _as_it_says}
+    {
+        **{f"apo-bench/row/{version}": _one_verdict for version in (2, 3, 4, 5)},
+        "apo-bench/row/6": _as_it_says,
+        ROW: _as_it_says,
+    }
 )
 """Schema -> what a row of it says in the words of today. Rows before the last say less: nothing about the test of a
-correction and its posterior (2), recognised contacts (3), the eye and the fidelity (4), two verdicts (5)."""
+correction and its posterior (2), recognised contacts (3), the eye and the fidelity (4), two verdicts (5), looks (6)."""
+
+
+def has_both_verdicts(schema: str) -> bool:
+    """Whether rows of a schema say both `success` and `as_demonstrated`."""
+    return MEANING[schema] is _as_it_says
 
 
 def verdict_of(rows: Sequence[Mapping[str, Any]], folder: str | Path) -> str:
@@ -45,12 +54,12 @@ def verdict_of(rows: Sequence[Mapping[str, Any]], folder: str | Path) -> str:
     Raises:
         InputError: Some rows are older than others, such that their verdicts are not the same.
     """
-    schemas = {row["schema"] for row in rows}
-    older = sorted(schemas - {ROW})
-    if ROW in schemas and older:
+    schemas = sorted({row["schema"] for row in rows})
+    older, newer = ([s for s in schemas if has_both_verdicts(s) is both] for both in (False, True))
+    if newer and older:
         raise InputError(
-            f"'{folder}' holds rows of schema '{older[0]}' and of '{ROW}', whose verdicts are not the same; keep them "
-            "in folders of their own."
+            f"'{folder}' holds rows of schema '{older[0]}' and of '{newer[0]}', whose verdicts are not the same; "
+            "keep them in folders of their own."
         )
     return AS_DEMONSTRATED if older else SUCCESS
 

@@ -11,6 +11,7 @@ from apo_bench.report.figures.levels import (
     recognition_figure,
     success_figure,
 )
+from apo_bench.report.figures.looks import looks_figure
 from apo_bench.report.figures.outcome_bars import outcome_figure
 from apo_bench.report.figures.prediction import prediction_figure
 from apo_bench.report.figures.sheet import Drawing, draw
@@ -40,6 +41,7 @@ def figures(
     made = {
         "success_over_level": success_figure(found.cells),
         "success_over_tightness": tightness_figure(found.cells),
+        "success_over_looks": looks_figure(found.cells),
         "failure_stages": outcome_figure(grouped),
         "gap_before_and_after": gap_figure(members(where, gaps), looks),
         "prediction": prediction_figure(confusions),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.report.tables.saying import interval_columns, level_text, rate_columns
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics.rate_text import failures, interval, percent
@@ -13,9 +13,13 @@ from apo_bench.statistics.rates import Cell
 
 def cell_table(cells: Sequence[Cell]) -> Table:
     """Axes that are as usual in every cell are left to files."""
-    met = {"noise": lambda c: not knows_truth(c.method), "relations": lambda c: knows_relations(c.method)}
+    met = {
+        "noise": lambda c: not knows_truth(c.method),
+        "relations": lambda c: knows_relations(c.method),
+        "looks": lambda c: may_look(c.method),
+    }
 
-    def axis(name: str, usual: str) -> Column:
+    def axis(name: str, usual: str | int) -> Column:
         unusual = any(getattr(c, name) != usual for c in cells)
         return Column(name, name * unusual, text=lambda c: getattr(c, name) if met[name](c) else "any", words=True)
 
@@ -33,6 +37,7 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             Column("method", "method", words=True),
             Column("grasp"),
             Column("fidelity"),
+            axis("looks", 0),
             Column("", "success", text=lambda c: percent(c.rate)),
             Column("", "95 % interval", text=interval),
             Column("trials", "n"),

@@ -71,6 +71,7 @@ def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) ->
         axis("method")._replace(head="method", words=True),
         axis("grasp"),
         axis("fidelity"),
+        axis("looks"),
     )
 
 

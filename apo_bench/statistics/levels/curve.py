@@ -9,7 +9,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.records.method import knows_relations, knows_truth
+from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.records.row import Row
 from apo_bench.records.settings import RANGE
 from apo_bench.statistics.rates import Place, by_place, order
@@ -26,10 +26,11 @@ class CurveSetting(NamedTuple):
     method: str
     grasp: str = "friction"
     fidelity: str = "full"
+    looks: int = 0
 
     def reference(self, method: str) -> CurveSetting:
-        """The setting that this one is compared with: `none` asks for no relations."""
-        other = self._replace(method=method)
+        """The setting that this one is compared with: `none` asks for no relations, and few methods for looks."""
+        other = self._replace(method=method, looks=self.looks if may_look(method) else 0)
         return other if knows_relations(method) else other._replace(relations="given")
 
 

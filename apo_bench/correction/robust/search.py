@@ -1,0 +1,217 @@
+"""The likeliest hypothesis: which views are outliers, or which relation is wrong.
+
+While the test of `contact` holds, nothing is doubted. If it fails, the smallest sets of operations are looked for
+without which the rest agrees: a set is solved only if the contacts that none of it has a part in agree with each other
+at what was seen, which is quick to say for every set. Of the sets whose test holds the likeliest is taken. Then each of
+its states is changed for as long as that is likelier, and each relation that it has a part in may be wrong instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations, groupby, product
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.equations import pattern
+from apo_bench.correction.consistency import p_value
+from apo_bench.correction.posterior import jacobian_rank
+from apo_bench.correction.robust.hypotheses import (
+    Case,
+    Hypothesis,
+    States,
+    believed_observation,
+    hypothesis,
+    seen_system,
+    soft_deviation,
+    unbelieved,
+)
+from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, State, beliefs
+from apo_bench.correction.solvers.whitened import scales
+from apo_bench.geometry.arrays import Array
+
+MOST_EXACT = 12
+"""Operations up to which every set is looked at; of more, sets grow by one operation at a time."""
+_LENIENT = 1e-4
+"""A set is not solved if what is left of the contacts agrees worse than by this p-value."""
+_LEVER_M = 0.1
+"""What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
+_MOST_SOLVED = 24
+"""Hypotheses of one size that are solved, those whose rest agrees best."""
+_BY = 15.0
+"""An operation that is less likely to be wrong, by so much in -2 log, counts like one more of a set."""
+_MOST_STARTS = 32
+
+
+@final
+class Search:
+    """The hypotheses of one case, each solved once."""
+
+    def __init__(self, case: Case, level: float) -> None:
+        """Args:
+        level: As of `RobustCorrector`.
+        """
+        self._case, self._level = case, level
+        self._beliefs = [beliefs(views, case.model) for views in case.views]
+        self._solved: dict[tuple[States, tuple[str, ...]], Hypothesis] = {}
+        self.operations = len(case.views)
+        self.first: Hypothesis | None = None
+        """What is likeliest of each operation by itself."""
+
+    def likeliest(self) -> Hypothesis | None:
+        """None if nothing that was tried has a solution."""
+        start = self._start()
+        self.first = self._try(start)
+        if self.first.p_value >= self._level:
+            return self.first
+        found = self._smallest(start)
+        return None if found is None else self._refined(found)
+
+    def share(self, found: Hypothesis, k: int) -> float:
+        """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
+        return self.weight(found, lambda one: one.states[k] != found.states[k])
+
+    def rival(self, found: Hypothesis) -> Hypothesis | None:
+        """The likeliest explanation of the other kind: with a wrong relation, or without one."""
+        others = [one for one in self._known() if bool(one.dropped) != bool(found.dropped)]
+        return min(others, key=_badness, default=None)
+
+    def weight(self, found: Hypothesis, which: Callable[[Hypothesis], bool]) -> float:
+        """How likely some of the hypotheses are together."""
+        known = self._known()
+        weights = np.exp([-0.5 * (one.badness - found.badness) for one in known])
+        return float(weights @ [which(one) for one in known] / weights.sum())
+
+    def _known(self) -> list[Hypothesis]:
+        return [one for one in self._solved.values() if np.isfinite(one.badness)]
+
+    def _try(self, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
+        key = states, dropped
+        if key not in self._solved:
+            self._solved[key] = hypothesis(self._case, states, dropped)
+        return self._solved[key]
+
+    def _start(self) -> States:
+        """The likeliest state of each operation by itself; of those that are equally likely what contacts like best."""
+        likeliest = [[state for s, state in own if s <= own[0][0]] for own in self._beliefs]
+        several = [one for _, one in zip(range(_MOST_STARTS), product(*likeliest), strict=False)]
+        if len(several) == 1:
+            return several[0]
+        return min(several, key=lambda states: _Rest(self._case, states).disagreement())
+
+    def _smallest(self, start: States) -> Hypothesis | None:
+        """The likeliest of the smallest sets whose test holds; if none does, of all that were solved."""
+        for sets in self._sets(start):
+            tried = [self._try(states) for states in sets]
+            held = [one for one in tried if one.p_value >= self._level]
+            if held:
+                return min(held, key=_badness)
+        return min(self._known(), key=_badness, default=None)
+
+    def _sets(self, start: States) -> Iterator[list[States]]:
+        """States in which some operations are in another than at the start, size by size, the best agreeing first."""
+        rest, seen = _Rest(self._case, start), [k for k, views in enumerate(self._case.views) if views]
+        other = {k: [state for _, state in self._beliefs[k] if state != start[k]] for k in seen}
+        size = {k: self._size(k, start[k]) for k in other}
+        for some in self._grown(size, rest):
+            rated = sorted(((rest.agreement(s), s) for s in some), key=lambda one: (-one[0], one[1]))
+            agreeing = [s for p, s in rated if p >= _LENIENT]
+            every = (changed(start, s, to) for s in agreeing for to in product(*(other[k] for k in s)))
+            yield [states for _, states in zip(range(_MOST_SOLVED), every, strict=False)]
+
+    def _grown(self, size: dict[int, int], rest: _Rest) -> Iterator[list[tuple[int, ...]]]:
+        """Sets of operations by size; not all of them together."""
+        if len(size) <= MOST_EXACT:
+            every = [s for m in range(1, len(size)) for s in combinations(size, m)]
+            sizes = {s: sum(size[k] for k in s) for s in every}
+            yield from (list(some) for _, some in groupby(sorted(every, key=sizes.__getitem__), sizes.__getitem__))
+            return
+        grown: list[tuple[int, ...]] = [()]
+        for _ in range(1, len(size)):
+            chosen = sorted({tuple(sorted({*s, k})) for s in grown for k in size if k not in s})
+            yield chosen
+            grown = sorted(chosen, key=lambda s: -rest.agreement(s))[:3]
+
+    def _size(self, k: int, now: State) -> int:
+        """How many outliers it is worth that operation k is in another state."""
+        known = {state: surprise for surprise, state in self._beliefs[k]}
+        least = min(surprise for state, surprise in known.items() if state != now)
+        return max(1, round((least - known[now]) / _BY))
+
+    def _believed(self, k: int) -> State:
+        """The likeliest state of an operation in which a view is believed."""
+        return next(state for _, state in self._beliefs[k] if set(state) != {GROSS})
+
+    def _refined(self, found: Hypothesis) -> Hypothesis:
+        """One state after the other changed for the better, until none is; or relations in place of observations."""
+        while True:
+            near = [self._try(states, found.dropped) for states in _near(found.states)]
+            near += [self._try(states, (relation,)) for states, relation in self._relations(found)]
+            best = min(near, key=_badness, default=found)
+            if not best.badness < found.badness:
+                return found
+            found = best
+
+    def _relations(self, found: Hypothesis) -> Iterator[tuple[States, str]]:
+        """A relation in place of an operation that is in doubt and that it depends on."""
+        if found.dropped:
+            return
+        assembly = self._case.observation.assembly
+        letters = pattern(assembly).letters - len(assembly.solids)
+        for k, state in enumerate(found.states):
+            if not state or all(one == INLIER for one in state):
+                continue
+            states = changed(found.states, (k,), (self._believed(k),))
+            rest = _Rest(self._case, states)
+            for i, arc in enumerate(assembly.arcs()):
+                if (letters[list(arc)] == k).any() and rest.agreement((), arc) >= _LENIENT:
+                    yield states, f"R{i + 1}"
+
+
+def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:
+    """With the states of some operations replaced."""
+    new = dict(zip(which, to, strict=True))
+    return tuple(new.get(k, state) for k, state in enumerate(states))
+
+
+def _near(states: States) -> Iterator[States]:
+    """With one view, that is no inlier, in another state."""
+    for k, state in enumerate(states):
+        for i, now in enumerate(state):
+            others = [one for one in (INLIER, BROAD, GROSS) if one != now] if now != INLIER else []
+            yield from (changed(states, (k,), ((*state[:i], one, *state[i + 1 :]),)) for one in others)
+
+
+def _badness(one: Hypothesis) -> float:
+    return one.badness
+
+
+class _Rest:
+    """How well contacts agree that none of some operations has a part in, linearised once at what was seen."""
+
+    def __init__(self, case: Case, states: States) -> None:
+        seen, self._unknown = believed_observation(case, states), unbelieved(states)
+        system = seen_system(seen)
+        self._e, blocks = system.blocks(seen.goals, scales(seen.covariance))
+        self._Jt: Array = system.gathered(blocks)
+        known = np.delete(seen.covariance, self._unknown, axis=0)
+        turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
+        self._soft = np.hypot(soft_deviation(seen), turned * turned * _LEVER_M)
+        self._operations = pattern(seen.assembly).letters - len(seen.assembly.solids)
+
+    def agreement(self, left_out: Sequence[int], contacts: Sequence[int] = ()) -> float:
+        """The p-value of the test of the other contacts."""
+        square, J = self._square(left_out, contacts)
+        return p_value(square, jacobian_rank(J.T)) if len(J) else 1.0
+
+    def disagreement(self) -> float:
+        """The squared length of what all that is believed leaves, in standard deviations."""
+        return self._square((), ())[0]
+
+    def _square(self, left_out: Sequence[int], contacts: Sequence[int]) -> tuple[float, Array]:
+        chosen = ~np.isin(self._operations, (*left_out, *self._unknown)).any(axis=1)
+        chosen[list(contacts)] = False
+        kept = np.repeat(chosen, 3)
+        J, e, soft = self._Jt[:, kept].T, self._e[kept], self._soft[kept]
+        return float(e @ np.linalg.solve(J @ J.T + np.diag(soft * soft), e)) if len(e) else 0.0, J

@@ -1,0 +1,123 @@
+"""What was seen of each operation, once or several times, and what comes of it if some of that is not believed.
+
+A view is an inlier, seen with the stated noise; broad, seen with some times that; or gross, so that it says nothing.
+Views of one operation that are believed are merged into one Gaussian. That they agree is evidence that they are right,
+since gross views lie anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+INLIER, BROAD, GROSS = 0, 1, 2
+State = tuple[int, ...]
+"""One of these for each view of an operation; empty if it was never seen."""
+ROOM = np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi))
+"""(6, 6): a Gaussian as dense in its middle as poses anywhere in half a metre, turned anyhow, are; [m, rad]."""
+ROOM.flags.writeable = False
+_MOST_TOGETHER = 4
+"""Of more views than this only those that agree are believed together."""
+_AGREE = 50.0
+"""Views whose difference is longer than this, squared and in standard deviations, are not inliers both."""
+_TURNS = 5
+
+
+class View(NamedTuple):
+    """An operation as it was seen once."""
+
+    goal: Array
+    """(4, 4)."""
+    covariance: Array
+    """(6, 6), [m, rad]."""
+
+
+class Merged(NamedTuple):
+    """What the views of an operation say together if they are in some state."""
+
+    goal: Array | None
+    """(4, 4); None if none of them is believed."""
+    covariance: Array
+    surprise: float
+    """-2 log of how likely such states and views are, beside one inlier, whatever contacts say."""
+
+
+Views = tuple[tuple[View, ...], ...]
+"""Those of each operation."""
+
+
+def views_of(observation: Observation) -> Views:
+    """What was seen, once at most."""
+    return looked_again(((),) * len(observation.goals), observation)
+
+
+def looked_again(views: Views, observation: Observation) -> Views:
+    """With what was seen this time."""
+    new = zip(views, observation.seen, observation.goals, observation.covariance, strict=True)
+    return tuple((*old, View(goal, C)) if seen else old for old, seen, goal, C in new)
+
+
+def merged(views: Sequence[View], state: State, model: OutlierModel) -> Merged:
+    """What the views of one operation say together."""
+    believed = [
+        view if one == INLIER else View(view.goal, view.covariance * model.times**2)
+        for view, one in zip(views, state, strict=True)
+        if one != GROSS
+    ]
+    surprise = sum(model.surprises[one] for one in state)
+    anywhere = _log_volume(ROOM)
+    if not believed:
+        return Merged(None, ROOM, surprise + anywhere * max(0, len(views) - 1))
+    surprise += anywhere * (len(views) - len(believed))
+    if len(believed) == 1:
+        return Merged(*believed[0], surprise)
+    goal, covariance, length = _mean(believed)
+    apart = sum(_log_volume(view.covariance) for view in believed) - _log_volume(covariance)
+    return Merged(goal, covariance, surprise + length + apart)
+
+
+def beliefs(views: Sequence[View], model: OutlierModel) -> list[tuple[float, State]]:
+    """States of the views of one operation without broad ones, each with its surprise, the likeliest first.
+
+    Of equally likely ones that which believes the latest view: an earlier one was looked at again for a reason.
+    """
+    m = len(views)
+    groups: set[tuple[int, ...]] = {()}
+    if m <= _MOST_TOGETHER:
+        groups.update(g for size in range(1, m + 1) for g in combinations(range(m), size))
+    else:
+        groups.update(tuple(j for j in range(m) if i == j or _agree(views[i], views[j])) for i in range(m))
+    found = []
+    for group in groups:
+        state = tuple(INLIER if i in group else GROSS for i in range(m))
+        found.append((round(merged(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
+    return [(surprise, state) for surprise, _, state in sorted(found)]
+
+
+def _agree(a: View, b: View) -> bool:
+    xi = pose.log(pose.inverse(a.goal) @ b.goal)
+    return float(xi @ np.linalg.solve(a.covariance + b.covariance, xi)) < _AGREE
+
+
+def _mean(views: Sequence[View]) -> tuple[Array, Array, float]:
+    """The most likely pose, its covariance, and the squared length of all deviations from it."""
+    goals = np.array([view.goal for view in views])
+    W = np.linalg.inv([view.covariance for view in views])
+    C, T = np.linalg.inv(W.sum(axis=0)), goals[-1]
+    for _ in range(_TURNS):
+        T = T @ pose.exp(C @ np.einsum("kij,kj->i", W, pose.log(pose.inverse(T) @ goals)))
+    xi = pose.log(pose.inverse(T) @ goals)
+    return T, (C + C.T) / 2, float(np.einsum("ki,kij,kj->", xi, W, xi))
+
+
+def _log_volume(covariance: Array) -> float:
+    """-2 log of the density of a Gaussian in its middle."""
+    return float(np.linalg.slogdet(2.0 * np.pi * covariance)[1])

@@ -1,0 +1,62 @@
+"""Looks at a demonstration that has been observed once: fresh draws of the same noise, as many as are allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError
+from apo_bench.observation.noise import Noise
+from apo_bench.observation.observing import observe
+from apo_bench.records.settings import check
+
+
+@final
+class Looks:
+    """A `apo_bench.assembly.look.Look`: it knows the demonstration, and hands out nothing but observations.
+
+    Each look draws all operations, so that what is seen of one does not depend on which were asked for.
+    """
+
+    def __init__(
+        self,
+        demonstration: Demonstration,
+        noise: Noise,
+        rng: np.random.Generator,
+        allowed: int,
+        assembly: Assembly | None = None,
+    ) -> None:
+        """Args:
+            noise: As in `observe`.
+            rng: Not the one that the first observation was drawn from, which would change that of others.
+            allowed: How many looks.
+            assembly: What the corrector was told, if that is not right.
+
+        Raises:
+            InputError: The number is not allowed.
+        """
+        check("looks", allowed)
+        self.left = allowed
+        self.seen_again = 0
+        """Operations that were looked at again, each as often as that was."""
+        self._demonstration, self._noise, self._rng = demonstration, noise, rng
+        self._assembly = assembly or demonstration.assembly
+
+    def __call__(self, operations: Collection[int]) -> Observation:
+        n = len(self._assembly)
+        asked = sorted({*operations})
+        if self.left < 1:
+            raise InputError("one more look was asked for, and none is left; ask `look.left` before.")
+        if not asked or not all(isinstance(k, int | np.integer) and 0 <= k < n for k in asked):
+            raise InputError(
+                f"a look at the operations {asked} was asked for; give one or more whole numbers from 0 to {n - 1}."
+            )
+        made = observe(self._demonstration, self._noise, self._rng)
+        self.left -= 1
+        self.seen_again += len(asked)
+        return replace(made, assembly=self._assembly, seen=made.seen & np.isin(np.arange(n), asked))
