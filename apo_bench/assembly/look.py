@@ -9,6 +9,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 
 
+@runtime_checkable
 class Look(Protocol):
     """What a corrector is handed that may look again: called with operations, counted from 0, it looks once at them.
 

@@ -47,6 +47,11 @@ def correct(observation: Observation, corrector: Any = "contact", look: Look | N
         CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observations((observation,))
+    if look is not None and not isinstance(look, Look):
+        raise InputError(
+            f"a look of {look!r} was given, which cannot be called or does not say how many are left; give an "
+            "apo_bench.observation.looking.Looks."
+        )
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     try:

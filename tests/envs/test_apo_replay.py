@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 import warnings
 from collections.abc import Iterator
@@ -24,11 +25,12 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.nullable import predicted_info, whole
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import outcomes
 from apo_bench.records.settings import TrialSettings
 from apo_bench.simulation.execution import controller as replays
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import Recording, looks_at, record_demonstration
 from apo_bench.trial.trial import run_trial
 
 SEED = 5
@@ -179,6 +181,37 @@ def test_correction_aims_and_an_action_composes_on_top(watched: APOReplay, monke
     watched.reset(seed=SEED)
     watched.step(zeros(watched))
     np.testing.assert_array_equal(asked[1].goals, watched.seen.goals)
+
+
+def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A corrector that can ask gets them; what it does with them stays out of what was seen at first."""
+
+    class Asks:
+        def __call__(self, seen: Observation) -> Any:
+            return pytest.fail("it can look again")
+
+        def looking(self, seen: Observation, look: Any) -> Any:
+            again.append(look([1]))
+            return correct(seen, "contact")
+
+    again: list[Observation] = []
+    made = APOReplay("block_on_block", grasp="weld", noise="outliers", looks=2)
+    monkeypatch.setattr(envs, "record_demonstration", demonstrated)
+    corrected = apo_bench.Corrected(made, Asks())
+    corrected.reset(seed=SEED)
+    assert again[0].seen.tolist() == [False, bool(again[0].seen[1])]
+    assert not np.array_equal(again[0].goals[1], made.seen.goals[1])
+    assert (made.look.left, made.look.seen_again) == (1, 1)
+    copied = copy.deepcopy(made)
+    second = made.look([0, 1])
+    np.testing.assert_array_equal(copied.look([0]).goals, second.goals)
+    with pytest.raises(InputError, match="none is left"):
+        made.look([0])
+    corrected.reset(seed=SEED)
+    np.testing.assert_array_equal(again[1].goals, again[0].goals)
+    recording = demonstrated(made._scene, 1.0, SEED, "noise")
+    look = looks_at(recording, make_noise("outliers", Level(1.0, 1.0)), SEED, 1)
+    np.testing.assert_array_equal(look([1]).goals, again[0].goals)
 
 
 def test_a_correction_that_fails_is_not_executed(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,9 +2,12 @@
 
 import pytest
 
+from apo_bench.assembly.look import LookingCorrector
 from apo_bench.errors import InputError
-from apo_bench.records.method import checked_method, knows_relations, knows_truth, parsed
+from apo_bench.names import resolve
+from apo_bench.records.method import checked_method, knows_relations, knows_truth, may_look, parsed
 from apo_bench.records.settings import TrialSettings
+from apo_bench.records.short_names import CORRECTORS
 from apo_bench.scenario.file import load_scenario
 from apo_bench.statistics.rates import rank
 from apo_bench.sweeps.grid import SweepSettings, units
@@ -66,3 +69,11 @@ def test_an_oracle_that_searches_runs_once_per_seed():
     assert asked.count(("oracle+search", 0.0, 0.0, "given")) == 1
     assert sorted(set(asked)) == sorted(asked)
     assert len(asked) == 5
+
+
+def test_methods_that_may_look_are_those_that_can_ask():
+    for name in CORRECTORS:
+        if name not in ("gtsam", "cadquery"):
+            assert may_look(name) == isinstance(resolve(name, CORRECTORS, "corrector"), LookingCorrector)
+    assert may_look("contact-robust+search")
+    assert not any(map(may_look, ("oracle", "none", "search", "mine:correct")))

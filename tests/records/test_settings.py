@@ -75,7 +75,10 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
     [
         ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
         ({"looks": 101}, "a number of looks of 101 was given; whole numbers from 0 to 100 are allowed."),
-        ({"looks": 1, "method": "m:f"}, "a number of looks of 1 was given with the method 'm:f', which runs in a process of its own"),
+        (
+            {"looks": 1, "method": "m:f"},
+            "a number of looks of 1 was given with the method 'm:f', which runs in a process",
+        ),
         ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
         ({"careless": "much"}, "a carelessness of 'much' was given; a number from 0 to 10 is allowed"),
         (

@@ -23,6 +23,9 @@ from apo_bench.report.tables.confusion import prediction_summary
 from apo_bench.statistics.confusion import Confusion, confusions
 from apo_bench.statistics.effort import Effort, efforts
 from apo_bench.statistics.rates import Rate, place_of, tally, wilson
+from apo_bench.statistics.settings import members
+from apo_bench.statistics.settings import settings as settings_of_cells
+from apo_bench.statistics.summary import summary
 from tests import pages
 
 UNKNOWN = dict.fromkeys(
@@ -280,6 +283,28 @@ def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
     assert {line["tightness"] for line in table} == {"", "0.5", "0.125", "2.0", "0.25", "1.0"}
     one = report(write(tmp_path / "one", [row(), row("paper")]))
     assert not any("tightness" in path.name for path in one.figures)
+
+
+def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: Path) -> None:
+    """Rows of before there were looks had none; a reference that cannot look is that of every number of looks."""
+    rows = [row("contact", seed=i, success=i < 1) for i in range(4)]
+    rows += [row("contact-robust", seed=i, success=i < n, looks=n) for n in (0, 2, 4) for i in range(4)]
+    found = summary(rows, ("contact",))
+    assert [(c.method, c.looks, c.successes) for c in found.cells] == [
+        *(("contact", 0, 1), ("contact-robust", 0, 0), ("contact-robust", 2, 2), ("contact-robust", 4, 4))
+    ]
+    assert [(p.place.looks, p.only_method, p.only_reference) for p in found.pairs] == [(0, 0, 1), (2, 1, 0), (4, 3, 0)]
+    grouped = members(settings_of_cells(found.cells), found.cells)
+    assert [(s.looks, [c.method for c in own]) for s, own in grouped.items()] == [
+        (n, ["contact", "contact-robust"]) for n in (0, 2, 4)
+    ]
+    made = report(write(tmp_path / "run", rows))
+    assert {"success_over_looks.svg", "success_over_looks.png"} <= {path.name for path in made.figures}
+    assert "Success over the number of looks" in pages.words(made.page)
+    assert made.answer.startswith("`contact-robust` with 4 more looks succeeds in 100.0 % of its 4 trials")
+    assert "than `contact` by 75.0 points" in made.answer or "as often as `contact`" in made.answer
+    one = report(write(tmp_path / "one", [row("contact-robust", looks=2), row("contact")]))
+    assert not any("looks" in path.name for path in one.figures)
 
 
 def test_the_figure_has_a_panel_per_scenario_and_carelessness(tmp_path: Path) -> None:

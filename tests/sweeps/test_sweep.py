@@ -95,6 +95,16 @@ def test_noises_and_relations_are_axes_but_only_of_those_who_meet_them() -> None
     assert len(met["paper"]) == 6
 
 
+def test_only_methods_that_can_ask_look_again() -> None:
+    spec = replace(SPEC, methods=("oracle", "none", "contact", "contact-robust"), looks=(0, 2.0, 2))
+    assert spec.looks == (0, 2)
+    trials = [t for unit in units([spec], load_all([spec])) for t in unit.trials]
+    met = {m: {t.looks for t in trials if t.method == m} for m in spec.methods}
+    assert met == {"oracle": {0}, "none": {0}, "contact": {0}, "contact-robust": {0, 2}}
+    with pytest.raises(InputError, match=r"a number of looks of 1.5 was given; whole numbers from 0 to 100"):
+        replace(SPEC, looks=(1.5,))
+
+
 def test_a_sweep_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
     huge = replace(SPEC, trials=1_000_000)
     with pytest.raises(InputError, match=r"up to [0-9,]+ trials, and at most 1,000,000 are allowed in one folder"):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect, Try
 from apo_bench.assembly.goals import Observation, Step
+from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
 from apo_bench.geometry.solid import Box, Face, Solid
@@ -27,6 +29,7 @@ def observation_message(observation: Observation) -> CorrectorMessage:
         "parts": parts,
         "gap_m": float(observation.gap_m),
         "play_m": float(observation.play_m),
+        "outliers": None if observation.outliers is None else [*map(float, astuple(observation.outliers))],
     }
     start = np.array([observation.start[part] for part in parts]).reshape(-1, 4, 4)
     return form, {
@@ -49,8 +52,9 @@ def parse_observation(form: MessageForm, arrays: Arrays) -> Observation:
         gaps={_contact(ends): Gap(*gap) for ends, gap in form["gaps"]},
     )
     start = dict(zip(form["parts"], arrays["start"], strict=True))
-    kept = {name: arrays[name] for name in ("goals", "covariance", "seen")}
-    return Observation(assembly, start, **kept, gap_m=form["gap_m"], play_m=form["play_m"])
+    seen = arrays["goals"], arrays["covariance"], arrays["seen"]
+    outliers = None if form["outliers"] is None else OutlierModel(*form["outliers"])
+    return Observation(assembly, start, *seen, gap_m=form["gap_m"], play_m=form["play_m"], outliers=outliers)
 
 
 def correction_message(correction: Correction) -> CorrectorMessage:

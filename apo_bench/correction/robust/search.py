@@ -210,7 +210,7 @@ class _Rest:
         return self._square((), ())[0]
 
     def _square(self, left_out: Sequence[int], contacts: Sequence[int]) -> tuple[float, Array]:
-        chosen = ~np.isin(self._operations, (*left_out, *self._unknown)).any(axis=1)
+        chosen = np.asarray(~np.isin(self._operations, (*left_out, *self._unknown)).any(axis=1))
         chosen[list(contacts)] = False
         kept = np.repeat(chosen, 3)
         J, e, soft = self._Jt[:, kept].T, self._e[kept], self._soft[kept]

@@ -25,6 +25,7 @@ STYLES = {
     "none": Style("#d55e00", "o", _SOLID),
     "search": Style("#e7298a", "8", _DASHED),
     "contact": Style("#332288", "p", _SOLID),
+    "contact-robust": Style("#aa3377", "$R$", _DASHED),
     "paper": Style("#0072b2", "s", _SOLID),
     "paper-track": Style("#009e73", "D", _SOLID),
     "last-only": Style("#e69f00", "v", _DASHED),
