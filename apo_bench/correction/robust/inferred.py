@@ -124,13 +124,24 @@ def _placed(told: Sequence[_Said], seen: Array) -> Array:
     """The pose that agrees best with what is said; what is not said of its orientation is as it was seen."""
     T = np.eye(4)
     T[:3, :3] = R = _turned(told, seen[:3, :3])
-    A, b = np.zeros((3, 3)), np.zeros(3)
+    A, b, fixed = np.zeros((3, 3)), np.zeros(3), _across(np.array([one.way for one in told]))
     for one in told:
         off, across, along = one.there - R @ one.at, 1.0 / one.reach_m**2, 1.0 / _PLANE_M**2
-        A += along * np.outer(one.way, one.way) + across * np.eye(3)
-        b += along * one.way * (one.way @ off) + across * off
+        way = fixed @ one.way
+        A += along * np.outer(way, way) + across * np.eye(3)
+        b += along * way * (way @ off) + across * off
     T[:3, 3] = np.linalg.solve(A, b)
     return T
+
+
+def _across(ways: Array) -> Array:
+    """The projection (3, 3) onto the directions in which planes say where a point is.
+
+    Planes that are parallel but for noise meet somewhere, far away; that says nothing.
+    """
+    _, w, Vt = np.linalg.svd(ways)
+    known = Vt[: np.count_nonzero(w > _APART * w[0])]
+    return np.asarray(known.T @ known)
 
 
 def _turned(told: Sequence[_Said], seen: Array) -> Array:

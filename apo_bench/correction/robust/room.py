@@ -1,12 +1,14 @@
 """Where parts may be of which too little was seen: beside the others, not inside them, and well on what they lie on.
 
 Contacts fix a part of the goal that was left out. What they leave free is chosen among a few places about the one
-that was inferred: the one where parts are least inside each other, and of these the one where faces cover most.
+that was inferred: the one where faces of contacts cover each other, then where parts are least inside each other, and
+of these the one where faces cover most.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,18 +22,26 @@ from apo_bench.geometry.overlap import face_area, overlap
 
 TRIED = 24
 """Places that are tried for one operation."""
+_COVERED = 0.02
+"""Faces that touch cover at least this part of the smaller one."""
 _DEEP_M = 5e-4
 """Parts that should not touch may be so deep in each other before another place is tried."""
 
 
-def crowding(observation: Observation, goals: Array) -> tuple[float, float]:
-    """How much parts are in each other's way if the goals, (n, 4, 4), are reached exactly.
+class Crowding(NamedTuple):
+    """What is wrong with goals that satisfy all equations, the worst first."""
 
-    Returns:
-        The sum of the depths of parts that should not touch, [m], 0 where none is deep; and how much of the smaller
-        face contacts leave bare, all together.
-    """
-    assembly, depth, bare = observation.assembly, 0.0, 0.0
+    missed: int
+    """Contacts whose faces do not cover each other."""
+    depth: float
+    """The sum of the depths of parts that should not touch, [m]; 0 where none is deep."""
+    bare: float
+    """How much of the smaller face contacts leave bare, all together."""
+
+
+def crowding(observation: Observation, goals: Array) -> Crowding:
+    """How much parts are in each other's way, or beside each other, if the goals, (n, 4, 4), are reached exactly."""
+    assembly, depth, bare, missed = observation.assembly, 0.0, 0.0, 0
     for operation, at in zip(assembly.operations, placements(assembly, observation.start, goals), strict=True):
         touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
         for part in operation.moves:
@@ -42,8 +52,9 @@ def crowding(observation: Observation, goals: Array) -> tuple[float, float]:
         for m, e in operation.contacts:
             faces = assembly.face(m), assembly.face(e)
             found = overlap(faces[0], at[m.part], faces[1], at[e.part])
-            bare += 1.0 - found.area / min(map(face_area, faces))
-    return depth, bare
+            covered = found.area / min(map(face_area, faces))
+            bare, missed = bare + 1.0 - covered, missed + (covered < _COVERED)
+    return Crowding(missed, depth, bare)
 
 
 def places(goal: Array) -> Iterator[Array]:
@@ -58,7 +69,7 @@ def places(goal: Array) -> Iterator[Array]:
 def least_crowded(
     observation: Observation, goals: Array, doubted: tuple[int, ...], solve: Callable[[Array], Array | None]
 ) -> Array | None:
-    """Goals at which parts are out of each other's way, as far as places that are tried allow.
+    """Goals at which parts touch that should, and no others, as far as places that are tried allow.
 
     Args:
         goals: (n, 4, 4), consistent.
@@ -66,11 +77,11 @@ def least_crowded(
         solve: Goals as they are inferred, (n, 4, 4) -> consistent goals, or None where there are none.
 
     Returns:
-        None if the given goals are as good as any that were tried, or nobody is in the way.
+        None if the given goals are as good as any that were tried, or nothing is wrong with them.
     """
     best, found = crowding(observation, goals), None
     for k in doubted:
-        if best[0] == 0.0:
+        if best.missed == 0 and best.depth == 0.0:
             break
         base = goals if found is None else found
         for T in places(base[k]):

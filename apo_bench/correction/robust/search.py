@@ -101,9 +101,10 @@ class Search:
         return min(several, key=lambda states: _Rest(self._case, states).disagreement())
 
     def _smallest(self, start: States) -> Hypothesis | None:
-        """The likeliest of the smallest sets whose test holds; if none does, of all that were solved."""
+        """The likeliest of the smallest sets, or single relations, whose test holds; else of all that were solved."""
+        tried = [self._try(start, (relation,)) for relation in self._relations(start)]
         for sets in self._sets(start):
-            tried = [self._try(states) for states in sets]
+            tried += [self._try(states) for states in sets]
             held = [one for one in tried if one.p_value >= self._level]
             if held:
                 return min(held, key=_badness)
@@ -147,26 +148,26 @@ class Search:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
         while True:
             near = [self._try(states, found.dropped) for states in _near(found.states)]
-            near += [self._try(states, (relation,)) for states, relation in self._relations(found)]
+            near += [self._try(states, (relation,)) for states, relation in self._instead(found)]
             best = min(near, key=_badness, default=found)
             if not best.badness < found.badness:
                 return found
             found = best
 
-    def _relations(self, found: Hypothesis) -> Iterator[tuple[States, str]]:
+    def _instead(self, found: Hypothesis) -> Iterator[tuple[States, str]]:
         """A relation in place of an operation that is in doubt and that it depends on."""
-        if found.dropped:
-            return
-        assembly = self._case.observation.assembly
-        letters = pattern(assembly).letters - len(assembly.solids)
-        for k, state in enumerate(found.states):
-            if not state or all(one == INLIER for one in state):
-                continue
+        doubted = [k for k, state in enumerate(found.states) if any(one != INLIER for one in state)]
+        for k in () if found.dropped else doubted:
             states = changed(found.states, (k,), (self._believed(k),))
-            rest = _Rest(self._case, states)
-            for i, arc in enumerate(assembly.arcs()):
-                if (letters[list(arc)] == k).any() and rest.agreement((), arc) >= _LENIENT:
-                    yield states, f"R{i + 1}"
+            yield from ((states, relation) for relation in self._relations(states, k))
+
+    def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
+        """Relations, or those that depend on an operation, without which the rest agrees."""
+        assembly, rest = self._case.observation.assembly, _Rest(self._case, states)
+        letters = pattern(assembly).letters - len(assembly.solids)
+        for i, arc in enumerate(assembly.arcs()):
+            if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:
+                yield f"R{i + 1}"
 
 
 def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:

@@ -28,6 +28,8 @@ _MOST_TOGETHER = 4
 """Of more views than this only those that agree are believed together."""
 _AGREE = 50.0
 """Views whose difference is longer than this, squared and in standard deviations, are not inliers both."""
+_IMPOSSIBLE = 100.0
+"""States that are less likely than the likeliest by so much in -2 log are not looked at."""
 _TURNS = 5
 
 
@@ -85,7 +87,8 @@ def merged(views: Sequence[View], state: State, model: OutlierModel) -> Merged:
 
 
 def beliefs(views: Sequence[View], model: OutlierModel) -> list[tuple[float, State]]:
-    """States of the views of one operation without broad ones, each with its surprise, the likeliest first.
+    """States of the views of one operation without broad ones, each with its surprise, the likeliest first;
+    those that are out of the question are left out.
 
     Of equally likely ones that which believes the latest view: an earlier one was looked at again for a reason.
     """
@@ -99,7 +102,8 @@ def beliefs(views: Sequence[View], model: OutlierModel) -> list[tuple[float, Sta
     for group in groups:
         state = tuple(INLIER if i in group else GROSS for i in range(m))
         found.append((round(merged(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
-    return [(surprise, state) for surprise, _, state in sorted(found)]
+    likely = min(found)[0] + _IMPOSSIBLE
+    return [(surprise, state) for surprise, _, state in sorted(found) if surprise < likely or set(state) == {GROSS}]
 
 
 def _agree(a: View, b: View) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar, final
@@ -10,6 +10,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.outlier_model import measured_rates
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -86,9 +87,10 @@ class Empirical:
         if len(sample.outliers):
             errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
         missed = chance[:, 2] < sample.missed
-        return observe_in_ray_frames(
+        made = observe_in_ray_frames(
             self.camera, self.level, demonstration, assembly, sign * errors, sample.covariance, missed
         )
+        return replace(made, outliers=measured_rates(sample.gross))
 
 
 def empirical_noise(path: Path, level: Level) -> Empirical:

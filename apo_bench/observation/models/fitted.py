@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.outlier_model import measured_rates
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -55,7 +56,7 @@ class Fitted:
 
     Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
     changes which operations are outliers or missed, but at level 0 all is seen as shown. The covariance is that of
-    inliers; an observation does not know which of its goals are outliers, and does not state them.
+    inliers; an observation does not know which of its goals are outliers, only how often there are any.
     """
 
     measured: MeasuredNoise
@@ -91,9 +92,10 @@ class Fitted:
         gross, chance = _gross(measured, n, rng), rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
-        return observe_in_ray_frames(
+        made = observe_in_ray_frames(
             self.camera, self.level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
+        return replace(made, outliers=measured_rates(measured.outliers))
 
 
 def check_measured_level(level: Level, covariance: Array) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Demonstration, Observation, Poses
+from apo_bench.assembly.outlier_model import measured_rates
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -81,7 +82,8 @@ class Outliers:
         goals, covariance = made.goals.copy(), made.covariance.copy()
         goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
-        return replace(made, goals=goals, covariance=covariance, seen=~missed)
+        stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
+        return replace(made, goals=goals, covariance=covariance, seen=~missed, outliers=stated)
 
 
 def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:

@@ -12,6 +12,7 @@ from apo_bench.assembly.goals import Demonstration
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.correctors import correct
+from apo_bench.correction.posterior import contains_truth
 from apo_bench.correction.robust.hypotheses import Case, hypothesis
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
@@ -20,6 +21,7 @@ from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.relations import culprit, make_relations, with_relations
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.pose_error import goal_errors
@@ -113,6 +115,15 @@ def test_the_inferred_goal_of_a_last_operation_that_contacts_fix_is_the_true_one
     assert not looking_away(scenario.assembly, layout.start, observation.goals).any()
 
 
+def test_planes_that_are_parallel_but_for_noise_do_not_say_where_they_meet():
+    """The stick lies in two slots that were seen a little turned; along them only the middles of faces say where."""
+    for seed in range(4):
+        observation, truth = look("vanished_fixture", seed), shown("vanished_fixture", seed)[1].goals
+        k = len(truth) - 1
+        found = inferred_goals(astray(observation, k, seed), [k]).goals[k]
+        assert np.linalg.norm(found[:3, 3] - truth[k][:3, 3]) < 0.03
+
+
 def test_an_operation_of_which_nothing_is_told_stays_unseen():
     scenario, _, _ = shown("block_on_block", 0)
     operations = [replace(one, contacts=()) for one in scenario.assembly.operations]
@@ -154,13 +165,55 @@ def test_parts_of_which_too_little_was_seen_are_beside_the_others():
     observation = astray(look("carried_bridge", 7, 0.5), 1)
     found = contact_robust(observation)
     assert found.ok
-    assert crowding(observation, found.goals)[0] == 0.0
+    assert crowding(observation, found.goals)[:2] == (0, 0.0)
 
 
 @pytest.mark.parametrize("wrong", [{"gross": 0.0}, {"gross": 0.7, "broad": 0.4}, {"times": 1.0}, {"relation": 1.0}])
 def test_a_model_of_outliers_that_makes_no_sense_is_refused(wrong):
     with pytest.raises(InputError, match=r"was given|were given"):
         OutlierModel(**wrong)
+
+
+def test_what_contacts_fix_is_certain_and_what_they_leave_free_unknown():
+    """The stick of the last operation, left out, may lie anywhere along the slots."""
+    _, layout, _ = shown("vanished_fixture", 2)
+    observation = astray(look("vanished_fixture", 2), 4)
+    found = correct(observation, "contact-robust")
+    assert found.left_out == (4,)
+    deviation = np.sqrt(np.linalg.eigvalsh(found.covariance[4][:3, :3]))
+    assert deviation[-1] == pytest.approx(0.05, rel=0.05)
+    assert deviation[0] < 0.002
+    assert contains_truth(observation, found, layout.goals)
+    assert not contains_truth(observation, replace(found, believed=None), layout.goals)
+
+
+def test_a_relation_may_be_to_blame_in_place_of_an_observation():
+    """One wall of the slot is 10 mm off its place: all other contacts of the stick agree with where it was seen."""
+    observation = look("vanished_fixture", 5)
+    wrong = with_relations(
+        observation, make_relations("shifted:10"), shown("vanished_fixture", 5)[1].goals, np.random.default_rng(1)
+    )
+    found = correct(wrong, "contact-robust")
+    assert found.ok
+    assert found.dropped == (culprit(observation.assembly, wrong.assembly),)
+    assert found.left_out == ()
+    assert f"; left out {found.dropped[0]}" in found.sentence
+    lonely = correct(astray(look("block_on_block", 5), 1), "contact-robust")
+    assert lonely.left_out == (1,)
+    assert lonely.sentence.endswith("; an observation is to blame with > 0.99, a relation (R2) with < 0.01")
+
+
+def test_rates_are_those_that_the_observation_states():
+    """A noise that has no gross errors, but one in two that is a hundred times as large."""
+    observation = look("stick_in_tower", 5, 0.2)
+    goals = np.array(observation.goals)
+    goals[-1] = goals[-1] @ pose.exp(0.02 * np.array([1.0, -1.0, 1.0, 10.0, 10.0, -10.0]))
+    observation = replace(observation, goals=goals)
+    assert correct(observation, "contact-robust").left_out == (2,)
+    known = replace(observation, outliers=OutlierModel(0.001, 0.49, 100.0))
+    found = correct(known, "contact-robust")
+    assert found.left_out == ()
+    assert "seen badly: operation 3" in found.sentence
 
 
 def test_of_many_operations_sets_grow_one_at_a_time(monkeypatch):
