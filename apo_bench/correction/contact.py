@@ -111,8 +111,8 @@ class ContactCorrector:
         asked = problem(observation, self.chosen_solver())
         kept = asked.without(dropped)
         solved = asked.solve(kept)
-        test = replace(solved.test, level=self.level)
-        return self._report(asked, solved, kept, test, test, dropped)
+        test, before_m = replace(solved.test, level=self.level), largest(asked.gaps(observation.goals))
+        return opposing(observation, self._report(asked, solved, kept, test, test, dropped, before_m))
 
     def chosen_solver(self) -> Solver:
         """What finds the nearest goals here."""

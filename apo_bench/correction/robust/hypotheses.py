@@ -30,7 +30,6 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
 _as_begun = ContactCorrector("apply", elsewhere=False)
-"""Goals of operations that are left out come from contacts already."""
 States = tuple[State, ...]
 """Those of the views of each operation."""
 UNKNOWN = np.diag(np.repeat([0.05, 0.5], 3) ** 2)
@@ -128,7 +127,9 @@ def unbelieved(states: States) -> tuple[int, ...]:
 def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
     """Solve for the goals that are most likely with these states, and without these relations."""
     believed = believed_observation(case, states)
-    return Hypothesis(case, states, dropped, believed, _corrected(believed, dropped))
+    trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
+    made = contact_apply(believed) if trusted else _corrected(believed, dropped)
+    return Hypothesis(case, states, dropped, believed, made)
 
 
 def believed_observation(case: Case, states: States) -> Observation:
@@ -160,4 +161,5 @@ def soft_deviation(observation: Observation) -> Array:
 
 
 def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:
-    return contact_apply.leaving_out(observation, dropped) if dropped else contact_apply(observation)
+    """Without other starts: what is not believed is where contacts say already."""
+    return _as_begun.leaving_out(observation, dropped) if dropped else _as_begun(observation)
