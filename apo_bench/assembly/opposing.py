@@ -14,8 +14,9 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
 
-OPPOSING = -0.5
-"""Cosine between the normals of two faces that look at each other, at most."""
+OPPOSING = -0.9
+"""Cosine between the normals of two faces that look at each other, at most: what contacts leave open tilts faces by a
+few degrees."""
 
 
 def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly.opposing import looking_away
+from apo_bench.assembly.opposing import OPPOSING, looking_away
 from apo_bench.assembly.placement import placements
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
@@ -39,7 +39,7 @@ def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name
         for m, e in operation.contacts:
             i = next(i for i, r in enumerate(assembly.relations()) if r.contact == (m, e) and r.made == k)
             cosine = (at[m.part][:3, :3] @ assembly.face(m).normal) @ (at[e.part][:3, :3] @ assembly.face(e).normal)
-            assert both[1, i] == (cosine > -0.5)
+            assert both[1, i] == (cosine > OPPOSING)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
