@@ -47,12 +47,16 @@ def turned_far(observed: Array, goals: Array) -> NDArray[np.bool_]:
 def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
     """A problem that begins where the nearest solution is found, and that; both as given if no other start is better.
 
+    Where faces look at each other nearby and contacts do not hold, they contradict each other wherever one begins.
+
     Args:
         first: What comes of beginning with what was seen.
     """
     observed, every = asked.observation.goals, np.ones(len(asked.exact), dtype=np.bool_)
-    usable = _holds(asked, first)
-    if (usable and not turned_far(observed, first.found.goals)) or 6 * len(observed) > LARGEST_POSTERIOR:
+    usable, far = _holds(asked, first), bool(turned_far(observed, first.found.goals))
+    if not far and (usable or _faces_oppose(asked, observed, first.found.goals)):
+        return asked, first
+    if 6 * len(observed) > LARGEST_POSTERIOR:
         return asked, first
     usable = usable and _is_flush(asked, first)
     length = float(first.found.z @ first.found.z) * _SHORTER if usable else np.inf
@@ -78,9 +82,14 @@ def turned_words(asked: Problem, goals: Array) -> str:
 
 def _holds(asked: Problem, solved: Solved) -> bool:
     """Whether every contact holds with faces that look at each other."""
-    observation, found = asked.observation, solved.found
-    holds = found.at_rest and found.finite and largest(solved.gaps) <= observation.gap_m
-    return bool(holds and not looking_away(observation.assembly, observation.start, found.goals).any())
+    found = solved.found
+    holds = found.at_rest and found.finite and largest(solved.gaps) <= asked.observation.gap_m
+    return bool(holds and _faces_oppose(asked, found.goals))
+
+
+def _faces_oppose(asked: Problem, *goals: Array) -> bool:
+    """Whether the faces of every contact look at each other, at each of some goals."""
+    return not looking_away(asked.observation.assembly, asked.observation.start, np.array(goals)).any()
 
 
 def _is_flush(asked: Problem, solved: Solved) -> bool:
