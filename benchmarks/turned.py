@@ -1,5 +1,5 @@
 """What do correctors make of a part that was seen turned? `python benchmarks/turned.py [--draws N] [--only NAME,..]`
-(half an hour for the 10,000 draws that are the default).
+(a quarter of an hour on a quiet core for the 10,000 draws that are the default).
 
 Every draw takes the next scenario and, all of these done, the next corrector. A layout is drawn and its consistent
 goals are seen with 1 mm and 1 degree of noise; one operation, drawn too, is turned by 90, 135 or 180 degrees about the
