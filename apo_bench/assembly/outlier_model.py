@@ -23,7 +23,7 @@ class OutlierModel:
     broad: float = 0.03
     """Part that is seen with `times` the stated deviation."""
     times: float = 10.0
-    relation: float = 0.01
+    relation: float = 0.001
     """Part of the relations that are wrong."""
 
     def __post_init__(self) -> None:

@@ -124,7 +124,8 @@ def correction_length(
     if holds and not slack_m.any():
         return float(found.z @ found.z), freedom, None
     if holds and correlated is not None:
-        return float(softened_length(found.z[None], found.Jt[None], correlated)[0]), freedom, None
+        Jt = found.Jt if isinstance(found.Jt, np.ndarray) else found.Jt.toarray()
+        return float(softened_length(found.z[None], Jt[None], correlated)[0]), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
     relaxed = nearest_goals(system, observed, L, soft, begin)
     asked = soft > 0.0

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
+from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -25,6 +27,10 @@ PLAN = "apo-bench/plan/2"
 
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 
+OUTLIER_KEYS = MappingProxyType(
+    {"gross_rate": "gross", "broad_rate": "broad", "broad_times": "times", "wrong_relation_rate": "relation"}
+)
+"""Key of a form -> field of `OutlierModel`."""
 Form = dict[str, Any]
 """What `json` can write."""
 
@@ -51,6 +57,7 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         "gap_mm": observation.gap_m * 1e3,
         "play_mm": observation.play_m * 1e3,
         "operations": _operations_form(observation.assembly, observation.goals, extra),
+        **_outliers_form(observation.outliers),
     }
 
 
@@ -91,6 +98,12 @@ def _poses_form(poses: Poses) -> Form:
 
 def _covariance_form(C: Array) -> list[list[float]]:
     return (C * np.outer(_TO_MM_DEG, _TO_MM_DEG)).tolist()
+
+
+def _outliers_form(outliers: OutlierModel | None) -> Form:
+    if outliers is None:
+        return {}
+    return {"outliers": {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()}}
 
 
 def _operations_form(assembly: Assembly, goals: Array, extra: list[Form]) -> list[Form]:

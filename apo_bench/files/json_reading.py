@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
+from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.schedule import REMEDY, schedule_fault
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
-from apo_bench.files.json_forms import DEMONSTRATION, OBSERVATION, PLAN
+from apo_bench.files.json_forms import DEMONSTRATION, OBSERVATION, OUTLIER_KEYS, PLAN
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode, read_json
@@ -44,9 +45,9 @@ def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> De
 def read_json_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
     """An observation from its file, measured or written by `write_form`.
 
-    `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`) and `seen`
-    (default: true) may be left out. Instead of `covariance_mm_deg`, `deviation_mm` and `deviation_deg` state one
-    standard deviation for the three directions and one for the three turns.
+    `start` and `gap_mm` (default: the scenario's), `play_mm` (default: the scenario's `clearance_mm`), `outliers`
+    (default: not known) and `seen` (default: true) may be left out. Instead of `covariance_mm_deg`, `deviation_mm` and
+    `deviation_deg` state one standard deviation for the three directions and one for the three turns.
 
     Args:
         scenario: The scenario the file must be of; by default the one it names, where a relative path to a
@@ -66,7 +67,7 @@ def read_json_observed(
     Args:
         assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.
     """
-    root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm", "play_mm"))
+    root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm", "play_mm", "outliers"))
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], found.assembly, (), stated)
@@ -78,6 +79,7 @@ def read_json_observed(
         seen=np.array([entry["seen"].flag() if "seen" in entry else True for entry in entries]),
         gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else found.gap_mm * 1e-3,
         play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
+        outliers=_outliers(root["outliers"]) if "outliers" in root else None,
     )
     complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
     return observation, not complete
@@ -94,6 +96,15 @@ def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
         raise InputError(f"{path}, schedule: it {wrong}; {REMEDY}.")
     targets = np.array([T for _, T in steps] or goals)
     return Plan(found.assembly, _poses(root["start"], found), goals, schedule, targets)
+
+
+def _outliers(node: JsonNode) -> OutlierModel:
+    """How often observations are worse than they state; what is not said is as usual."""
+    given = node.fields((), tuple(OUTLIER_KEYS))
+    try:
+        return OutlierModel(**{OUTLIER_KEYS[key]: value.number(0.0) for key, value in given.items()})
+    except InputError as error:
+        raise InputError(f"{node.file}, {node.key}: {error}") from error
 
 
 def _own_start(scenario: Scenario) -> Poses:

@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.equations import equations, pattern
-from apo_bench.assembly.goals import Demonstration
+from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.correction.consistency import fit_deviation, softened_length
 from apo_bench.correction.contact import contact_refuse
+from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.play import fit_covariance, plays
 from apo_bench.correction.problem import problem
 from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
+from benchmarks.corrector_bench.draws import draw
+from benchmarks.corrector_bench.problems import chain
 from tests.correction.robust.test_robust import SCENARIOS, look, shown
 
 PLAY_M = 0.25e-3
@@ -58,6 +61,17 @@ def test_faces_that_look_opposite_ways_are_off_by_the_same():
     slot, other = number["stick.nz on castle1.sfl"], number["stick.nz on castle2.sfl"]
     assert (S[up, up], S[up, down], S[down, slot]) == pytest.approx((1.0, -1.0, 1.0))
     assert S[slot, other] == pytest.approx(2.0)
+
+
+def test_many_operations_that_fit_are_corrected():
+    """Ten operations: equations are sparse, what play does to them together is not."""
+    of = chain(6)
+    assembly = replace(of.assembly, operations=of.assembly.operations[:-1])
+    seen = draw(of, "2/1", 0)
+    observation = Observation(assembly, of.start, seen.seen[:10], seen.covariance[:10], np.ones(10, bool), 1e-4, PLAY_M)
+    found = correct(observation)
+    assert found.ok
+    assert found.test.passes
 
 
 def test_the_length_that_play_leaves_is_that_of_soft_contacts():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Step
+from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.errors import InputError
 from apo_bench.files import json_forms as files
 from apo_bench.files import json_reading
@@ -49,6 +51,16 @@ def read(tmp_path: Path, document: Any, scenario: Scenario | None = SCENARIO) ->
     path = tmp_path / "seen.json"
     path.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
     return json_reading.read_json_observation(path, scenario)
+
+
+def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None:
+    stated = replace(observation(), outliers=OutlierModel(0.24, 0.05, 8.0, 0.002))
+    assert read(tmp_path, files.observation_form(stated, "stick_in_tower")).outliers == stated.outliers
+    assert read(tmp_path, form()).outliers is None
+    some = read(tmp_path, form() | {"outliers": {"gross_rate": 0.3}})
+    assert some.outliers == OutlierModel(0.3)
+    with pytest.raises(InputError, match=r"seen\.json, outliers: rates of 1\.5 gross"):
+        read(tmp_path, form() | {"outliers": {"gross_rate": 1.5}})
 
 
 @QUICK

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.outlier_model import LEAST
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -18,6 +19,7 @@ from apo_bench.observation.models.bias import Bias, BiasView
 from apo_bench.observation.models.camera import DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
 from apo_bench.observation.models.correlated import CORRELATION, Correlated
 from apo_bench.observation.models.heavy_tailed import FREEDOM, HeavyTailed
+from apo_bench.observation.models.isotropic import Isotropic
 from apo_bench.observation.models.outliers import MISSES, OUTLIERS, TIMES, UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
@@ -129,6 +131,15 @@ def test_outliers_and_misses_are_as_frequent_and_as_large_as_declared() -> None:
     for chosen, times in ((seen & ~gross, 1.0), (seen & gross, TIMES)):
         rms = np.sqrt(np.mean(unit[chosen] ** 2))
         assert abs(rms / times - 1) < 5 / np.sqrt(12 * chosen.sum())
+
+
+def test_how_often_there_are_outliers_is_stated() -> None:
+    stated = see(Outliers(Level(1.0, 1.0), outliers=0.2, times=8.0), 0).outliers
+    assert stated is not None
+    assert (stated.broad, stated.times) == (0.2, 8.0)
+    assert stated.gross == LEAST
+    assert see(Outliers(Level(1.0, 1.0), times=1.0), 0).outliers is None
+    assert see(Isotropic(LEVEL), 0).outliers is None
 
 
 def test_inliers_have_the_stated_covariance_and_all_errors_the_declared_one() -> None:

@@ -109,6 +109,8 @@ def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names:
     assert outliers - 0.06 < gross.mean() < outliers + 0.08
     clean, dirty = see(names[1], 0), see(names[0], 0)
     assert np.trace(dirty.covariance[dirty.seen][0]) < 2.0 * np.trace(clean.covariance[0])
+    assert dirty.outliers is not None
+    assert dirty.outliers.gross == pytest.approx(outliers)
 
 
 def test_the_choice_of_the_world_frame_does_not_count(names: tuple[str, str]) -> None:

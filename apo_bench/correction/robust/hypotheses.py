@@ -30,6 +30,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
 
 _as_begun = ContactCorrector("apply", elsewhere=False)
+_FAR_RAD = np.radians(10.0)
+"""Parts that are believed to be turned by less (a standard deviation) are not far from where they were seen: no other
+start is tried, and what is far nevertheless is an outlier."""
 States = tuple[State, ...]
 """Those of the views of each operation."""
 UNKNOWN = np.diag(np.repeat([0.05, 0.5], 3) ** 2)
@@ -128,7 +131,8 @@ def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hyp
     """Solve for the goals that are most likely with these states, and without these relations."""
     believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
-    made = contact_apply(believed) if trusted else _corrected(believed, dropped)
+    far = bool((believed.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any())
+    made = contact_apply(believed) if trusted and far else _corrected(believed, dropped)
     return Hypothesis(case, states, dropped, believed, made)
 
 

@@ -90,15 +90,15 @@ def unsure(search: Search, found: Hypothesis | None) -> tuple[int, ...]:
 
 def with_room(found: Hypothesis) -> Hypothesis:
     """A hypothesis whose left-out operations lead to where there is room for their parts."""
-    unknown = found.left_out
-    if not unknown or not np.isfinite(found.badness):
+    unknown, covariance = found.left_out, found.correction.covariance
+    if not unknown or covariance is None or not np.isfinite(found.badness):
         return found
 
     def solve(goals: Array) -> Array | None:
         made = found.at(goals, unknown).correction
         return made.goals if made.ok and found.stands_at(made.goals) else None
 
-    better = least_crowded(found.observation, found.correction.goals, unknown, solve)
+    better = least_crowded(found.observation, found.correction.goals, covariance, unknown, solve)
     return found if better is None else found.at(better, unknown)
 
 
@@ -113,17 +113,24 @@ def _report(
     """The correction of what is believed, with what was seen at first."""
     made = found.correction
     if not found.doubts and not again:
-        return made
+        return replace(made, sentence=made.sentence + _unexplained(made))
     before = largest_gap(observation.assembly, observation.start, observation.goals)
     return replace(
         made,
-        sentence=made.sentence + _doubts(search, found) + _looks(again),
+        sentence=made.sentence + _unexplained(made) + _doubts(search, found) + _looks(again),
         gap_before_m=before if observation.seen.all() else np.nan,
         test=first.correction.test or made.test,
         test_after=made.test,
         left_out=found.left_out,
         believed=found.observation,
     )
+
+
+def _unexplained(made: Correction) -> str:
+    """What the test says that no outlier explains better."""
+    if made.test is None or made.test.passes:
+        return ""
+    return f"; the correction is longer than the stated noise explains (p = {made.test.p_value:.2g}), no outlier does"
 
 
 def _doubts(search: Search, found: Hypothesis) -> str:

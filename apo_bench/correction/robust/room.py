@@ -14,16 +14,17 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.placement import placements
-from apo_bench.correction.robust.hypotheses import UNKNOWN
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.overlap import face_area, overlap
 
-TRIED = 24
-"""Places that are tried for one operation."""
+TRIED, LEAST_TRIED = 24, 8
+"""Places that are tried for all operations together, and for each at least."""
 _COVERED = 0.02
 """Faces that touch cover at least this part of the smaller one."""
+_FREE_M, _WEIGHTS = 2e-3, np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
+"""A direction is free if the goal may be off by more than this along it, [m]; a radian weighs as much as 50 mm."""
 _DEEP_M = 5e-4
 """Parts that should not touch may be so deep in each other before another place is tried."""
 
@@ -57,22 +58,35 @@ def crowding(observation: Observation, goals: Array) -> Crowding:
     return Crowding(missed, depth, bare)
 
 
-def places(goal: Array) -> Iterator[Array]:
-    """Poses about one, (4, 4) each: spread evenly as far as an inferred goal may be off, the nearest first."""
+def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
+    """Poses about one, (4, 4) each: spread evenly over what is free of it, the nearest first.
+
+    Args:
+        covariance: (6, 6), of the body twist by which it may be wrong, [m, rad].
+    """
     from scipy.stats import norm, qmc
 
-    z = norm.ppf(qmc.Halton(6, scramble=False).random(TRIED + 1)[1:])
-    twists = z[np.argsort((z * z).sum(axis=1))] * np.sqrt(np.diag(UNKNOWN))
+    w, V = np.linalg.eigh(covariance * np.outer(_WEIGHTS, _WEIGHTS))
+    free = w > _FREE_M**2
+    if not free.any():
+        return
+    z = norm.ppf(qmc.Halton(int(free.sum()), scramble=False).random(number + 1)[1:])
+    twists = (z[np.argsort((z * z).sum(axis=1))] * np.sqrt(w[free])) @ V[:, free].T / _WEIGHTS
     yield from goal @ pose.exp(twists)
 
 
 def least_crowded(
-    observation: Observation, goals: Array, doubted: tuple[int, ...], solve: Callable[[Array], Array | None]
+    observation: Observation,
+    goals: Array,
+    covariance: Array,
+    doubted: tuple[int, ...],
+    solve: Callable[[Array], Array | None],
 ) -> Array | None:
     """Goals at which parts touch that should, and no others, as far as places that are tried allow.
 
     Args:
         goals: (n, 4, 4), consistent.
+        covariance: (n, 6, 6), of the body twists by which they may be wrong, [m, rad].
         doubted: The operations whose observation was left out.
         solve: Goals as they are inferred, (n, 4, 4) -> consistent goals, or None where there are none.
 
@@ -84,7 +98,7 @@ def least_crowded(
         if best.missed == 0 and best.depth == 0.0:
             break
         base = goals if found is None else found
-        for T in places(base[k]):
+        for T in places(base[k], covariance[k], max(LEAST_TRIED, TRIED // len(doubted))):
             moved = np.array(base)
             moved[k] = T
             made = solve(moved)

@@ -66,7 +66,9 @@ class Search:
         if self.first.p_value >= self._level:
             return self.first
         found = self._smallest(start)
-        return None if found is None else self._refined(found)
+        if found is not None:
+            self._refined(found)
+        return min(self._known(), key=_badness, default=None)
 
     def share(self, found: Hypothesis, k: int) -> float:
         """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
@@ -144,14 +146,14 @@ class Search:
         """The likeliest state of an operation in which a view is believed."""
         return next(state for _, state in self._beliefs[k] if set(state) != {GROSS})
 
-    def _refined(self, found: Hypothesis) -> Hypothesis:
+    def _refined(self, found: Hypothesis) -> None:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
         while True:
             near = [self._try(states, found.dropped) for states in _near(found.states)]
             near += [self._try(states, (relation,)) for states, relation in self._instead(found)]
             best = min(near, key=_badness, default=found)
             if not best.badness < found.badness:
-                return found
+                return
             found = best
 
     def _instead(self, found: Hypothesis) -> Iterator[tuple[States, str]]:
