@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array, frozen
@@ -94,11 +96,21 @@ class Observation:
     """How far from nominal a contact of parts that fit may really be: their clearance per side, [m]."""
     outliers: OutlierModel | None = None
     """How often observations of this kind are worse than they say; None if that is not known."""
+    shared: tuple[SharedError, ...] = ()
+    """What errors of operations have in common, all of it within `covariance`; none: they are independent."""
+    tails: Tails | None = None
+    """How errors are distributed; None: as a Gaussian's."""
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
         object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
         object.__setattr__(self, "covariance", frozen(self.covariance, n, 6, 6))
+        object.__setattr__(self, "shared", tuple(self.shared))
+        for one in self.shared:
+            if max(one.operations, default=-1) >= n:
+                raise ValueError(f"the shared error '{one.name}' names operation {max(one.operations) + 1} of {n}")
+        if self.tails is not None and len(self.tails.frames) != n:
+            raise ValueError(f"tails of {len(self.tails.frames)} operations were given for {n}")
         object.__setattr__(self, "start", frozen_poses(self.start))
         seen = np.array(self.seen, dtype=np.bool_)
         if seen.shape != (n,):

@@ -62,7 +62,7 @@ class ContactCorrector:
             are all operations that a contact depends on; `covariance` is the posterior.
 
         Raises:
-            InputError: The covariance of an operation is not positive definite.
+            InputError: A covariance is not positive definite.
         """
         made = self.together((observation,))
         return self.given(observation, None) if made is None else made[0]
@@ -75,7 +75,7 @@ class ContactCorrector:
         """
         loops = compiled.kept_loops() if self.solver is None else None
         known = None if loops is None else layout(observations[0].assembly, observations[0].play_m)
-        if loops is None or known is None:
+        if loops is None or known is None or any(one.shared or one.tails for one in observations):
             return None
         seen = [one for one in observations if one.seen.all()]
         made = iter(correct_compiled(loops, known, seen, self.doubt == "apply", self.level, self.given))

@@ -23,7 +23,10 @@ from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.holding import Hold, by_relation, relation_holds
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, Freedom, freedom
 from apo_bench.correction.problem import problem
+from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
+from apo_bench.correction.solvers.joint import linearised_by
 from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.whitened import spread
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -105,6 +108,8 @@ class Explanation:
     redundant: int
     """Equations, three per contact, that follow from the others."""
     spectral_gap: float
+    shared: tuple[SharedEstimate, ...] = ()
+    """What is known of the errors that operations share."""
 
 
 def explain(observation: Observation, goals: Array, dropped: Collection[str] = ()) -> Explanation:
@@ -120,19 +125,23 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     n, assembly = len(goals), observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    asked = problem(replace(observation, goals=goals), nearest_goals)
+    asked = problem(replace(observation, goals=goals, shared=()), nearest_goals)
     kept = asked.exact & asked.without(tuple(dropped))
-    B = right_jacobian(pose.log(pose.inverse(observation.goals) @ goals)) @ asked.L
-    Jt = asked.compact.gathered(asked.compact.blocks(goals, B)[1])
+    xi = pose.log(pose.inverse(observation.goals) @ goals)
+    Jr = right_jacobian(xi)
+    B = Jr @ asked.L
+    _, Jt = linearised_by(asked.compact, goals, B)
     every, relations = relation_holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
     known = freedom(relations.Jt)
     if known is None:
         raise _too_many(n)
-    spread = (B @ known.free.reshape(n, 6, known.free.shape[1])).reshape(known.free.shape)
+    spans, shared = spread(B, known.free), tuple[SharedEstimate, ...]()
+    if observation.shared:
+        shared, spans = estimate_shared(observation, xi, Jr, asked.compact.among(kept))
     found = []
     for k, own in enumerate(_own(known, n)):
         block = slice(6 * k, 6 * k + 6)
-        C = spread[block] @ spread[block].T
+        C = spans[k] @ spans[k].T
         named = directions(B[k] @ own[block])
         needed = relations.holding(k, 6 - own.shape[1])
         found.append(
@@ -151,11 +160,12 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
         assembly=assembly,
         goals=goals,
         operations=tuple(found),
-        parts=_standing(assembly, observation.start, goals, B, known.free),
+        parts=_standing(assembly, observation.start, goals, B, spans),
         rank=known.rank,
         freedom=known.free.shape[1],
         redundant=known.redundant - 3 * int(np.count_nonzero(~kept)),
         spectral_gap=known.spectral_gap,
+        shared=shared,
     )
 
 
@@ -194,7 +204,7 @@ def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...
     return tuple(int(j) for j in np.flatnonzero(moved > 1e-6 * moved[k]) if j > k)
 
 
-def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Array) -> tuple[PartExplanation, ...]:
+def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: Array) -> tuple[PartExplanation, ...]:
     """Every part that was moved, at the end; its pose is a product of goals, so errors go through all of them."""
     if not len(assembly):
         return ()
@@ -202,10 +212,11 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, free: Ar
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
     found = []
     for part in last:
-        reach = _reach(words[part], stack, len(assembly.solids), B)
-        spread, unit = reach @ free, np.linalg.norm(reach, axis=1)[:, None]
-        U, w, _ = np.linalg.svd(spread / unit, full_matrices=False)
-        C = spread @ spread.T
+        reach = _reach(words[part], stack, len(assembly.solids), len(goals))
+        moved = reach.reshape(6, -1) @ spans.reshape(reach[0].size, -1)
+        unit = np.sqrt(np.square(np.swapaxes(reach, 0, 1) @ B).sum(axis=(0, 2)))[:, None]
+        U, w, _ = np.linalg.svd(moved / unit, full_matrices=False)
+        C = moved @ moved.T
         named = directions(unit * U[:, w > _ZERO])
         loose = tuple(FreeDirection(d, _deviation(C, d)) for d in named)
         placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
@@ -219,15 +230,15 @@ def _rooted(assembly: Assembly) -> dict[str, ODL]:
     return dict(replace(assembly, operations=(*starts, *assembly.operations)).odls()[-1])
 
 
-def _reach(word: ODL, stack: Array, constants: int, B: Array) -> Array:
-    """What a standard deviation of each goal makes of the body twist of a product of poses, (6, 6 n).
+def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:
+    """What the body twist of each goal makes of that of a product of poses, (6, n, 6).
 
     T exp(xi) M = T M exp(Ad(M^-1) xi), and (T exp(xi))^-1 M = T^-1 M exp(-Ad(M^-1 T) xi).
     """
-    behind, found = np.eye(4), np.zeros((len(B), 6, 6))
+    behind, found = np.eye(4), np.zeros((n, 6, 6))
     for k, inverse in reversed(word):
         behind = pose.inverse(stack[k]) @ behind if inverse else behind
         if k >= constants:
-            found[k - constants] += (-1.0 if inverse else 1.0) * pose.adjoint(pose.inverse(behind)) @ B[k - constants]
+            found[k - constants] += (-1.0 if inverse else 1.0) * pose.adjoint(pose.inverse(behind))
         behind = behind if inverse else stack[k] @ behind
-    return np.concatenate(found, axis=1)
+    return np.swapaxes(found, 0, 1)

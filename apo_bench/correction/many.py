@@ -51,6 +51,8 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
 def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
     if (made := corrector.together(observations)) is not None:
         return made
+    if any(one.shared or one.tails for one in observations):
+        return [corrector.given(one, None) for one in observations]
     goals, L = np.array([one.goals for one in observations]), np.array([scales(one.covariance) for one in observations])
     plain = equations(observations[0].assembly, observations[0].start, observations[0].goals)
     system, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)

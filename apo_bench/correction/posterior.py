@@ -12,18 +12,12 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpstrf
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
 from apo_bench.correction.solvers import sparse
-from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.manifold import NearestGoals
-from apo_bench.geometry import pose
+from apo_bench.correction.solvers.whitened import spread
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
 
 LARGEST_POSTERIOR = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
@@ -86,41 +80,5 @@ def jacobian_rank(Jt: Any) -> int:
 
 def marginals(found: NearestGoals, free: Array) -> Array:
     """The posterior covariance of the body twist of each corrected goal, (n, 6, 6), [m, rad]."""
-    spread = found.B @ free.reshape(len(found.B), 6, free.shape[1])
-    return np.asarray(spread @ np.swapaxes(spread, 1, 2))
-
-
-def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:
-    """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
-
-    The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
-    deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
-
-    Returns:
-        None if the correction states no posterior, did not converge, or nothing is free.
-    """
-    from scipy.special import chdtri
-
-    if correction.covariance is None or not correction.ok:
-        return None
-    observation = correction.believed or observation
-    L = np.linalg.cholesky(observation.covariance)
-    xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
-    system = compact_equations(
-        equations(observation.assembly, observation.start, observation.goals), len(correction.goals)
-    )
-    system = system.among(_equal(observation, correction.dropped))
-    _, blocks = system.blocks(correction.goals, right_jacobian(xi) @ L)
-    known = freedom(system.gathered(blocks))
-    if known is None or not known.free.shape[1]:
-        return None
-    free = known.free
-    true = pose.log(pose.inverse(observation.goals) @ truth)
-    off = free.T @ np.linalg.solve(L, (true - xi)[..., None]).ravel()
-    return bool(off @ off <= chdtri(free.shape[1], 1.0 - level))
-
-
-def _equal(observation: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
-    """The contacts that were equations, (c,): neither inequalities nor left out."""
-    low, high = observation.assembly.intervals(observation.play_m).T
-    return np.asarray(low == high) & observation.assembly.without(dropped)
+    spans = spread(found.B, free)
+    return np.asarray(spans @ np.swapaxes(spans, 1, 2))

@@ -25,7 +25,8 @@ from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
 from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
-from apo_bench.correction.solvers.whitened import correction_to, scales
+from apo_bench.correction.solvers.whitened import correction_to, noise_factor
+from apo_bench.correction.tailed import drawn_lengths, drawn_p_value
 from apo_bench.geometry.arrays import Array
 
 Solver = Callable[[CompactEquations, Array, Array], NearestGoals]
@@ -55,7 +56,7 @@ class Problem:
     """(c,): contacts that are equations; the others are inequalities."""
     inequalities: Inequalities
     L: Array
-    """(n, 6, 6)."""
+    """(n, 6, 6), or (n, 6, 6 n) where operations share errors."""
     slack_m: Array
     """(3 c,): what the play of parts that fit leaves, for the test."""
     correlated: Array | None
@@ -90,7 +91,7 @@ class Problem:
             touched = active_rank(found.Jt, inequalities, held)
             chi_square += float(held.z @ held.z - found.z @ found.z)
             found, freedom, gaps = held, freedom + touched, self.gaps(held.goals)
-        return Solved(found, Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL), gaps)
+        return Solved(found, self._tested(chosen, found, chi_square, freedom), gaps)
 
     def suspects(self, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
         """Relations whose contacts are `kept`, the most suspect first."""
@@ -103,9 +104,22 @@ class Problem:
     def _test(self, kept: NDArray[np.bool_]) -> Consistency:
         if kept[~self.exact].any():
             return self.solve(kept).test
-        part, _ = self._equal(kept & self.exact)
-        chi_square, freedom, _ = self._length(kept & self.exact, self._nearest(part))
-        return Consistency(chi_square, freedom, p_value(chi_square, freedom), TEST_LEVEL)
+        chosen = kept & self.exact
+        found = self._nearest(self._equal(chosen)[0])
+        chi_square, freedom, _ = self._length(chosen, found)
+        return self._tested(chosen, found, chi_square, freedom)
+
+    def _tested(self, chosen: NDArray[np.bool_], found: NearestGoals, chi_square: float, freedom: int) -> Consistency:
+        """The test of a squared length: by the chi-square distribution, or by draws where errors have tails."""
+        p, Jt = p_value(chi_square, freedom), found.Jt
+        if self.observation.tails is not None and freedom and np.isfinite(chi_square) and isinstance(Jt, np.ndarray):
+            p = drawn_p_value(drawn_lengths(self.observation, self.L, Jt, self._play(chosen)), chi_square)
+        return Consistency(chi_square, freedom, p, TEST_LEVEL)
+
+    def _play(self, chosen: NDArray[np.bool_]) -> Array | None:
+        """The covariance of the equations of the contacts that are chosen, (c,), that play causes, [m^2]."""
+        rows, S = np.repeat(chosen, 3), self.correlated
+        return S if S is None or chosen.all() else S[np.ix_(rows, rows)]
 
     def _nearest(self, part: CompactEquations, soft_m: Array | None = None) -> NearestGoals:
         """The nearest goals by some of the equations, demanded or given a standard deviation each, [m]."""
@@ -116,8 +130,7 @@ class Problem:
     def _length(self, chosen: NDArray[np.bool_], found: NearestGoals) -> tuple[float, int, NearestGoals | None]:
         """As `correction_length`, by the contacts that are chosen, (c,)."""
         part, slack_m = self._equal(chosen)
-        rows, S = np.repeat(chosen, 3), self.correlated
-        S = S if S is None or chosen.all() else S[np.ix_(rows, rows)]
+        S = self._play(chosen)
         return correction_length(part, self.observation.goals, self.L, found, slack_m, S, self.begin)
 
     def _equal(self, chosen: NDArray[np.bool_]) -> tuple[CompactEquations, Array]:
@@ -150,9 +163,9 @@ def problem(observation: Observation, solver: Solver, at: Array | None = None) -
             with; None stands for those that were seen.
 
     Raises:
-        InputError: The covariance of an operation is not positive definite.
+        InputError: A covariance is not positive definite.
     """
-    L = scales(observation.covariance)
+    L = noise_factor(observation)
     plain = equations(observation.assembly, observation.start, observation.goals if at is None else at)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     every = compact_assembly(observation.assembly, system)

@@ -16,13 +16,17 @@ import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
 DEMONSTRATION = "apo-bench/demonstration/1"
-OBSERVATION = "apo-bench/observation/1"
+OBSERVATION = "apo-bench/observation/2"
+OBSERVATION_BEFORE = "apo-bench/observation/1"
+"""Without errors that operations share."""
 PLAN = "apo-bench/plan/2"
 
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -58,6 +62,8 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         "play_mm": observation.play_m * 1e3,
         "operations": _operations_form(observation.assembly, observation.goals, extra),
         **_outliers_form(observation.outliers),
+        "shared": [_shared_form(one) for one in observation.shared],
+        **({} if observation.tails is None else {"tails": _tails_form(observation.tails)}),
     }
 
 
@@ -104,6 +110,32 @@ def _outliers_form(outliers: OutlierModel | None) -> Form:
     if outliers is None:
         return {}
     return {"outliers": {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()}}
+
+
+def _shared_form(one: SharedError) -> Form:
+    """A shared error; without a frame its twist is in the frame of each part."""
+    frame = {} if one.frame is None else {"frame": _pose_form(one.frame), "local": one.local}
+    correlation = {} if one.correlation is None else {"correlation": one.correlation.tolist()}
+    return {
+        "name": one.name,
+        "operations": [k + 1 for k in one.operations],
+        "covariance_mm_deg": _covariance_form(one.covariance),
+        **frame,
+        **correlation,
+    }
+
+
+def _tails_form(tails: Tails) -> Form:
+    """How errors are distributed: four numbers each, across and along the ray, tilt and turn about it."""
+    units = _TO_MM_DEG[[0, 0, 3, 3]]
+    return {
+        "axes": [frame.tolist() for frame in tails.frames],
+        "scales_mm_deg": (tails.scales * units).tolist(),
+        "degrees_of_freedom": tails.freedom.tolist(),
+        "deviations_mm_deg": (np.sqrt(tails.variances) * units).tolist(),
+        "limits_mm_deg": (tails.limits * units[[0, 2]]).tolist(),
+        "joined": tails.joined,
+    }
 
 
 def _operations_form(assembly: Assembly, goals: Array, extra: list[Form]) -> list[Form]:

@@ -10,16 +10,19 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.schedule import REMEDY, schedule_fault
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
-from apo_bench.files.json_forms import DEMONSTRATION, OBSERVATION, OUTLIER_KEYS, PLAN
+from apo_bench.files.json_forms import DEMONSTRATION, OBSERVATION, OBSERVATION_BEFORE, OUTLIER_KEYS, PLAN
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode, read_json
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
+_LEAST_FREEDOM = 0.4
 _DEVIATIONS = ("deviation_mm", "deviation_deg")
 _POSE = ("position_mm", "quaternion_wxyz")
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -67,10 +70,12 @@ def read_json_observed(
     Args:
         assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.
     """
-    root = _root(path, OBSERVATION, ("operations",), ("start", "gap_mm", "play_mm", "outliers"))
+    optional = ("start", "gap_mm", "play_mm", "outliers", "shared", "tails")
+    root = _root(path, OBSERVATION, ("operations",), optional, OBSERVATION_BEFORE)
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], found.assembly, (), stated)
+    shared = root["shared"].items("shared error") if "shared" in root else ()
     observation = Observation(
         assembly=found.assembly,
         start=_poses(root["start"], found) if "start" in root else _own_start(found),
@@ -80,6 +85,8 @@ def read_json_observed(
         gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else found.gap_mm * 1e-3,
         play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
         outliers=_outliers(root["outliers"]) if "outliers" in root else None,
+        shared=tuple(_shared(node, len(found.assembly)) for node in shared),
+        tails=_tails(root["tails"], len(found.assembly)) if "tails" in root else None,
     )
     complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
     return observation, not complete
@@ -112,11 +119,58 @@ def _own_start(scenario: Scenario) -> Poses:
     return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
+def _shared(node: JsonNode, n: int) -> SharedError:
+    """An error that operations share."""
+    given = node.fields(("name", "operations", "covariance_mm_deg"), ("frame", "local", "correlation"))
+    operations = tuple(entry.integer() - 1 for entry in given["operations"].items("operation"))
+    if not operations or len(set(operations)) != len(operations) or not all(0 <= k < n for k in operations):
+        given["operations"].fail(f"operations from 1 to {n}, each once, are needed")
+    if "local" in given and "frame" not in given:
+        given["local"].fail("a frame is needed with it", "state the frame, or leave this out")
+    m, correlation = len(operations), None
+    if "correlation" in given:
+        correlation = given["correlation"].numbers(m, m)
+        if np.abs(correlation - correlation.T).max() > 1e-9 or np.abs(np.diag(correlation) - 1.0).max() > 1e-9:
+            given["correlation"].fail("a symmetric matrix with 1 on its diagonal is needed")
+    return SharedError(
+        name=given["name"].text(),
+        operations=operations,
+        covariance=_covariance(given["covariance_mm_deg"], definite=False),
+        frame=_pose(given["frame"].fields(_POSE)) if "frame" in given else None,
+        local=given["local"].flag() if "local" in given else False,
+        correlation=correlation,
+    )
+
+
+def _tails(node: JsonNode, n: int) -> Tails:
+    """How errors are distributed."""
+    keys = ("axes", "scales_mm_deg", "degrees_of_freedom", "deviations_mm_deg", "limits_mm_deg", "joined")
+    given = node.fields(keys)
+    units = _TO_MM_DEG[[0, 0, 3, 3]]
+    axes = given["axes"].numbers(n, 3, 3)
+    if np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) > 1e-6:
+        given["axes"].fail("a rotation matrix for each operation is needed")
+    found = {key: given[key].numbers(2 if key == "limits_mm_deg" else 4) for key in keys[1:-1]}
+    for key, numbers in found.items():
+        if not (numbers > 0.0).all() or (key == "degrees_of_freedom" and numbers.min() < _LEAST_FREEDOM):
+            given[key].fail(f"numbers above {_LEAST_FREEDOM if key == 'degrees_of_freedom' else 0.0:g} are needed")
+    return Tails(
+        frames=axes,
+        scales=found["scales_mm_deg"] / units,
+        freedom=found["degrees_of_freedom"],
+        variances=(found["deviations_mm_deg"] / units) ** 2,
+        limits=found["limits_mm_deg"] / units[[0, 2]],
+        joined=given["joined"].flag(),
+    )
+
+
 def _root(
-    path: str | Path, schema: str, required: tuple[str, ...], optional: tuple[str, ...]
+    path: str | Path, schema: str, required: tuple[str, ...], optional: tuple[str, ...], before: str = ""
 ) -> Mapping[str, JsonNode]:
+    """The fields of a file; `before` is the schema of an older form that is still read."""
     document = read_json(path)
-    if isinstance(document.value, dict) and "schema" in document.value and document.value["schema"] != schema:
+    stated = document.value.get("schema", schema) if isinstance(document.value, dict) else schema
+    if stated != schema and stated != (before or schema):
         document.child(document.value["schema"], "schema").fail(f'"{schema}" is needed')
     return document.fields(("schema", "scenario", *required), optional)
 

@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, Fitted, MeasuredNoise
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, ConstantError, Fitted, MeasuredNoise, ViewNoise
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.observation.presets import noise_path
 from apo_bench.records.short_names import RESIDUALS
 from apo_bench.scenario.keys import read_pose
 
-_SCHEMA = "apo-bench/noise/1"
+_SCHEMA = "apo-bench/noise/2"
+_BEFORE = "apo-bench/noise/1"
+"""Without errors of the whole view."""
 _FARTHEST_MM = 1e5
+_LARGEST_VIEW_MM, _LARGEST_VIEW_DEG = 200.0, 45.0
 _HUGE = 1e300
 """Degrees of freedom beyond are infinitely many."""
 
@@ -40,10 +47,10 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
 def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     """What a noise file states, and the camera it names, else the default one."""
     root = read_toml(path, "noise file")
-    if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) != _SCHEMA:
+    if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) not in (_SCHEMA, _BEFORE):
         root.child(root.value["schema"], "schema").fail(f'"{_SCHEMA}" is needed')
     required = ("schema", "source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
-    top = root.fields(required, ("camera",))
+    top = root.fields(required, ("camera", "view", "constant"))
     shift, turn = _split(top["shift"], "mm", 1000.0), _split(top["turn"], "deg", 180.0)
     measured = MeasuredNoise(
         source=top["source"].text(),
@@ -52,6 +59,8 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
         missed=_number(top["missed_rate"], 0.0, 1.0),
         outliers=_number(top["outlier_rate"], 0.0, 1.0),
         farthest_mm=_number(top["outlier_farthest_mm"], shift.limit, _FARTHEST_MM),
+        view=_view(top["view"]) if "view" in top else None,
+        constant=_constant(top["constant"]) if "constant" in top else None,
     )
     return measured, Camera(read_pose(top["camera"])) if "camera" in top else Camera()
 
@@ -67,6 +76,8 @@ def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
         [f"outlier_farthest_mm = {measured.farthest_mm:.5g}"],
         _split_lines("shift", measured.shift_mm, "mm"),
         _split_lines("turn", measured.turn_deg, "deg"),
+        [] if measured.view is None else _view_lines(measured.view),
+        [] if measured.constant is None else _constant_lines(measured.constant),
     )
     return "\n".join(line for lines in head for line in lines) + "\n"
 
@@ -77,6 +88,50 @@ def _split_lines(name: str, split: Split, unit: str) -> list[str]:
         lines.append(f"{direction}_scale_{unit} = {tail.scale:.5g}")
         lines.append(f"{direction}_degrees_of_freedom = {tail.freedom:.5g}")
     return lines
+
+
+def _view_lines(view: ViewNoise) -> list[str]:
+    return [
+        *("", "[view]  # one error for each demonstration, about the middle of what is seen"),
+        *(f"shift_mm = {view.shift_mm:.5g}", f"turn_deg = {view.turn_deg:.5g}"),
+    ]
+
+
+def _constant_lines(constant: ConstantError) -> list[str]:
+    packed = pose.pack(constant.frame)
+    shift, turn = constant.twist[:3] * 1e3, np.degrees(constant.twist[3:])
+    return [
+        *("", "[constant]  # what is seen is displaced by this, in this frame"),
+        *(f"shift_mm = {_listed(shift)}", f"turn_deg = {_listed(turn)}"),
+        *(f"position_mm = {_listed(packed[:3] * 1e3)}", f"quaternion_wxyz = {_listed(packed[3:])}"),
+    ]
+
+
+def _listed(numbers: Array) -> str:
+    return f"[{', '.join(f'{x:.9g}' for x in numbers)}]"
+
+
+def _view(node: JsonNode) -> ViewNoise:
+    keys = node.fields(("shift_mm", "turn_deg"))
+    return ViewNoise(
+        _number(keys["shift_mm"], 0.0, _LARGEST_VIEW_MM), _number(keys["turn_deg"], 0.0, _LARGEST_VIEW_DEG)
+    )
+
+
+def _constant(node: JsonNode) -> ConstantError:
+    keys = node.fields(("shift_mm", "turn_deg", "position_mm", "quaternion_wxyz"))
+    shift, turn, q = keys["shift_mm"].numbers(3), keys["turn_deg"].numbers(3), keys["quaternion_wxyz"].numbers(4)
+    if np.abs(shift).max() > _LARGEST_VIEW_MM:
+        keys["shift_mm"].fail(f"numbers from {-_LARGEST_VIEW_MM:g} to {_LARGEST_VIEW_MM:g} are needed")
+    if np.abs(turn).max() > _LARGEST_VIEW_DEG:
+        keys["turn_deg"].fail(f"numbers from {-_LARGEST_VIEW_DEG:g} to {_LARGEST_VIEW_DEG:g} are needed")
+    if abs(np.linalg.norm(q) - 1.0) > 1e-3:
+        keys["quaternion_wxyz"].fail("a quaternion of length 1 (within 0.001) is needed", "divide it by its length")
+    place = keys["position_mm"].numbers(3)
+    if np.abs(place).max() > _FARTHEST_MM:
+        keys["position_mm"].fail(f"numbers of at most {_FARTHEST_MM:g} are needed")
+    twist = np.concatenate([shift * 1e-3, np.radians(turn)])
+    return ConstantError(twist, pose.unpack(np.concatenate([place * 1e-3, q])))
 
 
 def _split(node: JsonNode, unit: str, largest: float) -> Split:

@@ -13,6 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.shared_error import joint_covariance
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -70,8 +71,6 @@ class Belief:
 
 
 def initial_belief(observation: Observation) -> Belief:
-    """What an observation says before any contact is known: goals are wrong independently of each other."""
-    n = len(observation.goals)
-    covariance = np.zeros((n, 6, n, 6))
-    covariance[np.arange(n), :, np.arange(n)] = observation.covariance
-    return Belief(observation.assembly, observation.start, observation.goals, covariance.reshape(6 * n, 6 * n))
+    """What an observation says before any contact is known."""
+    covariance = joint_covariance(observation.goals, observation.covariance, observation.shared)
+    return Belief(observation.assembly, observation.start, observation.goals, covariance)

@@ -11,6 +11,7 @@ from apo_bench.assembly.topology import spelled
 from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.holding import Hold
+from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.show.words import listed_words, with_article
@@ -30,8 +31,9 @@ def total(found: Explanation) -> str:
 
 
 def sentences(found: Explanation) -> list[str]:
-    """One for each operation: what is fixed by which parts, and what is free."""
-    return [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(found, o.free)}" for o in found.operations]
+    """One for each operation: what is fixed by which parts, and what is free; then one for each shared error."""
+    operations = [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(found, o.free)}" for o in found.operations]
+    return operations + [_shared(one) for one in found.shared]
 
 
 def explanation_tables(found: Explanation) -> list[Any]:
@@ -62,7 +64,25 @@ def explanation_form(scenario: str, found: Explanation) -> dict[str, Any]:
         "rank": found.rank,
         "freedom": found.freedom,
         "redundant": found.redundant,
+        "shared": [_shared_form(one) for one in found.shared],
         "spectral_gap": found.spectral_gap if np.isfinite(found.spectral_gap) else None,
+    }
+
+
+def _shared(one: SharedEstimate) -> str:
+    """`camera: seen off by (-0.30 +- 0.50, 1.90 +- 0.30, 0.10 +- 0.40) mm and (..) deg, in its frame`."""
+    numbers = zip(one.twist * _TO_MM_DEG, one.deviations * _TO_MM_DEG, strict=True)
+    each = [f"{x:.2f} +- {s:.2f}" for x, s in numbers]
+    frame = "in the frame of the part" if one.error.frame is None else "in its frame"
+    return f"{one.error.name}: seen off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
+
+
+def _shared_form(one: SharedEstimate) -> dict[str, Any]:
+    return {
+        "name": one.error.name,
+        "operations": [k + 1 for k in one.error.operations],
+        "twist_mm_deg": (one.twist * _TO_MM_DEG).tolist(),
+        "covariance_mm_deg": covariance_form(one.covariance),
     }
 
 

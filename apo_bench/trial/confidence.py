@@ -6,7 +6,7 @@ import math
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.correction.posterior import contains_truth
+from apo_bench.correction.region import contains_truth
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit
 from apo_bench.records.row import Row

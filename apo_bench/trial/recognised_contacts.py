@@ -48,7 +48,9 @@ def _again(observation: Observation, first: Recognised) -> Recognised:
     correction = correct(replace(observation, assembly=first.assembly), "contact")
     if not correction.ok or correction.covariance is None:
         return first
-    corrected = replace(observation, goals=correction.goals, covariance=floored(correction.covariance))
+    corrected = replace(
+        observation, goals=correction.goals, covariance=floored(correction.covariance), shared=(), tails=None
+    )
     return recognise(corrected, first_seen=observation.goals)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
-from apo_bench.correction.posterior import contains_truth
+from apo_bench.correction.region import contains_truth
 from apo_bench.geometry.arrays import Array
 from benchmarks.corrector_bench.draws import Draw, draw, factors
 from benchmarks.corrector_bench.measures import free_basis, lengths, spread

@@ -16,6 +16,8 @@ from hypothesis import strategies as st
 
 from apo_bench.assembly.goals import Demonstration, Observation, Plan, Step
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.shared_error import SharedError, first_order
+from apo_bench.assembly.tails import Tails
 from apo_bench.errors import InputError
 from apo_bench.files import json_forms as files
 from apo_bench.files import json_reading
@@ -44,7 +46,18 @@ def observation(seed: int = 0) -> Observation:
 
 
 def form() -> dict[str, Any]:
-    return files.observation_form(observation(), "stick_in_tower")
+    return files.observation_form(with_shared(observation()), "stick_in_tower")
+
+
+def with_shared(seen: Observation) -> Observation:
+    """With an error of each kind."""
+    C = np.diag(np.repeat([1e-4, 2e-3], 3) ** 2)
+    P = pose.at((0.1, 0.2, 0.9), (150.0, 20.0, -35.0))
+    camera = SharedError("camera", (0, 2), C, P)
+    drift = SharedError("drift", (1, 2), C, P, local=True, correlation=first_order(2, 0.9))
+    four = np.array([1e-3, 4e-3, 0.02, 0.03])
+    tails = Tails(seen.goals[:, :3, :3], four, np.array([2.0, 3.0, 1e9, 5.0]), 2.0 * four**2, np.array([0.05, 0.5]))
+    return replace(seen, shared=(camera, drift, SharedError("castle1", (0,), C)), tails=tails)
 
 
 def read(tmp_path: Path, document: Any, scenario: Scenario | None = SCENARIO) -> Observation:
@@ -205,6 +218,26 @@ def test_a_scenario_by_name_is_loaded(tmp_path: Path) -> None:
         read(tmp_path, form() | {"scenario": "stick_in_towr"}, None)
 
 
+def test_shared_errors_come_back_and_files_without_them_are_still_read(tmp_path: Path) -> None:
+    seen = with_shared(observation())
+    back = read(tmp_path, form())
+    assert [one.name for one in back.shared] == ["camera", "drift", "castle1"]
+    for one, other in zip(back.shared, seen.shared, strict=True):
+        assert (one.operations, one.local) == (other.operations, other.local)
+        for name in ("covariance", "frame", "correlation"):
+            given, kept = getattr(other, name), getattr(one, name)
+            assert (given is None) == (kept is None)
+            if given is not None:
+                np.testing.assert_allclose(kept, given, rtol=1e-9, atol=1e-13)
+    assert back.tails is not None
+    assert seen.tails is not None
+    for name in ("frames", "scales", "freedom", "variances", "limits"):
+        np.testing.assert_allclose(getattr(back.tails, name), getattr(seen.tails, name), rtol=1e-9, atol=1e-12)
+    before = {key: value for key, value in form().items() if key not in ("shared", "tails")}
+    old = read(tmp_path, before | {"schema": files.OBSERVATION_BEFORE})
+    assert (old.shared, old.tails) == ((), None)
+
+
 def _set(*keys: Any, to: Any) -> Callable[[dict[str, Any]], None]:
     def edit(document: Any) -> None:
         for key in keys[:-1]:
@@ -228,8 +261,14 @@ def _lopsided(document: dict[str, Any]) -> None:
 
 
 BROKEN = {
-    "other schema": (_set("schema", to="apo-bench/observation/2"), "schema"),
+    "other schema": (_set("schema", to="apo-bench/observation/3"), "schema"),
     "no schema": (_drop("schema"), "'schema' is missing"),
+    "shared by nobody": (_set("shared", 0, "operations", to=[]), "operations from 1 to 3, each once, are needed"),
+    "shared by operation 4": (_set("shared", 0, "operations", to=[1, 4]), "operations from 1 to 3"),
+    "shared, lopsided": (_set("shared", 1, "correlation", 0, 1, to=0.5), "with 1 on its diagonal is needed"),
+    "shared, local in no frame": (_set("shared", 2, "local", to=True), "state the frame, or leave this out"),
+    "tails of no freedom": (_set("tails", "degrees_of_freedom", to=[0.1, 1, 1, 1]), "numbers above 0.4 are needed"),
+    "tails of no axes": (_set("tails", "axes", 0, 0, 0, to=3.0), "a rotation matrix for each operation is needed"),
     "form of a plan": (_set("schema", to=files.PLAN), "schema"),
     "unknown key": (_set("coment", to="x"), "unknown key 'coment'"),
     "unknown key in operation": (_set("operations", 1, "sen", to=True), "operation 2: unknown key 'sen'; did you mean"),
@@ -347,7 +386,7 @@ def test_any_value_anywhere_is_read_or_refused(value: Any, data: st.DataObject, 
     document = form()
     place: Any = document
     key: Any = data.draw(st.sampled_from(sorted(document)))
-    while isinstance(place[key], (dict, list)) and data.draw(st.booleans()):
+    while isinstance(place[key], (dict, list)) and place[key] and data.draw(st.booleans()):
         place = place[key]
         key = data.draw(st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place))))
     place[key] = value

@@ -11,6 +11,8 @@ import numpy as np
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect, Try
 from apo_bench.assembly.goals import Observation, Step
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
 from apo_bench.geometry.solid import Box, Face, Solid
@@ -30,6 +32,8 @@ def observation_message(observation: Observation) -> CorrectorMessage:
         "gap_m": float(observation.gap_m),
         "play_m": float(observation.play_m),
         "outliers": None if observation.outliers is None else [*map(float, astuple(observation.outliers))],
+        "shared": [_shared_form(one) for one in observation.shared],
+        "tails": None if observation.tails is None else _tails_form(observation.tails),
     }
     start = np.array([observation.start[part] for part in parts]).reshape(-1, 4, 4)
     return form, {
@@ -52,9 +56,18 @@ def parse_observation(form: MessageForm, arrays: Arrays) -> Observation:
         gaps={_contact(ends): Gap(*gap) for ends, gap in form["gaps"]},
     )
     start = dict(zip(form["parts"], arrays["start"], strict=True))
-    seen = arrays["goals"], arrays["covariance"], arrays["seen"]
-    outliers = None if form["outliers"] is None else OutlierModel(*form["outliers"])
-    return Observation(assembly, start, *seen, gap_m=form["gap_m"], play_m=form["play_m"], outliers=outliers)
+    return Observation(
+        assembly,
+        start,
+        goals=arrays["goals"],
+        covariance=arrays["covariance"],
+        seen=arrays["seen"],
+        gap_m=form["gap_m"],
+        play_m=form["play_m"],
+        outliers=None if form["outliers"] is None else OutlierModel(*form["outliers"]),
+        shared=tuple(SharedError(**one) for one in form["shared"]),
+        tails=None if form["tails"] is None else Tails(**form["tails"]),
+    )
 
 
 def correction_message(correction: Correction) -> CorrectorMessage:
@@ -111,6 +124,22 @@ def parse_correction(form: MessageForm, arrays: Arrays) -> Correction:
         )
     except (ValueError, TypeError, KeyError, IndexError, OverflowError) as error:
         raise GarbledMessage("the message is no correction") from error
+
+
+def _shared_form(one: SharedError) -> MessageForm:
+    return {
+        "name": one.name,
+        "operations": list(one.operations),
+        "covariance": one.covariance.tolist(),
+        "frame": None if one.frame is None else one.frame.tolist(),
+        "local": bool(one.local),
+        "correlation": None if one.correlation is None else one.correlation.tolist(),
+    }
+
+
+def _tails_form(tails: Tails) -> MessageForm:
+    arrays = ("frames", "scales", "freedom", "variances", "limits")
+    return {**{name: getattr(tails, name).tolist() for name in arrays}, "joined": bool(tails.joined)}
 
 
 def _solid_form(solid: Solid) -> MessageForm:

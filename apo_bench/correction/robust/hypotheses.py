@@ -24,7 +24,8 @@ from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, State, Views, merged
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.whitened import scales
+from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import right_jacobian
@@ -86,14 +87,14 @@ class Hypothesis:
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
         xi = pose.log(pose.inverse(observation.goals) @ made.goals)
-        _, blocks = system.blocks(made.goals, right_jacobian(xi) @ scales(wide))
-        Jt = system.gathered(blocks)
+        L = noise_factor(replace(observation, covariance=wide))
+        _, Jt = linearised_by(system, made.goals, right_jacobian(xi) @ L)
         soft, false = soft_deviation(observation), np.zeros(Jt.shape[1])
         if self.dropped:
             wrong = np.repeat(~observation.assembly.without(self.dropped), 3)
             each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
             soft = np.where(wrong, each, soft)
-            false = np.where(wrong, system.blocks(made.goals, scales(wide))[0] / each, 0.0)
+            false = np.where(wrong, system.residual(made.goals) / each, 0.0)
         S = Jt.T @ Jt + np.diag(soft * soft)
         unlikely = made.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
         model, states = self.case.model, zip(self.case.views, self.states, strict=True)
@@ -137,7 +138,7 @@ def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hyp
 
 
 def believed_observation(case: Case, states: States) -> Observation:
-    """Views merged, and what is not believed inferred."""
+    """Views merged, and what is not believed inferred; shared errors and tails of several views are not kept."""
     first = case.observation
     goals, covariance, unknown = np.array(first.goals), np.array(first.covariance), list[int]()
     for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
@@ -149,6 +150,8 @@ def believed_observation(case: Case, states: States) -> Observation:
             goals[k], covariance[k] = found.goal, found.covariance
     seen = np.ones(len(states), dtype=np.bool_)
     believed = replace(first, goals=goals, covariance=covariance, seen=seen)
+    if any(len(views) > 1 for views in case.views):
+        believed = replace(believed, shared=(), tails=None)
     return replace(believed, goals=inferred_goals(believed, unknown).goals) if unknown else believed
 
 

@@ -28,7 +28,8 @@ from apo_bench.correction.robust.hypotheses import (
     unbelieved,
 )
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, State, beliefs
-from apo_bench.correction.solvers.whitened import scales
+from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry.arrays import Array
 
 MOST_EXACT = 12
@@ -196,8 +197,8 @@ class _Rest:
     def __init__(self, case: Case, states: States) -> None:
         seen, self._unknown = believed_observation(case, states), unbelieved(states)
         system = seen_system(seen)
-        self._e, blocks = system.blocks(seen.goals, scales(seen.covariance))
-        self._Jt: Array = system.gathered(blocks)
+        self._e, Jt = linearised_by(system, seen.goals, noise_factor(seen))
+        self._Jt: Array = Jt
         known = np.delete(seen.covariance, self._unknown, axis=0)
         turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
         self._soft = np.hypot(soft_deviation(seen), turned * turned * _LEVER_M)

@@ -67,14 +67,14 @@ def nearest_goals_compiled(
 ) -> NearestGoals:
     """Compiled `manifold.nearest_goals`: equal results but for rounding.
 
-    One observation of very many operations is left to sparse matrices there.
+    One observation of very many operations is left to sparse matrices there, and one with shared errors as it is.
 
     Raises:
         InputError: Numba is not installed.
     """
     lead, n = goals.shape[:-3], system.n
     kernels = compiled_loops()
-    if not lead and 6 * n > manifold.LARGEST_DENSE:
+    if L.shape[-1] != 6 or (not lead and 6 * n > manifold.LARGEST_DENSE):
         return manifold.nearest_goals(system, goals, L, soft_m)
     b = math.prod(lead)
     many, turns = solved(

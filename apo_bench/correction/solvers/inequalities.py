@@ -18,7 +18,9 @@ from apo_bench.assembly.equations import Equations
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.joint import linearised_by
 from apo_bench.correction.solvers.manifold import NearestGoals, SolverTurn, project, settles, shortened_step
+from apo_bench.correction.solvers.whitened import pulled, spread
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
@@ -96,7 +98,7 @@ def nearest_between(
 
     Args:
         seen: (n, 4, 4), world frame, [m].
-        L: (n, 6, 6), L L^t the covariance of the body twists.
+        L: (n, 6, 6) or (n, 6, 6 n), as of `nearest_goals`.
         start: The nearest goals without inequalities.
 
     Returns:
@@ -113,12 +115,11 @@ def nearest_between(
     known, before, trace, pace = jacobian_rank(start.Jt), np.inf, list(start.trace), 1.0
     z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
     for _ in range(_TURNS):
-        e, blocks = system.blocks(T, B)
-        Jt = system.gathered(blocks)
+        e, Jt = linearised_by(system, T, B)
         shortest = z + project(e[None], Jt[None], z[None], None, _SETTLED)[0][0]
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = inequalities.system.linearised(T)
-        J_wall = (J_wall.reshape(len(inequalities), -1, 1, 6) @ B).reshape(len(inequalities), -1)
+        J_wall = pulled(J_wall.reshape(len(inequalities), -1), B)
         ahead = e_wall + J_wall @ (shortest - z)
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
         step = shortest + free @ u - z
@@ -129,7 +130,7 @@ def nearest_between(
         pace = _paced(pace, step, last)
         last = step if rest else shortened_step(step[None], L[None])[0]
         z = z + (step if rest else pace * last)
-        D, Jr = exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])
+        D, Jr = exp_and_jacobian(spread(L, z))
         T, B, before = observed @ D, Jr @ L, length
         if over:
             break
@@ -144,7 +145,7 @@ def active_rank(Jt: Array, inequalities: Inequalities, found: NearestGoals) -> i
     """
     e, J = inequalities.system.linearised(found.goals)
     at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
-    J = (J[at].reshape(int(at.sum()), len(found.B), 1, 6) @ found.B).reshape(int(at.sum()), len(found.z))
+    J = pulled(J[at].reshape(int(at.sum()), len(found.z)), found.B)
     return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
 
 

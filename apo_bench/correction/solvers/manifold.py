@@ -67,7 +67,8 @@ class NearestGoals:
     Jt: Any
     """(*, 6 n, 3 c): the derivative of e by z, transposed, [m]; of many operations, a sparse matrix of SciPy."""
     B: Array
-    """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected goal k: J_r(xi) L, [m, rad]."""
+    """(*, n, 6, 6): what a change of z_k makes of the body twist at the corrected goal k: J_r(xi) L, [m, rad]; where
+    operations share errors (n, 6, 6 n), of all of z."""
     at_rest: NDArray[np.bool_]
     """(*,)."""
     finite: NDArray[np.bool_]
@@ -83,12 +84,17 @@ def nearest_goals(
 
     Args:
         goals: (*, n, 4, 4), what was seen, world frame, [m].
-        L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad].
+        L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad]; of one observation also (n, 6, 6 n), of all
+            of them together.
         soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
         begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
     """
     lead, n = goals.shape[:-3], system.n
+    if L.shape[-1] != 6:
+        from apo_bench.correction.solvers.joint import nearest_goals_joint
+
+        return nearest_goals_joint(system, goals, L, soft_m, begin)
     if not lead and 6 * n > LARGEST_DENSE:
         from apo_bench.correction.solvers.large import nearest_goals_sparse
 
@@ -205,7 +211,7 @@ def damping(gap2: Array, turn: int) -> Array:
 
 def shortened_step(step: Array, L: Array) -> Array:
     """A step, shortened where a goal of an observation would turn further than `LARGEST_TURN`."""
-    turned = (L[:, :, 3:] @ step.reshape(*L.shape[:2], 6, 1))[..., 0]
+    turned = (L[:, :, 3:] @ step.reshape(len(L), -1, L.shape[3], 1))[..., 0]
     largest = np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0))
     if (largest <= LARGEST_TURN).all():
         return step

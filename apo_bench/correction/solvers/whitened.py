@@ -1,4 +1,8 @@
-"""Twists in units of the stated noise: z = L^-1 xi, with covariance L L^t, so that |z| is a Mahalanobis length."""
+"""Twists in units of the stated noise: z = L^-1 xi, with covariance L L^t, so that |z| is a Mahalanobis length.
+
+Where errors of operations are independent, L has a block for each, (n, 6, 6), and the six numbers of operation k are
+its own. Where they share errors, L is the factor of their joint covariance, (n, 6, 6 n): the six rows of each.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.shared_error import joint_covariance
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -22,20 +27,15 @@ class Whitened:
     observed: Array
     """(n, 4, 4), world frame, [m]."""
     factor: Array
-    """(n, 6, 6), L of each operation, [m, rad]."""
+    """(n, 6, 6) or (n, 6, 6 n), L, [m, rad]."""
 
     def goals(self, z: Array) -> Array:
         """T_seen exp(L z), (n, 4, 4)."""
-        return np.asarray(self.observed @ pose.exp(self._twists(z)))
+        return np.asarray(self.observed @ pose.exp(spread(self.factor, z)))
 
     def pulled(self, z: Array, J: Array) -> Array:
         """A derivative by the body twists of the goals at z, (m, 6 n), as the derivative by z."""
-        n = len(self.observed)
-        D = right_jacobian(self._twists(z)) @ self.factor
-        return np.einsum("mni,nij->mnj", J.reshape(-1, n, 6), D).reshape(-1, 6 * n)
-
-    def _twists(self, z: Array) -> Array:
-        return np.asarray((self.factor @ z.reshape(-1, 6, 1))[..., 0])
+        return pulled(J, right_jacobian(spread(self.factor, z)) @ self.factor)
 
 
 def whitened(observation: Observation) -> Whitened:
@@ -44,20 +44,57 @@ def whitened(observation: Observation) -> Whitened:
     Raises:
         InputError: A covariance is not positive definite.
     """
-    return Whitened(observation.goals, scales(observation.covariance))
+    return Whitened(observation.goals, noise_factor(observation))
+
+
+def spread(L: Array, z: Array) -> Array:
+    """L z by operation: z (6 n,) -> (n, 6), or (6 n, f) -> (n, 6, f)."""
+    n, columns = len(L), z.shape[1:]
+    if L.shape[2] != 6:
+        return np.asarray((L.reshape(6 * n, len(z)) @ z).reshape(n, 6, *columns))
+    return np.asarray((L @ z.reshape(n, 6, *(columns or (1,)))).reshape(n, 6, *columns))
+
+
+def unspread(L: Array, xi: Array) -> Array:
+    """z of body twists xi = L z, (*, n, 6) -> (*, 6 n)."""
+    flat = (*xi.shape[:-2], 6 * len(L))
+    if L.shape[2] != 6:
+        return np.asarray(np.linalg.solve(L.reshape(flat[-1], flat[-1]), xi.reshape(*flat, 1))[..., 0])
+    return np.asarray(np.linalg.solve(L, xi[..., None]).reshape(flat))
+
+
+def pulled(J: Array, B: Array) -> Array:
+    """A derivative by body twists, (m, 6 n), as one by z, (m, 6 n), of which B z are the body twists."""
+    m, n = len(J), len(B)
+    if B.shape[2] != 6:
+        return np.asarray(J.reshape(m, 6 * n) @ B.reshape(6 * n, 6 * n))
+    return np.asarray((J.reshape(m, n, 1, 6) @ B).reshape(m, 6 * n))
+
+
+def noise_factor(observation: Observation) -> Array:
+    """L of an observation, (n, 6, 6), or (n, 6, 6 n) where operations share errors.
+
+    Raises:
+        InputError: A covariance is not positive definite, or operations are said to share more than their errors.
+    """
+    if not observation.shared:
+        return scales(observation.covariance)
+    scales(observation.covariance)
+    n = len(observation.goals)
+    joint = joint_covariance(observation.goals, observation.covariance, observation.shared)
+    try:
+        return np.asarray(np.linalg.cholesky(joint).reshape(n, 6, 6 * n), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        names = ", ".join(f"'{one.name}'" for one in observation.shared)
+        raise InputError(
+            f"the shared errors {names} are larger than the covariances of their operations; state covariances that "
+            "contain them, and more than them in every direction."
+        ) from None
 
 
 def correction_to(observed: Array, L: Array, goals: Array) -> Array:
-    """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n).
-
-    Args:
-        L: (n, 6, 6), or (n, 6, 6 n) of all twists together.
-    """
-    xi, unknowns = pose.log(pose.inverse(observed) @ goals), 6 * len(L)
-    lead = goals.shape[:-3]
-    if L.shape[-1] == unknowns:
-        return np.asarray(np.linalg.solve(L.reshape(unknowns, unknowns), xi.reshape(*lead, unknowns, 1))[..., 0])
-    return np.asarray(np.linalg.solve(L, xi[..., None]).reshape(*lead, unknowns))
+    """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n)."""
+    return unspread(L, pose.log(pose.inverse(observed) @ goals))
 
 
 def scales(covariance: Array) -> Array:

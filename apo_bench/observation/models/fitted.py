@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.outlier_model import measured_rates
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.isotropic import observe_displaced
+from apo_bench.observation.models.isotropic import observe_displaced, with_shared
 from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
@@ -26,8 +29,28 @@ SMALLEST, LEAST_FREEDOM = 1e-4, 0.5
 
 LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
 """[m] per mm and [rad] per degree."""
+_GAUSSIAN = 1e9
+"""Degrees of freedom of a Gaussian, as good as infinitely many."""
 LARGEST_M, LARGEST_RAD = 0.4, 2.0
 """A standard deviation per axis beyond which a level makes no sense."""
+
+
+class ViewNoise(NamedTuple):
+    """Standard deviations per axis of an error of the whole view, one for each demonstration."""
+
+    shift_mm: float
+    turn_deg: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ConstantError:
+    """A displacement of everything that a camera sees, T_seen = P exp(c) P^-1 T, always the same."""
+
+    twist: Array
+    """(6,), c, [m, rad]."""
+    frame: Array
+    """(4, 4), P, world, [m]."""
 
 
 @final
@@ -47,6 +70,10 @@ class MeasuredNoise:
     """Part of those that were found, that are off by more than the limit of the shift."""
     farthest_mm: float
     """Outliers are off by the limit to this, alike in each octave."""
+    view: ViewNoise | None = None
+    """What all operations of a demonstration share."""
+    constant: ConstantError | None = None
+    """What stays from demonstration to demonstration; it is not drawn, since it can be taken out."""
 
 
 @final
@@ -72,7 +99,7 @@ class Fitted:
         ),
         frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
         parameters=("all in the file: scales s, degrees of freedom n, limits, shares of outliers and misses, source",),
-        states="that of what is no outlier, within the limits, turned into the part that is seen",
+        states="that of what is no outlier, within the limits, turned into the part that is seen, and its tails",
         notes=("Level 1 is as measured", "At level 0 nothing is missed"),
         measured=True,
     )
@@ -95,7 +122,44 @@ class Fitted:
         made = observe_in_ray_frames(
             self.camera, self.level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
-        return replace(made, outliers=measured_rates(measured.outliers))
+        tails = stated_tails(measured, self.level, self.camera, made.goals) if min(self.level) > 0.0 else None
+        made = replace(made, outliers=measured_rates(measured.outliers), tails=tails)
+        return made if measured.view is None else self._displaced(made, rng.standard_normal(6))
+
+    def _displaced(self, made: Observation, unit: Array) -> Observation:
+        """What is seen if the whole view is off as well."""
+        sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.level, 3)
+        if not sigma.any() or not len(made.goals):
+            return made
+        P = view_frame(self.camera, [made.goals])
+        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ made.goals
+        return with_shared(replace(made, goals=goals), view_error(self.camera, goals, sigma))
+
+
+def stated_tails(measured: MeasuredNoise, level: Level, camera: Camera, goals: Array) -> Tails:
+    """The tails of inliers, in the frames of the rays on which parts are seen."""
+    shift, turn = measured.shift_mm, measured.turn_deg
+    units = np.repeat(LEVEL_UNITS[[0, 3]] * level, 2)
+    each = (shift.across, shift.along, turn.across, turn.along)
+    return Tails(
+        frames=np.swapaxes(goals[:, :3, :3], 1, 2) @ camera.frames(goals),
+        scales=np.array([tail.scale for tail in each]) * units,
+        freedom=np.minimum([tail.freedom for tail in each], _GAUSSIAN),
+        variances=np.array([*shift.variances, *turn.variances]) * units**2,
+        limits=np.array([shift.limit, turn.limit]) * units[[0, 2]],
+    )
+
+
+def view_error(camera: Camera, goals: Array, sigma: Array) -> SharedError:
+    """An error of the whole view with standard deviations (6,), about the middle of what is seen, [m, rad]."""
+    return SharedError("camera", tuple(range(len(goals))), np.diag(sigma**2), view_frame(camera, [goals]))
+
+
+def view_frame(camera: Camera, goals: Sequence[Array]) -> Array:
+    """The axes of a camera in the middle of all goals, (4, 4), world, [m]."""
+    P = camera.T_world_camera.copy()
+    P[:3, 3] = np.concatenate([one[:, :3, 3] for one in goals]).mean(axis=0)
+    return P
 
 
 def check_measured_level(level: Level, covariance: Array) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar, final
 
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -16,6 +18,9 @@ from apo_bench.observation.models.level import Facts, Level
 COVARIANCE_FLOOR = np.repeat([0.05e-3, np.radians(0.05)], 3)
 """Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
 COVARIANCE_FLOOR.flags.writeable = False
+OWN = 1.0 / 20.0
+"""What operations that share an error err by themselves, as part of the level."""
+OWN_FACT = f"o = {OWN:g}: part of the level by which each operation errs alone"
 
 
 @final
@@ -55,6 +60,33 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
     )
     stated = floored(covariance + demonstration.careless)
     return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+
+
+def observe_shared(
+    assembly: Assembly,
+    demonstration: Demonstration,
+    xi: Array,
+    own: Array,
+    shared: Callable[[Array], Sequence[SharedError]],
+) -> Observation:
+    """Every goal seen at `T exp(xi)`, by errors of which operations share most.
+
+    Args:
+        xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
+        own: (6,), standard deviation of what of xi operations do not share, [m, rad]. Without any, operations would be
+            told to agree without an error, which no camera does.
+        shared: The goals that are seen, (n, 4, 4) -> what operations share.
+    """
+    made = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
+    return with_shared(made, *shared(made.goals)) if own.any() else made
+
+
+def with_shared(made: Observation, *shared: SharedError) -> Observation:
+    """An observation that states, beside what it states already, errors that operations share."""
+    stated = np.array(made.covariance)
+    for one in shared:
+        stated[list(one.operations)] += one.added(made.goals)
+    return replace(made, covariance=stated, shared=(*made.shared, *shared))
 
 
 def floored(covariance: Array) -> Array:

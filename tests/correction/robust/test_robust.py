@@ -12,7 +12,7 @@ from apo_bench.assembly.goals import Demonstration
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.posterior import contains_truth
+from apo_bench.correction.region import contains_truth
 from apo_bench.correction.robust.hypotheses import Case, hypothesis
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust

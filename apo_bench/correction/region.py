@@ -1,0 +1,55 @@
+"""Is the truth in the region that a correction states? For benchmarks and tests, which know the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.goals import Observation
+from apo_bench.correction.posterior import freedom
+from apo_bench.correction.solvers.compact import compact_equations
+from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.whitened import noise_factor, unspread
+from apo_bench.correction.tailed import drawn_radius
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import right_jacobian
+
+
+def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:
+    """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
+
+    The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
+    deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
+
+    Returns:
+        None if the correction states no posterior, did not converge, or nothing is free.
+    """
+    from scipy.special import chdtri
+
+    if correction.covariance is None or not correction.ok:
+        return None
+    observation = correction.believed or observation
+    L = noise_factor(observation)
+    xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
+    system = compact_equations(
+        equations(observation.assembly, observation.start, observation.goals), len(correction.goals)
+    )
+    system = system.among(_equal(observation, correction.dropped))
+    known = freedom(linearised_by(system, correction.goals, right_jacobian(xi) @ L)[1])
+    if known is None or not known.free.shape[1]:
+        return None
+    free = known.free
+    true = pose.log(pose.inverse(observation.goals) @ truth)
+    off = free.T @ unspread(L, true - xi)
+    tailed = observation.tails is not None
+    most = drawn_radius(observation, L, free, level) if tailed else chdtri(free.shape[1], 1.0 - level)
+    return bool(off @ off <= most)
+
+
+def _equal(observation: Observation, dropped: tuple[str, ...]) -> NDArray[np.bool_]:
+    """The contacts that were equations, (c,): neither inequalities nor left out."""
+    low, high = observation.assembly.intervals(observation.play_m).T
+    return np.asarray(low == high) & observation.assembly.without(dropped)

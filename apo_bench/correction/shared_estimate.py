@@ -1,0 +1,73 @@
+"""What a correction tells of the errors that operations share: the camera is off by so much, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.shared_error import SharedError, joint_covariance
+from apo_bench.correction.posterior import freedom
+from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.whitened import noise_factor, spread
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SharedEstimate:
+    """What is known of one shared error after a correction."""
+
+    error: SharedError
+    twist: Array
+    """(6,), [m, rad], in its frame: how far what was seen is off, the opposite of what takes it to the truth."""
+    covariance: Array
+    """(6, 6), posterior, of that."""
+
+    @property
+    def deviations(self) -> Array:
+        """Posterior standard deviations, (6,), [m, rad]."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def estimate_shared(
+    observation: Observation, xi: Array, Jr: Array, system: CompactEquations
+) -> tuple[tuple[SharedEstimate, ...], Array]:
+    """The errors that are one and the same in several operations, and how uncertain all goals are together.
+
+    Shared error c and body twists xi are jointly Gaussian, cov(c, xi_k) = C A_k^t: given the corrected twists, c has
+    the mean K xi and the covariance C - K A C, K = C A^t S^-1, to which comes what is uncertain of the twists.
+
+    Args:
+        xi: (n, 6), the body twists from what was seen to the corrected goals, [m, rad].
+        Jr: (n, 6, 6), their right Jacobians.
+        system: The equations that hold.
+
+    Returns:
+        One estimate for each shared error that is no mere correlation, and (n, 6, f) of which the products with
+        themselves are the posterior covariances of the body twists at the corrected goals.
+
+    Raises:
+        InputError: Too many operations.
+    """
+    L, seen = noise_factor(observation), observation.goals
+    known = freedom(linearised_by(system, seen @ pose.exp(xi), Jr @ L)[1])
+    if known is None:
+        raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")
+    joint = joint_covariance(seen, observation.covariance, observation.shared)
+    free, found = L.reshape(xi.size, xi.size) @ known.free, []
+    for one in observation.shared:
+        if one.correlation is not None:
+            continue
+        A, rows = np.zeros((len(seen), 6, 6)), list(one.operations)
+        A[rows] = one.ways(seen)
+        AC = A.reshape(xi.size, 6) @ one.covariance
+        K = np.linalg.solve(joint, AC).T
+        C = one.covariance - K @ AC + (K @ free) @ (K @ free).T
+        found.append(SharedEstimate(one, -(K @ xi.ravel()), (C + C.T) / 2))
+    return tuple(found), spread(Jr @ L, known.free)

@@ -1,0 +1,56 @@
+"""The test and the regions of a correction where errors have tails: by draws of the noise that is stated.
+
+Near the solution everything is linear: the squared length of a correction is that of what the observation is off by in
+the directions that contacts fix, and the goals are off by the rest. So both are drawn with the noise, and numbers that
+were seen are compared with numbers that were drawn (Monte Carlo p-value; Davison and Hinkley, "Bootstrap Methods and
+their Application", 1997, Section 4.2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.shared_error import joint_covariance
+from apo_bench.correction.consistency import ROUNDING
+from apo_bench.correction.solvers.whitened import unspread
+from apo_bench.geometry.arrays import Array
+
+DRAWS = 2000
+
+
+def drawn_lengths(observation: Observation, L: Array, Jt: Array, S: Array | None) -> Array:
+    """Squared lengths of corrections of errors that are drawn, (DRAWS,), sorted.
+
+    Args:
+        L: As of `noise_factor`.
+        Jt: (6 n, 3 c), the transposed derivative of the equations by z, at a solution.
+        S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
+    """
+    r = _drawn(observation, L) @ Jt
+    A = Jt.T @ Jt
+    if S is not None:
+        w, V = np.linalg.eigh(S)
+        play = np.random.default_rng(DRAWS).standard_normal(r.shape)
+        r, A = r + play @ (V * np.sqrt(np.maximum(w, 0.0))).T, A + S
+    A = A + ROUNDING * A.diagonal().max(initial=1e-300) * np.eye(len(A))
+    return np.sort((r * np.linalg.solve(A, r.T).T).sum(axis=1))
+
+
+def drawn_p_value(lengths: Array, length: float) -> float:
+    """The part of drawn lengths, sorted, that are not shorter; never 0, since one more might be."""
+    above = len(lengths) - int(np.searchsorted(lengths, length))
+    return (1.0 + above) / (1.0 + len(lengths))
+
+
+def drawn_radius(observation: Observation, L: Array, free: Array, level: float) -> float:
+    """The squared length within which a part `level` of errors in the free directions are, (6 n, f), of z."""
+    return float(np.quantile(np.square(_drawn(observation, L) @ free).sum(axis=1), level))
+
+
+def _drawn(observation: Observation, L: Array) -> Array:
+    """z of errors, (DRAWS, 6 n)."""
+    if observation.tails is None:
+        raise ValueError("the observation states no tails")
+    joint = joint_covariance(observation.goals, observation.covariance, observation.shared)
+    return unspread(L, observation.tails.draws(joint, DRAWS))

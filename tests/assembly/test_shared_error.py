@@ -1,0 +1,80 @@
+"""Errors that operations share: their joint covariance is the one of errors that are drawn so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench.assembly.shared_error import SharedError, first_order, joint_covariance
+from apo_bench.geometry import pose
+from apo_bench.observation.noise import Level, make_noise
+from tests import scenes
+
+GOALS = np.array(
+    [
+        pose.at((0.1, 0.02, 0.0), (20.0, -35.0, 70.0)),
+        pose.at((0.2, -0.05, 0.03), (0.0, 15.0, -160.0)),
+        pose.at((0.15, 0.1, 0.2), (90.0, 0.0, 45.0)),
+    ]
+)
+C = np.diag(np.repeat([2e-3, 0.03], 3) ** 2)
+P = pose.at((0.3, -0.1, 0.8), (160.0, 10.0, 25.0))
+
+
+def test_a_twist_in_a_frame_of_the_world_moves_every_goal_alike() -> None:
+    """T_k = P exp(c) P^-1 T_seen_k = T_seen_k exp(A_k c), for a twist of any size."""
+    c = np.array([0.03, -0.02, 0.05, 0.4, -0.3, 0.7])
+    ways = SharedError("camera", (0, 1, 2), C, P).ways(GOALS)
+    assert_allclose(GOALS @ pose.exp(ways @ c), P @ pose.exp(c) @ pose.inverse(P) @ GOALS, atol=1e-12)
+
+
+def test_without_a_frame_it_is_the_one_of_the_part_and_locally_only_axes_count() -> None:
+    assert_allclose(SharedError("cube", (0, 2), C).ways(GOALS), np.tile(np.eye(6), (2, 1, 1)))
+    c = np.array([1e-3, 2e-3, -3e-3, 0.0, 0.0, 0.0])
+    moved = GOALS @ pose.exp(SharedError("drift", (0, 1, 2), C, P, local=True).ways(GOALS) @ c)
+    assert_allclose(moved[:, :3, 3] - GOALS[:, :3, 3], np.tile(P[:3, :3] @ c[:3], (3, 1)), atol=1e-15)
+
+
+def test_what_is_shared_stands_beside_the_diagonal() -> None:
+    own = np.tile(np.diag(np.repeat([1e-3, 0.01], 3) ** 2), (3, 1, 1))
+    camera = SharedError("camera", (0, 2), C, P)
+    stated = own.copy()
+    stated[[0, 2]] += camera.added(GOALS)
+    joint = joint_covariance(GOALS, stated, [camera]).reshape(3, 6, 3, 6)
+    A = camera.ways(GOALS)
+    assert_allclose(joint[0, :, 2], A[0] @ C @ A[1].T, atol=1e-18)
+    assert not joint[1, :, [0, 2]].any()
+    assert_allclose(joint[np.arange(3), :, np.arange(3)], stated, atol=1e-18)
+    drift = SharedError("drift", (0, 1, 2), C, correlation=first_order(3, 0.9))
+    joint = joint_covariance(GOALS, own + C, [drift]).reshape(3, 6, 3, 6)
+    assert_allclose(joint[0, :, 2], 0.81 * C, atol=1e-18)
+
+
+@pytest.mark.parametrize("name", ["bias", "bias-view", "correlated"])
+def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
+    """Over 1,500 seeds, squared lengths of all errors together are chi-square of 6 n degrees of freedom."""
+    scene, noise = scenes.subassembly_on_castles(), make_noise(name, Level(2.0, 2.0))
+    shown, square = scenes.shown(scene), []
+    for seed in range(1500):
+        seen = noise(shown.assembly, shown, np.random.default_rng(seed))
+        xi = pose.log(pose.inverse(seen.goals) @ shown.goals).ravel()
+        joint = joint_covariance(seen.goals, seen.covariance, seen.shared)
+        square.append(xi @ np.linalg.solve(joint, xi))
+    freedom = 6 * len(scene.goals)
+    assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 1500) + 0.02 * freedom)
+    assert np.var(square) == pytest.approx(2 * freedom, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SharedError("camera", (0, 0), C), "each operation once"),
+        (lambda: SharedError("camera", (-1,), C), "each operation once"),
+        (lambda: SharedError("camera", (0, 1), C, correlation=np.eye(3)), r"shape \(2, 2\) is needed"),
+        (lambda: SharedError("camera", (0, 1), C[:3]), r"shape \(6, 6\) is needed"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(make, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()

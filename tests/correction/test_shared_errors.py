@@ -1,0 +1,140 @@
+"""`contact` on observations whose errors are shared: the joint estimate, its posterior, what it says of the error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly.shared_error import SharedError
+from apo_bench.assembly.topology import Gap
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.explanation import explain
+from apo_bench.correction.many import correct_many
+from apo_bench.correction.region import contains_truth
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.show.explain_text import sentences
+
+
+def shown(name: str, seed: int) -> Demonstration:
+    scenario = load_scenario(name)
+    layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
+    n = len(layout.goals)
+    return Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+
+
+def seen(model: str, name: str = "pocket_table", seed: int = 0, level: float = 2.0) -> tuple[Observation, np.ndarray]:
+    demonstration = shown(name, seed)
+    made = make_noise(model, Level(level, level))(demonstration.assembly, demonstration, np.random.default_rng(seed))
+    return made, np.array(demonstration.goals)
+
+
+def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
+    """pocket_table: contacts with the fixed table tell where the camera is; taken alone, operations are torn apart."""
+    joint, alone = [], []
+    for seed in range(8):
+        observation, truth = seen("bias-view", seed=seed)
+        for given, errors in ((observation, joint), (replace(observation, shared=()), alone)):
+            made = correct(given, "contact")
+            assert made.ok
+            errors.append(np.linalg.norm(made.goals[:, :3, 3] - truth[:, :3, 3], axis=1).max())
+    assert np.mean(joint) < 0.15 * np.mean(alone)
+
+
+@pytest.mark.parametrize("model", ["bias", "bias-view", "correlated"])
+def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str) -> None:
+    """Of 60 draws 95 % regions cover 57 but for chance (binomial, 4 sigma), and p is uniform on average."""
+    p, covered = [], []
+    for seed in range(60):
+        observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed)
+        made = correct(observation, "contact")
+        assert made.ok
+        p.append(made.test.p_value)
+        covered.append(contains_truth(observation, made, truth))
+    assert sum(covered) >= 57 - 4 * np.sqrt(60 * 0.95 * 0.05)
+    assert np.mean(p) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 60))
+
+
+@pytest.mark.parametrize("model", ["heavy-tailed", "megapose-tless-inliers"])
+def test_the_test_and_the_regions_are_those_of_the_tails(model: str) -> None:
+    """Of 120 draws, alarms at a nominal 10 % and regions of 95 % as chance makes them (binomial, 4 sigma)."""
+    p, covered = [], []
+    for seed in range(120):
+        observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5)
+        made = correct(observation, "contact")
+        p.append(made.test.p_value)
+        covered.append(contains_truth(observation, made, truth))
+    assert abs(np.mean(np.array(p) < 0.1) - 0.1) < 4 * np.sqrt(0.09 / 120)
+    assert abs(np.mean(covered) - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 120)
+
+
+def test_a_shared_error_of_none_of_the_size_changes_nothing() -> None:
+    observation, _ = seen("isotropic")
+    tiny = SharedError(
+        "camera", tuple(range(len(observation.goals))), np.diag(np.repeat([1e-9, 1e-9], 3) ** 2), np.eye(4)
+    )
+    one = correct(observation, ContactCorrector())
+    other = correct(replace(observation, shared=(tiny,)), ContactCorrector())
+    assert_allclose(other.goals, one.goals, atol=1e-9)
+    assert_allclose(other.covariance, one.covariance, rtol=1e-5, atol=1e-16)
+    assert other.test.chi_square == pytest.approx(one.test.chi_square, rel=1e-6)
+
+
+def test_many_are_corrected_as_one_after_the_other() -> None:
+    observation, _ = seen("bias-view")
+    made = correct_many([observation, replace(observation, shared=())])
+    for one, given in zip(made, (observation, replace(observation, shared=())), strict=True):
+        assert_allclose(one.goals, correct(given, "contact").goals, atol=1e-9)
+
+
+def test_walls_between_operations_that_share_errors_are_kept() -> None:
+    """What overlaps by play stays within it, and the joint estimate is nearer than the separate one."""
+    observation, truth = seen("bias-view")
+    between = dict.fromkeys((relation.contact for relation in observation.assembly.relations()), Gap("clearance"))
+    walls = replace(observation, assembly=replace(observation.assembly, gaps=between), play_m=2e-3)
+    made = correct(walls, "contact")
+    assert made.ok
+    assert np.linalg.norm(made.goals[:, :3, 3] - truth[:, :3, 3], axis=1).max() < 4e-3
+
+
+def test_what_is_known_of_the_camera_is_said() -> None:
+    """The estimate of the shared twist is within its own posterior: squared lengths of 40 are chi-square of six."""
+    square = []
+    for seed in range(40):
+        observation, truth = seen("bias-view", seed=seed)
+        found = explain(observation, correct(observation, "contact").goals)
+        (one,) = found.shared
+        P = one.error.frame
+        true = pose.log(pose.inverse(P) @ observation.goals[0] @ pose.inverse(truth[0]) @ P)
+        off = one.twist - true
+        square.append(off @ np.linalg.solve(one.covariance + np.diag(np.repeat([1e-4, 2e-3], 3) ** 2), off))
+    assert np.mean(square) < 12.0
+    assert any("camera: seen off by (" in sentence for sentence in sentences(found))
+
+
+def test_a_shared_error_above_its_covariance_is_refused() -> None:
+    observation, _ = seen("isotropic", level=1.0)
+    large = SharedError("camera", (0, 1), np.diag(np.repeat([0.1, 1.0], 3) ** 2), np.eye(4))
+    with pytest.raises(InputError, match="the shared errors 'camera' are larger than the covariances"):
+        correct(replace(observation, shared=(large,)), "contact")
+
+
+def test_an_outlier_beside_an_error_of_the_view_is_left_out_and_the_rest_solved_jointly() -> None:
+    for seed in range(4):
+        observation, truth = seen("bias-view", seed=seed)
+        (camera,), goals, stated = observation.shared, np.array(observation.goals), np.array(observation.covariance)
+        goals[1] = goals[1] @ pose.at((0.12, -0.07, 0.05), (40.0, -20.0, 60.0))
+        stated[1] += camera.added(goals)[1] - camera.added(observation.goals)[1]
+        made = correct(replace(observation, goals=goals, covariance=stated), "contact-robust")
+        assert made.ok
+        others = [k for k in range(len(goals)) if k != 1]
+        off = np.linalg.norm(made.goals[others, :3, 3] - truth[others, :3, 3], axis=1)
+        assert off.max() < 1e-3
