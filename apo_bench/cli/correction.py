@@ -85,6 +85,10 @@ def correct(
     ] = None,
     deviation_mm: _DeviationMm = 1.0,
     deviation_deg: _DeviationDeg = 1.0,
+    camera_noise: Annotated[
+        Path | None,
+        typer.Option(help="Take the noise of this file, of `noise learn` or `noise fit`, for what the camera states."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the corrected goals: a plan .json, or .csv.")] = None,
     as_json: _AsJson = False,
 ) -> None:
@@ -104,6 +108,11 @@ def correct(
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
+    if camera_noise is not None:
+        from apo_bench.observation.noise_file import read_noise
+        from apo_bench.observation.restated import restated
+
+        seen, assumed = restated(seen, *read_noise(camera_noise)), False
     with redirect_output(as_json):
         correction = correct_named(seen, with_simulated(corrector))
     found = _explained(seen, correction)

@@ -1,4 +1,4 @@
-"""The commands `apo-bench noise list | card | fit`: noise models, their cards, and noise that is measured."""
+"""The commands `apo-bench noise list | card | fit | learn`: noise models, their cards, noise that is measured."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.errors import InputError
 
-_HELP = "Noise models: list, cards, fits to measured poses."
+_HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
 noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=_HELP)
 
@@ -122,6 +122,57 @@ def fit(
     for path, _, _ in written:
         if path is not None and not as_json:
             typer.echo(f"Wrote {path}")
+
+
+@noise.command()
+def learn(
+    observations: Annotated[
+        list[Path], typer.Argument(help="Observations, .json of `replay --save-observation`, or folders of them.")
+    ],
+    out: Annotated[Path | None, typer.Option(help="Write the noise file for --noise and `correct`: .toml.")] = None,
+    constant: Annotated[
+        bool, typer.Option("--constant", help="The camera also has an error that is the same in all observations.")
+    ] = False,
+    source: Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+) -> None:
+    """Learn the noise of a camera from observations alone: contacts tell it, without the truth."""
+    import json
+
+    from apo_bench.files.json_reading import read_json_observation
+    from apo_bench.observation.models.camera import Camera
+    from apo_bench.observation.noise_file import noise_text
+    from apo_bench.show.learned_text import learned_form, learned_lines
+    from apo_bench.trial.learned_noise import learn as learned
+
+    files = _observation_files(observations)
+    if out is not None:
+        check_writable(out, "--out", (".toml",))
+    named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
+    found = learned([read_json_observation(path) for path in files], Camera(), named, constant=constant)
+    if as_json:
+        typer.echo(json.dumps(learned_form(found), allow_nan=False))
+    else:
+        typer.echo("\n".join(learned_lines(found)))
+    if out is None:
+        return
+    try:
+        out.write_text(noise_text(found.measured), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+    if not as_json:
+        typer.echo(f"Wrote {out}")
+
+
+def _observation_files(given: list[Path]) -> list[Path]:
+    """The files that were named, and those in the folders that were."""
+    found = list[Path]()
+    for path in given:
+        inside = sorted(path.glob("*.json")) if path.is_dir() else [path]
+        if not inside:
+            raise InputError(f"the folder {path} holds no .json file; name a folder of observations.")
+        found += inside
+    return found
 
 
 def _printable(text: str) -> str:

@@ -1,0 +1,1 @@
+"""What contacts tell of the noise of a camera, without the truth."""
