@@ -23,7 +23,13 @@ def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
     hint = f"; did you mean '{near[0]}'?" if near else "."
     shown = names if len(names) <= _MOST else get_close_matches(given, names, n=_MOST, cutoff=0.3)
     more = "" if len(shown) == len(names) else f" (nearest of {len(names)})"
-    return f"unknown {kind} '{given[:_LONGEST]}'{hint} Known: {', '.join(shown) or 'none'}{more}."
+    return f"unknown {kind} '{one_line(given, _LONGEST)}'{hint} Known: {', '.join(shown) or 'none'}{more}."
+
+
+def one_line(text: str, longest: int) -> str:
+    """The beginning of a text for a sentence: line ends and control characters are spelled out."""
+    text = text[:longest]
+    return text if text.isprintable() else ascii(text)[1:-1]
 
 
 def failed(what: str, error: Exception) -> InputError:

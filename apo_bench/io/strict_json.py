@@ -13,7 +13,7 @@ from typing import Any, NoReturn, final
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, one_line
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.plain_text import UNSHOWN
 from apo_bench.io.reading import read_text
@@ -40,7 +40,8 @@ class JsonNode:
         raise InputError(f"{place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
 
     def child(self, value: Any, key: str) -> JsonNode:
-        return JsonNode(value, self.file, f"{self.key}, {key[:60]}" if self.key else key[:60])
+        name = one_line(key, 60)
+        return JsonNode(value, self.file, f"{self.key}, {name}" if self.key else name)
 
     def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
         """The members of an object: every required key, no unknown one."""
@@ -53,7 +54,7 @@ class JsonNode:
                 near = get_close_matches(key, known, n=1, cutoff=0.5)
                 hint = f"; did you mean '{near[0]}'? Allowed" if near else "; allowed"
                 place = f"{self.file}, {self.key}" if self.key else self.file
-                raise InputError(f"{place}: unknown key '{key[:60]}'{hint}: {', '.join(known)}.")
+                raise InputError(f"{place}: unknown key '{one_line(key, 60)}'{hint}: {', '.join(known)}.")
         for key in required:
             if key not in self.value:
                 place = f"{self.file}, {self.key}" if self.key else self.file
@@ -154,7 +155,10 @@ def check_plain(document: Any, file: str) -> None:
         below: list[tuple[str, Any]] = []
         for key, value in level:
             if isinstance(value, dict):
-                below += [(f"{key}, {name[:60]}" if key else name[:60], entry) for name, entry in value.items()]
+                below += [
+                    (f"{key}, {one_line(name, 60)}" if key else one_line(name, 60), entry)
+                    for name, entry in value.items()
+                ]
             elif isinstance(value, list):
                 below += [(key, entry) for entry in value]
             elif isinstance(value, int) and not -_LARGEST_INTEGER <= value <= _LARGEST_INTEGER:
