@@ -13,14 +13,17 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
 from fields import sentences
 
 from apo_bench.cli.setting_options import shown_default
 from apo_bench.io.strict_json import JsonNode
-from apo_bench.observation.noise_file import read_noise
+from apo_bench.observation.models.fitted import ConstantError, ViewNoise
+from apo_bench.observation.noise_file import noise_text, read_noise
 from apo_bench.observation.presets import presets
 from apo_bench.parts.allowed import ELEMENT_RULES
 from apo_bench.records.setting_info import SettingInfo
@@ -122,7 +125,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     },
     "Noise files": {
         "": {
-            "schema": "`apo-bench/noise/1`",
+            "schema": "`apo-bench/noise/2`; `apo-bench/noise/1` is still read",
             "source": "whose errors these are",
             "missed_rate": "share of parts that were not found, 0 to 1",
             "outlier_rate": "share of outliers among those that were found, 0 to 1",
@@ -130,6 +133,8 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "shift": "errors of the position",
             "turn": "errors of the turn",
             "camera": "pose of the camera in the world, `{ at_mm, turn_deg }`; else the default one",
+            "view": "one error for each demonstration that all operations share; else there is none",
+            "constant": "an error that stays, which `correct --camera-noise` takes out; else there is none",
         },
         "shift": {
             "limit_mm": "no error of an inlier is longer",
@@ -144,6 +149,16 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "across_degrees_of_freedom": "its degrees of freedom, `inf` for a Gaussian",
             "along_scale_deg": "scale of the Student t of turns about the ray",
             "along_degrees_of_freedom": "its degrees of freedom",
+        },
+        "view": {
+            "shift_mm": "standard deviation per axis, 0 to 200",
+            "turn_deg": "standard deviation per axis, about the middle of what is seen, 0 to 45",
+        },
+        "constant": {
+            "shift_mm": "how far everything is seen displaced, three numbers",
+            "turn_deg": "and turned, a rotation vector",
+            "position_mm": "the frame of both in the world: its origin",
+            "quaternion_wxyz": "and its axes",
         },
     },
     "Sweep files": {
@@ -197,7 +212,11 @@ def scenario_keys() -> Keys:
 def noise_keys() -> Keys:
     with listening() as heard:
         for path in presets().values():
-            read_noise(path)
+            measured, _ = read_noise(path)
+        with tempfile.TemporaryDirectory() as folder:
+            own, still = Path(folder) / "own.toml", ConstantError(np.zeros(6), np.eye(4))
+            own.write_text(noise_text(replace(measured, view=ViewNoise(1.0, 1.0), constant=still)), encoding="utf-8")
+            read_noise(own)
     return named(heard, lambda key: key)
 
 
