@@ -195,13 +195,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         return self._seen
 
     @property
-    def look(self) -> Looks:
-        """Sees operations of this episode again, as often as `looks` says.
+    def look(self) -> Looks | None:
+        """Sees operations of this episode again, as often as `looks` says; None if it says 0.
 
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        if self._look is None:
+        if self._allowed and self._look is None:
             raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
         return self._look
 
@@ -236,7 +236,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._trial, recording = self._watch_human(seed)
         noise = range_sensor(self._scene, recording, self._now.level.mm) if self._eye == RANGE else self._noise
         self._seen = observe_recording(recording, noise, self._trial)
-        self._look = looks_at(recording, noise, self._trial, self._allowed)
+        self._look = looks_at(recording, noise, self._trial, self._allowed) if self._allowed else None
         self._recording = replace(recording, images=None)
         self.aim(self._seen.goals)
         self._refused, self._over = observation_failure(self._seen), False

@@ -278,7 +278,7 @@ def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     assert info["code"] in outcomes.CODES
     assert all(isinstance(value, (bool, str, int, type(None))) for value in info.values())
     assert {f.name for f in fields(watched.seen)} == {
-        *("assembly", "start", "goals", "covariance", "seen", "gap_m", "play_m")
+        *("assembly", "start", "goals", "covariance", "seen", "gap_m", "play_m", "outliers", "shared", "tails")
     }
 
 

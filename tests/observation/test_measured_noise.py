@@ -257,7 +257,7 @@ GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ('"apo-bench/noise/1"', '"apo-bench/noise/9"', 'schema: "apo-bench/noise/1" is needed'),
+        ('"apo-bench/noise/2"', '"apo-bench/noise/9"', 'schema: "apo-bench/noise/2" is needed'),
         ("missed_rate = 0.16609", "missed_rate = 1.5", "missed_rate: a number from 0 to 1 is needed, 1.5 was given"),
         ("missed_rate = 0.16609", "missed_rate = nan", "missed_rate: a number from 0 to 1 is needed, NaN was given"),
         ("missed_rate = 0.16609", "mised_rate = 0.1", "unknown key 'mised_rate'; did you mean 'missed_rate'"),

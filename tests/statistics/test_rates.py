@@ -54,6 +54,7 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "grasp": "friction",
         "fidelity": "full",
         "method": method,
+        "looks": 0,
         "seed": seed,
         **UNKNOWN,
         "demonstration": "demonstration_failed" if success is None else "ok",

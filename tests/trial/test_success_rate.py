@@ -49,12 +49,15 @@ HEADLINE_METHODS = ("none", "paper", "contact")
 HEADLINE_SEEDS = range(1, 5)
 """Four of those that are simulated where things may touch, as the headline is."""
 LEVEL, CARELESS = 1.0, 1.0
-NOT_COMPARED = ("spec_hash", "reached", "thresholds", "schema")
+NOT_COMPARED = ("spec_hash", "reached", "thresholds", "schema", "chi_square", "p_value")
+"""The headline is older than the test of `contact` that adds play up along what is carried."""
 OTHERWISE = (
     *("success", "loose_success", "as_demonstrated_code", "failure_stage", "failure_code", "failure_operation"),
     *("sentence", "conditions", "worst_gap_mm", "worst_angle_deg", "least_overlap", "penetration_mm", "pushed_mm"),
 )
 """What older rows say of the verdict that is now called `as_demonstrated`."""
+NEW = ("seen_again", "left_out")
+"""What rows of version 6 do not say."""
 CASES = [(name, method) for name, methods in METHODS.items() for method in methods]
 
 
@@ -156,6 +159,7 @@ def test_a_part_of_the_headline_runs_again_to_the_same_rows(all_ended: Ended) ->
         if mine[0]["peak_force_n"] == theirs[0]["peak_force_n"]:
             for ours, recorded in zip(mine, theirs, strict=True):
                 left_out = NOT_COMPARED if recorded["schema"] == ROW else (*NOT_COMPARED, *OTHERWISE)
+                left_out = (*left_out, *(name for name in NEW if recorded[name] is None))
                 same = {name: value for name, value in ours.items() if name not in left_out}
                 assert same == {name: value for name, value in recorded.items() if name not in left_out}
         won, rate = sum(row["as_demonstrated"] for row in mine), rate_of(all_ended.name, method)
