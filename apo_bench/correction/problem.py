@@ -22,7 +22,7 @@ from apo_bench.correction.consistency import (
     suspects,
 )
 from apo_bench.correction.play import fit_covariance
-from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
+from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly, compact_equations
 from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between, violations
 from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
@@ -173,3 +173,10 @@ def problem(observation: Observation, solver: Solver, at: Array | None = None) -
     begin = None if at is None else correction_to(observation.goals, L, at)
     correlated = fit_covariance(observation.assembly, observation.play_m)
     return Problem(observation, system, every, exact, inequalities, L, slack_m, correlated, solver, begin)
+
+
+def seen_system(observation: Observation) -> CompactEquations:
+    """The equations of every contact, each vertex where it was seen."""
+    return compact_equations(
+        equations(observation.assembly, observation.start, observation.goals), len(observation.goals)
+    )

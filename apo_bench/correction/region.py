@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.posterior import freedom
-from apo_bench.correction.solvers.compact import compact_equations
+from apo_bench.correction.problem import seen_system
 from apo_bench.correction.solvers.joint import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor, unspread
 from apo_bench.correction.tailed import drawn_radius
@@ -34,10 +33,7 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
     observation = correction.believed or observation
     L = noise_factor(observation)
     xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
-    system = compact_equations(
-        equations(observation.assembly, observation.start, observation.goals), len(correction.goals)
-    )
-    system = system.among(_equal(observation, correction.dropped))
+    system = seen_system(observation).among(_equal(observation, correction.dropped))
     known = freedom(linearised_by(system, correction.goals, right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None

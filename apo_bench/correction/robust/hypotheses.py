@@ -15,15 +15,15 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations, pattern
+from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
 from apo_bench.correction.contact import ContactCorrector, contact_apply
+from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, State, Views, merged
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.joint import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import pose
@@ -153,13 +153,6 @@ def believed_observation(case: Case, states: States) -> Observation:
     if any(len(views) > 1 for views in case.views):
         believed = replace(believed, shared=(), tails=None)
     return replace(believed, goals=inferred_goals(believed, unknown).goals) if unknown else believed
-
-
-def seen_system(observation: Observation) -> CompactEquations:
-    """The equations of every contact, each vertex where it was seen."""
-    return compact_equations(
-        equations(observation.assembly, observation.start, observation.goals), len(observation.goals)
-    )
 
 
 def soft_deviation(observation: Observation) -> Array:

@@ -17,13 +17,13 @@ import numpy as np
 from apo_bench.assembly.equations import pattern
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.posterior import jacobian_rank
+from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.hypotheses import (
     Case,
     Hypothesis,
     States,
     believed_observation,
     hypothesis,
-    seen_system,
     soft_deviation,
     unbelieved,
 )

@@ -13,6 +13,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.fitted import view_error, view_frame
 from apo_bench.observation.models.isotropic import OWN, OWN_FACT, observe_displaced, observe_shared
 from apo_bench.observation.models.level import Facts, Level
 
@@ -80,15 +81,9 @@ class BiasView:
         unit, own = rng.standard_normal(6), rng.standard_normal((len(assembly), 6)) * OWN * sigma
         if not len(assembly):
             return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
-        view = pose.adjoint(pose.inverse(demonstration.goals) @ self._middle(demonstration.goals))
+        view = pose.adjoint(pose.inverse(demonstration.goals) @ view_frame(self.camera, [demonstration.goals]))
 
         def shared(goals: Array) -> list[SharedError]:
-            every = tuple(range(len(assembly)))
-            return [SharedError("camera", every, np.diag(sigma**2), self._middle(goals))]
+            return [view_error(self.camera, goals, sigma)]
 
         return observe_shared(assembly, demonstration, view @ (unit * sigma) + own, OWN * sigma, shared)
-
-    def _middle(self, goals: Array) -> Array:
-        P = self.camera.T_world_camera.copy()
-        P[:3, 3] = goals[:, :3, 3].mean(axis=0)
-        return P
