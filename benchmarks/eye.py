@@ -21,7 +21,7 @@ from apo_bench.assembly.placement import placements
 from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import OBSERVATION, Recording, range_sensor, record_demonstration, stream
@@ -72,7 +72,7 @@ def noticed(scene: Scene, shown: Recording, event: Event) -> int:
     count = 0
     for view, region in zip(shown.images.finder.views, event.regions, strict=True):
         for mask, poses in ((region.appeared, demonstration.final), (region.vanished, stages[-2])):
-            shapes = [shape_of(physical_boxes(solids[part], play), poses[part]) for part in solids]
+            shapes = [shape_of(physical_pieces(solids[part], play), poses[part]) for part in solids]
             owner = np.concatenate([[part] * len(shape.center) for part, shape in zip(solids, shapes, strict=True)])
             pixels = np.flatnonzero(mask)
             _, box = strike_distances(join_shapes(shapes), view.origin, view.rays[pixels])

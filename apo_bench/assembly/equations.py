@@ -241,6 +241,8 @@ class _Flat(NamedTuple):
 def _flat(face: Face) -> _Flat:
     """Corners (k, 3), face equation of Eq. 1 (4,), area inside the outline (Newell's formula)."""
     corners = face.outline
+    if face.stated_normal is not None:
+        return _Flat(corners, face.plane, 0.0)
     twice = _cross(corners, np.concatenate([corners[1:], corners[:1]])).sum(axis=0)
     size = math.sqrt(twice @ twice)
     n = twice / size

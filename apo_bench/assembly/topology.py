@@ -15,6 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.records import copyable
 from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 
 
@@ -125,11 +126,24 @@ class Assembly:
         return len(self.operations)
 
     def face(self, of: PartFace) -> Face:
+        """A flat face."""
         return self.solids[of.part].faces[of.face]
+
+    def round_face(self, of: PartFace) -> RoundFace:
+        return self.solids[of.part].rounds[of.face]
+
+    def face_of(self, of: PartFace) -> Face | RoundFace:
+        """A face, flat or round."""
+        solid = self.solids[of.part]
+        return solid.rounds[of.face] if of.face in solid.rounds else solid.faces[of.face]
+
+    def is_round(self, contact: Contact) -> bool:
+        """Whether a contact is of other faces than two flat ones."""
+        return any(of.face in self.solids[of.part].rounds for of in contact)
 
     def is_fit(self, contact: Contact) -> bool:
         """Whether the physical faces stay apart by the clearance when the nominal ones touch."""
-        return self.face(contact.manipulated).fit or self.face(contact.environment).fit
+        return self.face_of(contact.manipulated).fit or self.face_of(contact.environment).fit
 
     def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
         """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play."""
@@ -182,9 +196,9 @@ class Assembly:
 
         Contacts by their number in `relations()`; arcs in the order in which they were made.
         """
-        together: dict[tuple[int, str, str], list[int]] = {}
+        together: dict[tuple[int, frozenset[str]], list[int]] = {}
         for i, (contact, made, _) in enumerate(self.relations()):
-            together.setdefault((made, contact.manipulated.part, contact.environment.part), []).append(i)
+            together.setdefault((made, frozenset(of.part for of in contact)), []).append(i)
         return tuple(map(tuple, together.values()))
 
     def without(self, left_out: Collection[str]) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry.solid import Piece
 
 
 class Shape(NamedTuple):
@@ -23,9 +23,9 @@ class Shape(NamedTuple):
     """(k, 3, 3), rotations whose columns are the axes of the boxes."""
 
 
-def shape_of(boxes: Iterable[Box], T: Array | None = None) -> Shape:
-    """The union of boxes whose common frame is at T, (4, 4), of the shape's frame (none: the same)."""
-    kept = tuple(boxes)
+def shape_of(pieces: Iterable[Piece], T: Array | None = None) -> Shape:
+    """The union of pieces, as the boxes around them, whose frame is at T, (4, 4), of the shape's (none: the same)."""
+    kept = tuple(pieces)
     center, half = np.array([box.center for box in kept]), np.array([box.half for box in kept])
     T = np.eye(4) if T is None else T
     return Shape(center @ T[:3, :3].T + T[:3, 3], half, np.repeat(T[None, :3, :3], len(kept), axis=0))

@@ -18,7 +18,7 @@ from apo_bench.depth_camera.regions import Regions, regions
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.symmetry import nearest_symmetric_pose, symmetries
 
 _GONE = 0.5
@@ -74,7 +74,7 @@ def follow_demonstration(
     pause of the hand looks the same as the end of an operation, so the others are not seen.
     """
     assembly, believed = expected.assembly, dict(expected.start)
-    shapes = {p: shape_of(physical_boxes(s, expected.play_m)) for p, s in assembly.solids.items()}
+    shapes = {p: shape_of(physical_pieces(s, expected.play_m)) for p, s in assembly.solids.items()}
     events: list[Event] = []
     frame, k, first = np.eye(3), 0, 0
     while first + 1 < len(images) and k < len(assembly):

@@ -8,8 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError
+from apo_bench.geometry.convex import all_boxes, piece_corners
+from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.overlap import SLIVER_M2
-from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.geometry.receding import receded_hull
+from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.solid import Box, Face, Piece, Solid
 
 _IN_PLANE_M = 1e-9
 """A face and a side of a box this near to each other lie in one plane."""
@@ -17,10 +21,11 @@ _THINNEST_M = 5e-5
 """Half of what a box is thick at least, [m]; what is thinner, MuJoCo takes for nothing."""
 
 
-def physical_boxes(solid: Solid, clearance_m: float) -> tuple[Box, ...]:
-    """The boxes of the part as it is made, same names and order.
+def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
+    """The pieces of the part as it is made, same names and order.
 
-    Every side of a box that carries a fit face, or a piece of one, moves into the box by the clearance. The nominal
+    Every side of a piece that carries a fit face, or a piece of one, moves into it by the clearance; so a round hole
+    gets wider. The nominal
     part has none: walls and stick of one size touch. With clearance c a stick of 20 mm is 20 - 2c thick, a pocket of
     50 mm is 50 + 2c wide.
 
@@ -28,18 +33,27 @@ def physical_boxes(solid: Solid, clearance_m: float) -> tuple[Box, ...]:
         clearance_m: How far each fit face recedes, >= 0, [m].
 
     Raises:
-        InputError: The clearance is negative or not finite, swallows a box, or a side carries both a fit face and
-            another one.
+        InputError: The clearance is negative or not finite, swallows a piece, or a side of a box carries both a fit
+            face and another one.
     """
     if not np.isfinite(clearance_m) or clearance_m < 0:
         raise InputError(
             f"a clearance of {1e3 * clearance_m:g} mm was given for part '{solid.name}'; "
             "give a finite length per side that is not negative."
         )
-    if not any(face.fit for face in solid.faces.values()):
-        return solid.boxes
+    if not solid.fits:
+        return solid.pieces
+    if not all_boxes(solid.pieces):
+        return _receded_hulls(solid, clearance_m)
     sides = [_Side(face.name, face.fit, *_plane(face), _flat(face)) for face in solid.faces.values()]
-    return tuple(_receded(solid, box, sides, clearance_m) for box in solid.boxes)
+    return tuple(_receded(solid, box, sides, clearance_m) for box in solid.pieces if isinstance(box, Box))
+
+
+@remembered
+def _receded_hulls(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
+    """`physical_pieces` of a part that has pieces other than boxes, each of which is taken as one of them."""
+    hulls = [p if isinstance(p, Hull) else Hull(p.name, piece_corners(p)) for p in solid.pieces]
+    return tuple(receded_hull(solid, hull, clearance_m) for hull in hulls)
 
 
 class _Side(NamedTuple):

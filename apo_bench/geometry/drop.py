@@ -32,7 +32,7 @@ def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int | None:
     """The first of the places at which `a` is in `b`."""
-    count = max(1, _AT_ONCE // (len(a.boxes) * len(b.boxes)))
+    count = max(1, _AT_ONCE // (len(a.pieces) * len(b.pieces)))
     for begin in range(0, len(ways), count):
         met = np.flatnonzero(drop_depths(a, T_a, ways[begin : begin + count], b, T_b) > TOUCH_M)
         if len(met):
@@ -43,16 +43,16 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
 def drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Array:
     """How deep `a` is in `b` once it went down so far, (k,), [m]; negative where they are apart."""
     at = T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
-    return intrusion_depths(a.boxes, T_a[:3, :3], at, b.boxes, T_b)
+    return intrusion_depths(a.pieces, T_a[:3, :3], at, b.pieces, T_b)
 
 
 def _above(a: Solid, T_a: Array, b: Solid, T_b: Array) -> bool:
     """Whether the boxes around both, whose sides are those of the world, lie over one another in part."""
-    (low_a, high_a), (low_b, high_b) = (upright_bounds(s.boxes, T[:3, :3], T[:3, 3]) for s, T in ((a, T_a), (b, T_b)))
+    (low_a, high_a), (low_b, high_b) = (upright_bounds(s.pieces, T[:3, :3], T[:3, 3]) for s, T in ((a, T_a), (b, T_b)))
     return bool((low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2])
 
 
 def _span(a: Solid, T_a: Array, b: Solid, T_b: Array) -> tuple[float, float]:
     """From where on they may meet, and until where."""
-    (low_a, high_a), (low_b, high_b) = (upright_bounds(s.boxes, T[:3, :3], T[:3, 3]) for s, T in ((a, T_a), (b, T_b)))
+    (low_a, high_a), (low_b, high_b) = (upright_bounds(s.pieces, T[:3, :3], T[:3, 3]) for s, T in ((a, T_a), (b, T_b)))
     return max(0.0, float(low_a[2] - high_b[2])), float(high_a[2] - low_b[2])

@@ -1,4 +1,4 @@
-"""How deep two solids of boxes are in each other."""
+"""How deep two solids of convex pieces are in each other."""
 
 from __future__ import annotations
 
@@ -7,27 +7,28 @@ from functools import lru_cache
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.convex import all_boxes, piece_corners, separating_axes, shadow
+from apo_bench.geometry.solid import Piece, Solid
 
 _TOUCHING_M = 1e-6
 """Balls around solids are apart if this far from each other, whatever was rounded."""
 
 
 def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
-    """The depth of the deepest pair of boxes of two posed solids, [m]; 0 if they are apart or only touch.
+    """The depth of the deepest pair of pieces of two posed solids, [m]; 0 if they are apart or only touch.
 
-    Separating axes: two boxes are apart if their shadows are apart along a normal of a side or along a cross product
+    Separating axes: two pieces are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
-    (middle_a, reach_a), (middle_b, reach_b) = _ball(a.boxes), _ball(b.boxes)
+    (middle_a, reach_a), (middle_b, reach_b) = _ball(a.pieces), _ball(b.pieces)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     if between @ between > (reach_a + reach_b + _TOUCHING_M) ** 2:
         return 0.0
-    return max(0.0, float(intrusion_depths(a.boxes, T_a[:3, :3], T_a[None, :3, 3], b.boxes, T_b)[0]))
+    return max(0.0, float(intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b)[0]))
 
 
-def intrusion_depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ...], T_b: Array) -> Array:
-    """How deep boxes that only shift are in others, at k places, (k,), [m]; negative where they are apart.
+def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
+    """How deep pieces that only shift are in others, at k places, (k,), [m]; negative where they are apart.
 
     Args:
         R_a: (3, 3), the orientation of `a`.
@@ -36,6 +37,8 @@ def intrusion_depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ..
     Returns:
         (k,), [m].
     """
+    if not (_all_boxes(a) and _all_boxes(b)):
+        return _piece_by_piece(a, R_a, at, b, T_b)
     (centers_a, halves_a), (centers_b, halves_b) = _boxes(a), _boxes(b)
     axes = _axes(R_a, T_b[:3, :3])
     reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
@@ -44,16 +47,60 @@ def intrusion_depths(a: tuple[Box, ...], R_a: Array, at: Array, b: tuple[Box, ..
     return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
 
 
-@lru_cache(maxsize=1024)
-def _boxes(boxes: tuple[Box, ...]) -> tuple[Array, Array]:
-    """Centres and half sizes, (k, 3) each, in the frame of their solid."""
-    return frozen([box.center for box in boxes], None, 3), frozen([box.half for box in boxes], None, 3)
+def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
+    """`intrusion_depths` where sides look anywhere: pairs whose balls meet nowhere count by how far these are apart."""
+    deepest = np.full(len(at), -np.inf)
+    (balls_a, radii_a), (balls_b, radii_b) = _balls(a), _balls(b)
+    places_a, places_b = balls_a @ R_a.T, balls_b @ T_b[:3, :3].T + T_b[:3, 3]
+    for i, own in enumerate(a):
+        between = at[:, None] + places_a[i] - places_b[None]
+        rooms = np.sqrt((between * between).sum(axis=-1)) - radii_a[i] - radii_b
+        for j in np.argsort(rooms.min(axis=0)):
+            room = rooms[:, j]
+            near = (room <= 0.0) & (-room > deepest)
+            deepest = np.where(room > 0.0, np.maximum(deepest, -room), deepest)
+            if near.any():
+                deepest[near] = np.maximum(deepest[near], _pair_depths(own, R_a, at[near], b[j], T_b))
+    return deepest
+
+
+def _pair_depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array) -> Array:
+    """How deep one piece is in another one, at k places, (k,), [m]."""
+    axes = separating_axes(a, R_a, b, T_b[:3, :3])
+    (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, T_b[:3, :3], axes)
+    apart = np.abs((at - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
+    return np.asarray((half_a + half_b - apart).min(axis=-1))
 
 
 @lru_cache(maxsize=1024)
-def _ball(boxes: tuple[Box, ...]) -> tuple[Array, float]:
-    """Middle, (3,), and radius of a ball around boxes, in the frame of their solid."""
-    centers, halves = _boxes(boxes)
+def _all_boxes(pieces: tuple[Piece, ...]) -> bool:
+    return all_boxes(pieces)
+
+
+@lru_cache(maxsize=1024)
+def _corners(pieces: tuple[Piece, ...]) -> Array:
+    """The corners of all pieces, (k, 3), in the frame of their solid."""
+    return frozen(np.concatenate([piece_corners(piece) for piece in pieces]), None, 3)
+
+
+@lru_cache(maxsize=1024)
+def _balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
+    """Middles, (k, 3), and radii, (k,), of balls around pieces, in the frame of their solid."""
+    corners = [piece_corners(piece) for piece in pieces]
+    radii = [np.linalg.norm(c - p.center, axis=1).max() for c, p in zip(corners, pieces, strict=True)]
+    return frozen([piece.center for piece in pieces], None, 3), frozen(radii, None)
+
+
+@lru_cache(maxsize=1024)
+def _boxes(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
+    """Centres and half sizes, (k, 3) each, of boxes or of those around pieces, in the frame of their solid."""
+    return frozen([piece.center for piece in pieces], None, 3), frozen([piece.half for piece in pieces], None, 3)
+
+
+@lru_cache(maxsize=1024)
+def _ball(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
+    """Middle, (3,), and radius of a ball around pieces, in the frame of their solid."""
+    centers, halves = _boxes(pieces)
     low, high = (centers - halves).min(axis=0), (centers + halves).max(axis=0)
     return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
 
@@ -68,13 +115,16 @@ def _axes(R_a: Array, R_b: Array) -> Array:
     return np.concatenate([R_a.T, R_b.T, crossed[kept] / length[kept, None]])
 
 
-def upright_bounds(boxes: tuple[Box, ...], R: Array, at: Array) -> tuple[Array, Array]:
-    """The lowest and the highest corner, (3,) each, of the box around posed boxes whose sides are those of the world.
+def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Array, Array]:
+    """The lowest and the highest corner, (3,) each, of the box around posed pieces whose sides are those of the world.
 
     Args:
         R: (3, 3), their orientation.
         at: (3,), the place of their frame, [m].
     """
-    centers, halves = _boxes(boxes)
+    if not _all_boxes(pieces):
+        corners = _corners(pieces) @ R.T + at
+        return corners.min(axis=0), corners.max(axis=0)
+    centers, halves = _boxes(pieces)
     middle, reach = centers @ R.T + at, halves @ np.abs(R).T
     return (middle - reach).min(axis=0), (middle + reach).max(axis=0)

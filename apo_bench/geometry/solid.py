@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import final
@@ -11,7 +11,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.records import copyable
+from apo_bench.geometry.round_face import RoundFace
 
 
 @final
@@ -27,6 +29,8 @@ class Face:
     """Corners of each hole, shape (k, 3), clockwise seen from outside, [m]."""
     fit: bool = False
     """The physical part recedes here by the clearance; the nominal face does not."""
+    stated_normal: Array | None = None
+    """Of a sheet, whose corners need not make a polygon: points, or the ends of a line."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", frozen(self.outline, None, 3))
@@ -35,6 +39,8 @@ class Face:
     @cached_property
     def normal(self) -> Array:
         """The outward unit normal, (3,) (Newell's formula: right for concave outlines too)."""
+        if self.stated_normal is not None:
+            return frozen(self.stated_normal, 3)
         corners = self.outline - self.outline[0]
         M = corners.T @ np.concatenate([corners[1:], corners[:1]])
         n = np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
@@ -62,39 +68,64 @@ class Box:
         object.__setattr__(self, "half", frozen(self.half, 3))
 
 
-def extent(boxes: Iterable[Box], along: Array) -> tuple[float, float]:
-    """How far boxes reach along a direction, (3,), of their own frame: the least and the greatest coordinate, [m]."""
-    ends = [(along @ box.center, np.abs(along) @ box.half) for box in boxes]
-    return float(min(at - reach for at, reach in ends)), float(max(at + reach for at, reach in ends))
+Piece = Box | Hull
+"""A convex piece of a solid. Both have `center` and `half`, of the aligned box that it is or that is around it."""
+
+
+def extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
+    """How far pieces reach along a direction, (3,), of their own frame: the least and the greatest coordinate, [m]."""
+    ends = [_ends(piece, along) for piece in pieces]
+    return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
+
+
+def _ends(piece: Piece, along: Array) -> tuple[float, float]:
+    if isinstance(piece, Hull):
+        found = piece.corners @ along
+        return float(found.min()), float(found.max())
+    at, reach = along @ piece.center, np.abs(along) @ piece.half
+    return float(at - reach), float(at + reach)
 
 
 @final
 @copyable
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A rigid part of nominal size: named faces, and the boxes whose union it is."""
+    """A rigid part of nominal size: named faces, and the convex pieces whose union it is."""
 
     name: str
     faces: Mapping[str, Face]
-    boxes: tuple[Box, ...]
+    """The flat ones."""
+    pieces: tuple[Piece, ...]
     centroid: Array
     """Centre of volume of the union, (3,), [m]; the centre of mass, since parts are homogeneous."""
     volume: float
     """[m^3]."""
+    rounds: Mapping[str, RoundFace] = field(default_factory=dict)
+    """The faces of revolution; no name is in `faces` and here."""
+    inertia: Array | None = None
+    """Of density 1 about the centroid, (3, 3), [m^5]; None: that of its boxes, which do not overlap."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "faces", MappingProxyType(dict(self.faces)))
         object.__setattr__(self, "centroid", frozen(self.centroid, 3))
+        object.__setattr__(self, "rounds", MappingProxyType(dict(self.rounds)))
+        if self.inertia is not None:
+            object.__setattr__(self, "inertia", frozen(self.inertia, 3, 3))
+
+    @property
+    def fits(self) -> bool:
+        """Whether any face recedes by the clearance."""
+        return any(f.fit for f in self.faces.values()) or any(f.fit for f in self.rounds.values())
 
     @property
     def bounds(self) -> Array:
         """Lowest and highest corner of the solid, (2, 3), [m]."""
-        low = np.min([box.center - box.half for box in self.boxes], axis=0)
-        high = np.max([box.center + box.half for box in self.boxes], axis=0)
+        low = np.min([piece.center - piece.half for piece in self.pieces], axis=0)
+        high = np.max([piece.center + piece.half for piece in self.pieces], axis=0)
         return np.array([low, high])
 
 
 def world_bounds(posed: Iterable[tuple[Solid, Array]]) -> tuple[Array, Array]:
     """The lowest and the highest corner, (3,) each, of the box around posed solids, world frame, [m]."""
-    ends = np.array([[np.add(extent(solid.boxes, T[i, :3]), T[i, 3]) for i in range(3)] for solid, T in posed])
+    ends = np.array([[np.add(extent(solid.pieces, T[i, :3]), T[i, 3]) for i in range(3)] for solid, T in posed])
     return ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)

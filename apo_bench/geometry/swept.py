@@ -1,7 +1,7 @@
-"""Boxes moved along a straight line against boxes that rest: exactly where they meet, and where they come free.
+"""Pieces moved along a straight line against pieces that rest: exactly where they meet, and where they come free.
 
-Two boxes overlap where their shadows do along every separating axis; along a line each shadow does so in an interval,
-so each pair of boxes meets in one interval of the way.
+Two convex pieces overlap where their shadows do along every separating axis; along a line each shadow does so in an
+interval, so each pair of pieces meets in one interval of the way.
 """
 
 from __future__ import annotations
@@ -13,27 +13,30 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry.convex import all_boxes, separating_axes, shadow
+from apo_bench.geometry.solid import Piece
 
 _SLACK_M = 5e-5
-"""Boxes are less than this deep in each other where they touch."""
+"""Pieces are less than this deep in each other where they touch."""
 
 
 class Posed(NamedTuple):
-    """The boxes of a part somewhere."""
+    """The pieces of a part somewhere."""
 
-    boxes: tuple[Box, ...]
+    pieces: tuple[Piece, ...]
     T: Array
     """(4, 4), world, [m]."""
 
 
 def overlap_intervals(moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M) -> Array:
-    """Where along a line the boxes of two parts overlap by more than a slack, (k, 2), [m]: from and until.
+    """Where along a line the pieces of two parts overlap by more than a slack, (k, 2), [m]: from and until.
 
     Args:
         way: Unit vector of the motion, (3,), world.
-        slack_m: Negative: boxes count that are still this far apart.
+        slack_m: Negative: pieces count that are still this far apart.
     """
+    if not (all_boxes(moving.pieces) and all_boxes(resting.pieces)):
+        return _pair_by_pair(moving, way, resting, slack_m)
     a, half_a = _world(moving)
     b, half_b = _world(resting)
     axes = _axes(moving.T[:3, :3], resting.T[:3, :3])
@@ -42,6 +45,22 @@ def overlap_intervals(moving: Posed, way: Array, resting: Posed, slack_m: float 
     reach = (reach_a[:, None] + reach_b[None]).reshape(-1, len(axes)) - slack_m
     at = ((a @ axes.T)[:, None] - (b @ axes.T)[None]).reshape(-1, len(axes))
     return _intervals(at, axes @ way, reach)
+
+
+def _pair_by_pair(moving: Posed, way: Array, resting: Posed, slack_m: float) -> Array:
+    """`overlap_intervals` where sides look anywhere."""
+    found = [np.zeros((0, 2))]
+    (R_a, R_b), between = (moving.T[:3, :3], resting.T[:3, :3]), moving.T[:3, 3] - resting.T[:3, 3]
+    for a, b in product(moving.pieces, resting.pieces):
+        line = R_a @ a.center - R_b @ b.center + between
+        across = line - (line @ way) * way
+        if across @ across > (np.linalg.norm(a.half) + np.linalg.norm(b.half) + abs(slack_m)) ** 2:
+            continue
+        axes = separating_axes(a, R_a, b, R_b)
+        (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, R_b, axes)
+        at, reach = middle_a - middle_b + axes @ between, half_a + half_b - slack_m
+        found.append(_intervals(at[None], axes @ way, reach[None]))
+    return np.concatenate(found)
 
 
 def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
@@ -73,8 +92,8 @@ def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:
 
 def _ball(posed: Posed) -> tuple[Array, float]:
     """Middle and radius of a ball around a part."""
-    low = np.min([box.center - box.half for box in posed.boxes], axis=0)
-    high = np.max([box.center + box.half for box in posed.boxes], axis=0)
+    low = np.min([piece.center - piece.half for piece in posed.pieces], axis=0)
+    high = np.max([piece.center + piece.half for piece in posed.pieces], axis=0)
     return posed.T[:3, :3] @ (low + high) / 2 + posed.T[:3, 3], float(np.linalg.norm(high - low)) / 2
 
 
@@ -92,8 +111,8 @@ def _intervals(at: Array, speed: Array, reach: Array) -> Array:
 
 def _world(posed: Posed) -> tuple[Array, Array]:
     """Centres in the world and half sizes, (k, 3) each."""
-    centers = np.array([box.center for box in posed.boxes])
-    return centers @ posed.T[:3, :3].T + posed.T[:3, 3], np.array([box.half for box in posed.boxes])
+    centers = np.array([box.center for box in posed.pieces])
+    return centers @ posed.T[:3, :3].T + posed.T[:3, 3], np.array([box.half for box in posed.pieces])
 
 
 def _axes(R_a: Array, R_b: Array) -> Array:

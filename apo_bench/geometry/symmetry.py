@@ -41,7 +41,7 @@ def symmetries(solid: Solid) -> Array:
     do not count. Seen at `T g` it looks as it does at `T`.
     """
     c = solid.centroid
-    centred = [(box.center - c, box.half) for box in solid.boxes]
+    centred = [(box.center - c, box.half) for box in solid.pieces]
     turned = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
     g = np.tile(np.eye(4), (len(turned), 1, 1))
     g[:, :3, :3] = turned

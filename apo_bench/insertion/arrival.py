@@ -94,14 +94,14 @@ def arrive(
     T = poses[moves[0]]
     touched = tuple(touched_contacts(assembly, contacts, moves, poses))
     normals = _normals(touched, angle_rad)
-    moving = [Posed(assembly.solids[part].boxes, poses[part]) for part in moves]
-    resting = {part: Posed(solid.boxes, poses[part]) for part, solid in assembly.solids.items() if part not in moves}
+    moving = [Posed(assembly.solids[part].pieces, poses[part]) for part in moves]
+    resting = {part: Posed(solid.pieces, poses[part]) for part, solid in assembly.solids.items() if part not in moves}
     direction = stated.direction
     if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
         direction = None
 
     def clear(way: Array, length_m: float) -> bool:
-        begin = [Posed(posed.boxes, _shifted(posed.T, length_m * way)) for posed in moving]
+        begin = [Posed(posed.pieces, _shifted(posed.T, length_m * way)) for posed in moving]
         others = list(resting.values())
         return is_way_free(moving, way, length_m, others) and is_way_free(begin, UP, _CLEAR_M, others)
 

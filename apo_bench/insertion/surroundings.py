@@ -87,5 +87,5 @@ def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[f
 
 def _heights(solid: Solid, T: Array) -> tuple[float, float]:
     """The lowest and the highest point of a part, [m]."""
-    low, high = extent(solid.boxes, T[2, :3])
+    low, high = extent(solid.pieces, T[2, :3])
     return float(T[2, 3] + low), float(T[2, 3] + high)

@@ -11,14 +11,13 @@ from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly, Contact, Relation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.overlap import Overlap
 from apo_bench.geometry.solid import Solid
 from apo_bench.geometry.symmetry import nearest_symmetry, symmetries
 from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
-
-_SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
 
 
 def judge_finished(
@@ -112,5 +111,5 @@ def _displacements(
 
 
 def _corners(solid: Solid) -> Array:
-    """The corners of all boxes, (8 k, 3), in the frame of the solid, [m]."""
-    return np.concatenate([box.center + _SIGNS * box.half for box in solid.boxes])
+    """The corners of all pieces, (k, 3), in the frame of the solid, [m]."""
+    return np.concatenate([piece_corners(piece) for piece in solid.pieces])

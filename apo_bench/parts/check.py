@@ -43,6 +43,6 @@ def _mesh(solid: Solid) -> Any:
     import manifold3d
     import trimesh
 
-    boxes = [manifold3d.Manifold.cube(2.0 * box.half, center=True).translate(box.center) for box in solid.boxes]
+    boxes = [manifold3d.Manifold.cube(2.0 * box.half, center=True).translate(box.center) for box in solid.pieces]
     mesh = manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add).to_mesh64()
     return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)

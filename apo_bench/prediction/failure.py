@@ -20,7 +20,7 @@ from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Attach
@@ -194,6 +194,6 @@ def _operation(doing: _Doing) -> Operation:
 def _physical(assembly: Assembly, clearance_mm: float) -> dict[str, Solid]:
     """The parts as they are made, fit faces receded."""
     return {
-        name: replace(solid, boxes=physical_boxes(solid, clearance_mm * 1e-3))
+        name: replace(solid, pieces=physical_pieces(solid, clearance_mm * 1e-3))
         for name, solid in assembly.solids.items()
     }

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly.goals import Layout
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import extent
 from apo_bench.scenario.scenario import Scenario
 
@@ -60,7 +60,7 @@ def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Arr
     if part in scenario.assembly.fixed or clearance_m == 0.0 or not any(face.fit for face in solid.faces.values()):
         return T
     lowered = np.array(T)
-    lowered[2, 3] -= extent(physical_boxes(solid, clearance_m), T[2, :3])[0] - extent(solid.boxes, T[2, :3])[0]
+    lowered[2, 3] -= extent(physical_pieces(solid, clearance_m), T[2, :3])[0] - extent(solid.pieces, T[2, :3])[0]
     return lowered
 
 

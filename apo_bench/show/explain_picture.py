@@ -93,13 +93,13 @@ def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
     color = (_SHADE * r, _SHADE * g, _SHADE * b)
     axis = R @ direction.axis
     if not direction.turns:
-        reach = extent(one.solid.boxes, direction.axis)[1] - direction.axis @ middle
+        reach = extent(one.solid.pieces, direction.axis)[1] - direction.axis @ middle
         center = R @ middle + one.pose[:3, 3]
         return ShiftArrows(center, axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, color, str(direction))
-    low, high = extent(one.solid.boxes, direction.axis)
+    low, high = extent(one.solid.pieces, direction.axis)
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
     across = _across(direction.axis)
-    ends = np.array([extent(one.solid.boxes, v) for v in across]) - (across @ about)[:, None]
+    ends = np.array([extent(one.solid.pieces, v) for v in across]) - (across @ about)[:, None]
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
     return TurnRing(R @ about + one.pose[:3, 3], axis, toward, radius, color, str(direction))
 

@@ -21,7 +21,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import Solid
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.scene.physics import Physics, physics
@@ -112,7 +112,7 @@ def _xml(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float,
         body = ElementTree.SubElement(room, "body", {"name": f"{part}/"})
         if part in free:
             ElementTree.SubElement(body, "freejoint")
-        for box in physical_boxes(solid, clearance_m):
+        for box in physical_pieces(solid, clearance_m):
             ElementTree.SubElement(body, "geom", {"pos": _spelled(box.center), "size": _spelled(box.half)})
     return ElementTree.tostring(root, encoding="unicode")
 

@@ -168,7 +168,7 @@ def _read(path: Path, key: str, scene: Scene) -> Recording:
 
 def _named(node: JsonNode, scene: Scene) -> dict[str, Array]:
     """Part -> its pose, (4, 4), of every part of the scenario."""
-    return {part: _poses(of) for part, of in node.fields(scene.boxes).items()}
+    return {part: _poses(of) for part, of in node.fields(scene.pieces).items()}
 
 
 def _poses(node: JsonNode, *n: int) -> Array:

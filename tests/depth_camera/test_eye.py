@@ -21,7 +21,7 @@ from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.symmetry import symmetries
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
@@ -80,7 +80,7 @@ def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
     sight.look(hands.data.qpos)
     image = sight.range_image(finder)
     solids, play = built.scenario.assembly.solids, 1e-3 * built.clearance_mm
-    whole = join_shapes(shape_of(physical_boxes(solids[part], play), start[part]) for part in solids)
+    whole = join_shapes(shape_of(physical_pieces(solids[part], play), start[part]) for part in solids)
     for view, distance in zip(finder.views, image.distance, strict=True):
         expected = strike_distances(whole, view.origin, view.rays)[0].reshape(distance.shape)
         both = np.isfinite(expected)
@@ -162,7 +162,7 @@ def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
     """The scene shows a stick where the topology expects a second cube-like block to arrive."""
     shown = watched("stick_in_tower")
     assembly = shown.demonstration.assembly
-    short = replace(assembly.solids["stick"], boxes=assembly.solids["castle1"].boxes)
+    short = replace(assembly.solids["stick"], pieces=assembly.solids["castle1"].pieces)
     wrong = replace(assembly, solids={**assembly.solids, "stick": short})
     eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
     seen = eye(wrong, replace(shown.demonstration, assembly=wrong), stream(3, OBSERVATION))

@@ -23,7 +23,7 @@ from tests.scenes import block, castle, cube, mm, stick
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOLIDS = {"castle": castle(), "cube": cube(), "stick": stick(), "block": block()}
-SHAPES = {name: shape_of(solid.boxes) for name, solid in SOLIDS.items()}
+SHAPES = {name: shape_of(solid.pieces) for name, solid in SOLIDS.items()}
 STANDING = pose.at((0.05, 0.02, 0.0), (0.0, 0.0, 25.0))
 
 

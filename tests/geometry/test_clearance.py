@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import Face, Solid
 from apo_bench.parts import load_part
 from apo_bench.parts.faces import SIDES, unite
 
 
 def sizes(name: str, clearance_m: float) -> dict[str, tuple[float, ...]]:
-    return {box.name: tuple(2e3 * box.half) for box in physical_boxes(load_part(name), clearance_m)}
+    return {box.name: tuple(2e3 * box.half) for box in physical_pieces(load_part(name), clearance_m)}
 
 
 def test_the_stick_gets_thinner_and_not_shorter():
@@ -23,7 +23,7 @@ def test_the_stick_gets_thinner_and_not_shorter():
 @pytest.mark.parametrize("name", ["castle", "cube", "block", "bridge", "table"])
 def test_parts_without_fit_faces_keep_their_size(name: str):
     solid = load_part(name)
-    for before, after in zip(solid.boxes, physical_boxes(solid, 0.0005), strict=True):
+    for before, after in zip(solid.pieces, physical_pieces(solid, 0.0005), strict=True):
         assert (before.center == after.center).all()
         assert (before.half == after.half).all()
 
@@ -33,8 +33,8 @@ def test_a_pocket_is_wider_and_has_no_crack(clearance_mm: float):
     """The union of the physical boxes is again one solid with two plain pockets, as deep as before."""
     c = 1e-3 * clearance_mm
     solid = load_part("table_pockets")
-    boxes = physical_boxes(solid, c)
-    assert [box.name for box in boxes] == [box.name for box in solid.boxes]
+    boxes = physical_pieces(solid, c)
+    assert [box.name for box in boxes] == [box.name for box in solid.pieces]
     union = unite(boxes)
     wide = 0.05 + 2 * c
     assert union.volume == pytest.approx(1.4 * 1.2 * 0.02 - 2 * wide**2 * 0.006, rel=1e-9)
@@ -48,11 +48,11 @@ def test_a_pocket_is_wider_and_has_no_crack(clearance_mm: float):
 @pytest.mark.parametrize("clearance_m", [-1e-4, float("nan"), float("inf"), 0.01, 1.0])
 def test_a_clearance_that_cannot_be(clearance_m: float):
     with pytest.raises(InputError, match=r"clearance of .* part 'stick'"):
-        physical_boxes(load_part("stick"), clearance_m)
+        physical_pieces(load_part("stick"), clearance_m)
 
 
 def test_a_side_with_a_fit_face_and_another_cannot_recede():
-    bar = load_part("stick").boxes[0]
+    bar = load_part("stick").pieces[0]
     halves = {
         name: Face(
             name,
@@ -62,4 +62,4 @@ def test_a_side_with_a_fit_face_and_another_cannot_recede():
         for name, x, fit in (("left", -0.11, True), ("right", 0.0, False))
     }
     with pytest.raises(InputError, match="'left' and the face 'right'"):
-        physical_boxes(Solid("odd", halves, (bar,), np.zeros(3), bar.half.prod() * 8), 1e-4)
+        physical_pieces(Solid("odd", halves, (bar,), np.zeros(3), bar.half.prod() * 8), 1e-4)

@@ -18,5 +18,5 @@ def test_the_farthest_corners_are_the_extent(seed: int) -> None:
     along = np.random.default_rng(seed).standard_normal(3)
     for solid in (scenes.castle(), scenes.cube(), scenes.stick()):
         signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-        reach = np.concatenate([(box.center + signs * box.half) @ along for box in solid.boxes])
-        assert extent(solid.boxes, along) == pytest.approx((reach.min(), reach.max()), abs=1e-15)
+        reach = np.concatenate([(box.center + signs * box.half) @ along for box in solid.pieces])
+        assert extent(solid.pieces, along) == pytest.approx((reach.min(), reach.max()), abs=1e-15)

@@ -37,7 +37,7 @@ def test_intrusion_agrees_with_points(T: Array):
     """A common point well inside both boxes means intrusion; boxes pushed apart by the depth only touch."""
     a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
     grid = np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 9)] * 3), axis=-1).reshape(-1, 3)
-    inside = np.abs(pose.apply(pose.inverse(T), grid * a.boxes[0].half)) < 0.95 * b.boxes[0].half
+    inside = np.abs(pose.apply(pose.inverse(T), grid * a.pieces[0].half)) < 0.95 * b.pieces[0].half
     depth = intrusion(a, np.eye(4), b, T)
     if inside.all(axis=1).any():
         assert depth > 0
@@ -55,7 +55,7 @@ def test_depths_of_boxes_at_many_places_are_those_of_the_solids() -> None:
     a, b = scenes.block("a"), scenes.block("b")
     T_a, T_b = pose.at((0, 0, 0), (0, 0, 30)), pose.at((0.02, 0.01, 0.03), (10, 0, 0))
     at = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.01], [0.2, 0.0, 0.0]])
-    found = intrusion_depths(a.boxes, T_a[:3, :3], at, b.boxes, T_b)
+    found = intrusion_depths(a.pieces, T_a[:3, :3], at, b.pieces, T_b)
     for p, depth_m in zip(at, found, strict=True):
         T = np.array(T_a)
         T[:3, 3] = p

@@ -33,7 +33,7 @@ def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
         way = rng.standard_normal(3) if rng.integers(2) else np.eye(3)[rng.integers(3)]
         way = way / np.linalg.norm(way)
         s = np.linspace(-0.3, 0.3, 301)
-        deep = intrusion_depths(a.boxes, a.T[:3, :3], a.T[:3, 3] + np.outer(s, way), b.boxes, b.T) - slack
+        deep = intrusion_depths(a.pieces, a.T[:3, :3], a.T[:3, 3] + np.outer(s, way), b.pieces, b.T) - slack
         spans = overlap_intervals(a, way, b, slack)
         inside = ((s[:, None] > spans[:, 0]) & (s[:, None] < spans[:, 1])).any(axis=1)
         clear = np.abs(deep) > 1e-9
@@ -47,12 +47,12 @@ def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
     rng, met = np.random.default_rng(2), 0
     for _ in range(60):
         a, b = boxes(rng), boxes(rng)
-        a, b = Posed(a.boxes[:1], a.T), Posed(b.boxes[:1], b.T)
+        a, b = Posed(a.pieces[:1], a.T), Posed(b.pieces[:1], b.T)
         way = (b.T - a.T)[:3, 3] + rng.uniform(-0.02, 0.02, 3)
         way = way / np.linalg.norm(way)
         spans = overlap_intervals(a, way, b, 0.0)
         for s in rng.uniform(0.0, 0.3, 4):
-            moved = Posed(a.boxes, pose.at(s * way) @ a.T)
+            moved = Posed(a.pieces, pose.at(s * way) @ a.T)
             if np.abs(spans - s).min(initial=1.0) > 1e-6:
                 assert common_point(moved, b) == bool(((spans[:, 0] < s) & (s < spans[:, 1])).any())
                 met += common_point(moved, b)
@@ -62,7 +62,7 @@ def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
 def common_point(a: Posed, b: Posed) -> bool:
     A, limits = [], []
     for posed in (a, b):
-        (box,) = posed.boxes
+        (box,) = posed.pieces
         R, middle = posed.T[:3, :3], posed.T[:3, :3] @ box.center + posed.T[:3, 3]
         A += [R.T, -R.T]
         limits += [box.half + R.T @ middle, box.half - R.T @ middle]
@@ -72,7 +72,7 @@ def common_point(a: Posed, b: Posed) -> bool:
 
 
 def posed(solid: Solid, T: Array) -> Posed:
-    return Posed(solid.boxes, T)
+    return Posed(solid.pieces, T)
 
 
 def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:

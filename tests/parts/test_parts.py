@@ -139,7 +139,7 @@ def test_a_mesh_union_has_the_same_volume_and_surface(name: str):
     import trimesh
 
     solid = load_part(name)
-    boxes = [trimesh.creation.box(bounds=(b.center - b.half, b.center + b.half)) for b in solid.boxes]
+    boxes = [trimesh.creation.box(bounds=(b.center - b.half, b.center + b.half)) for b in solid.pieces]
     mesh = trimesh.boolean.union(boxes, engine="manifold") if len(boxes) > 1 else boxes[0]
     assert mesh.volume == pytest.approx(solid.volume, rel=1e-6)
     assert mesh.center_mass == pytest.approx(solid.centroid, abs=1e-7)
@@ -258,7 +258,7 @@ def test_the_simulator_reads_the_same_boxes(name: str):
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(part_path(name)))
-    for box in load_part(name).boxes:
+    for box in load_part(name).pieces:
         geom = model.geom(box.name)
         assert geom.type == mujoco.mjtGeom.mjGEOM_BOX
         assert geom.pos == pytest.approx(box.center)

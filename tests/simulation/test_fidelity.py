@@ -166,7 +166,7 @@ def test_what_is_near_is_told_from_what_is_far():
     its = scene()
     data = initial_state(its.work, shown().layout.start)
     stick = part_pose(its.work, data, "stick")
-    hand = [near.Moving(its.boxes["stick"], np.eye(4))]
+    hand = [near.Moving(its.pieces["stick"], np.eye(4))]
     held = ("stick",)
 
     def spans(start, end):
@@ -194,7 +194,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
     its, rng = scene(), np.random.default_rng(5)
     data = initial_state(its.work, shown().layout.start)
     others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
-    hand = [near.Moving(its.boxes["stick"], np.eye(4))]
+    hand = [near.Moving(its.pieces["stick"], np.eye(4))]
     came, left_out = 0, 0
     for _ in range(60):
         start = pose.at(rng.uniform((-0.1, -0.1, 0.03), (0.1, 0.1, 0.2)), rng.uniform(-30.0, 30.0, 3))
@@ -204,7 +204,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
         for i, T in enumerate(line.poses(s)):
             depths = [
                 intrusion_depths(
-                    its.boxes["stick"], T[:3, :3], T[None, :3, 3], its.boxes[part], near._pose(its.work, data, part)
+                    its.pieces["stick"], T[:3, :3], T[None, :3, 3], its.pieces[part], near._pose(its.work, data, part)
                 )
                 for part in others
             ]
@@ -222,7 +222,7 @@ def test_nothing_is_left_out_while_something_moves():
     stick = part_pose(its.work, data, "stick")
     line = Trajectory(shifted(stick, (0, 0, 1), 0.2), shifted(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
     s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
-    hand = [near.Moving(its.boxes["stick"], np.eye(4))]
+    hand = [near.Moving(its.pieces["stick"], np.eye(4))]
     assert near.near_spans(its, data, hand, ("stick",), line, s) == []
     other = next(part for part in its.work.free if part != "stick")
     data.qvel[its.work.dof[other]] = 0.01

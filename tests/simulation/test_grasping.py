@@ -41,7 +41,7 @@ def depth(scene: Scene, move: Move, T_part: Array, T_tip: Array, opening: float,
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
     T = T_part @ T_tip
     around = obstacles(scene.scenario.assembly.solids, poses, (move.transfer.part,))
-    return max(float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.boxes, o.T)[0]) for o in around)
+    return max(float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], o.pieces, o.T)[0]) for o in around)
 
 
 def test_the_gripper_is_as_wide_as_its_fingers_are_open(pockets: Scene) -> None:

@@ -97,7 +97,7 @@ def _solved(cq: Any, observation: Observation, poses: Poses, standing: list[Rela
     mated = {end.part: None for relation in standing for end in relation.contact}
     assembly = cq.Assembly(name="assembly")
     for part in mated:
-        boxes = [_box(cq, box.center * _MM, box.half * _MM) for box in observation.assembly.solids[part].boxes]
+        boxes = [_box(cq, box.center * _MM, box.half * _MM) for box in observation.assembly.solids[part].pieces]
         assembly.add(cq.Compound.makeCompound(boxes), name=part, loc=_location(cq, poses[part]))
         if part not in moved:
             assembly.constrain(part, "Fixed")

@@ -44,8 +44,8 @@ def meeting(assembly: Assembly, system: Equations) -> Meeting:
     pairs = [
         (w, a, b)
         for w, i in enumerate(first)
-        for a in assembly.solids[contacts[i].manipulated.part].boxes
-        for b in assembly.solids[contacts[i].environment.part].boxes
+        for a in assembly.solids[contacts[i].manipulated.part].pieces
+        for b in assembly.solids[contacts[i].environment.part].pieces
     ]
     letters, inverse = system.letters[first], system.inverse[first]
     words = Equations(

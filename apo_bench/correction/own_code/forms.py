@@ -149,7 +149,7 @@ def _solid_form(solid: Solid) -> MessageForm:
             [key, face.name, face.outline.tolist(), [hole.tolist() for hole in face.holes], bool(face.fit)]
             for key, face in solid.faces.items()
         ],
-        "boxes": [[box.name, box.center.tolist(), box.half.tolist()] for box in solid.boxes],
+        "boxes": [[box.name, box.center.tolist(), box.half.tolist()] for box in solid.pieces],
         "centroid": solid.centroid.tolist(),
         "volume": float(solid.volume),
     }

@@ -58,7 +58,7 @@ class Grips(NamedTuple):
 
 def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str]) -> tuple[Obstacle, ...]:
     """Every part but these, where it is believed to be."""
-    return tuple(obstacle(solid.boxes, poses[part]) for part, solid in solids.items() if part not in without)
+    return tuple(obstacle(solid.pieces, poses[part]) for part, solid in solids.items() if part not in without)
 
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
@@ -198,7 +198,7 @@ def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[O
     depth = np.full(len(at), -1.0)
     for each in around:
         if (low < each.high).all() and (high > each.low).all():
-            depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.boxes, each.T))
+            depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.pieces, each.T))
     return depth
 
 

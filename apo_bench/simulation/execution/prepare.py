@@ -10,7 +10,7 @@ from apo_bench.assembly.goals import Plan, Poses, Step
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import extent
 from apo_bench.insertion.surroundings import (
     OVER_M,
@@ -170,7 +170,7 @@ def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: A
     T = {p: pose.inverse(poses[part]) @ poses[p] for p in moves}
 
     def ends(axis: Array) -> tuple[float, float]:
-        found = [np.add(extent(scene.boxes[p], axis @ T[p][:3, :3]), axis @ T[p][:3, 3]) for p in moves]
+        found = [np.add(extent(scene.pieces[p], axis @ T[p][:3, :3]), axis @ T[p][:3, 3]) for p in moves]
         return float(np.min(found)), float(np.max(found))
 
     middle = np.array([np.mean(ends(axis)) for axis in np.eye(3)])
@@ -212,7 +212,7 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
     rest = scene.kinematics.forward(scene.arm.home)
     tips = [tip_frame(each, start) for each in (grasp, other)]
     tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
-    near, far = extent(physical_boxes(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3), grasp.across)
+    near, far = extent(physical_pieces(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3), grasp.across)
     return Grip(tip, (far - near) / 2)
 
 

@@ -103,7 +103,7 @@ class Hands:
 
     def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: those where something is near; at last the end."""
-        boxes, tip = self.scene.boxes, pose.inverse(line.start)
+        boxes, tip = self.scene.pieces, pose.inverse(line.start)
         held = tuple(self._held[hand])
         moving = [Moving(boxes[part], tip @ self.pose(part)) for part in held]
         s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))

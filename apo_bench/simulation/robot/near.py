@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry.solid import Piece
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import Ints, World, part_pose
@@ -39,22 +39,22 @@ _Span = tuple[int, int]
 class Obstacle(NamedTuple):
     """A part that rests while another is moved."""
 
-    boxes: tuple[Box, ...]
+    pieces: tuple[Piece, ...]
     T: Array
     low: Array
     """The lowest corner of the upright box around it, (3,), world, [m]."""
     high: Array
 
 
-def obstacle(boxes: tuple[Box, ...], T: Array) -> Obstacle:
+def obstacle(pieces: tuple[Piece, ...], T: Array) -> Obstacle:
     """A part that rests at T."""
-    return Obstacle(boxes, T, *upright_bounds(boxes, T[:3, :3], T[:3, 3]))
+    return Obstacle(pieces, T, *upright_bounds(pieces, T[:3, :3], T[:3, 3]))
 
 
 class Moving(NamedTuple):
-    """Boxes that move with the tip, in their own frame."""
+    """Pieces that move with the tip, in their own frame."""
 
-    boxes: tuple[Box, ...]
+    pieces: tuple[Piece, ...]
     T_tip: Array
 
 
@@ -83,7 +83,7 @@ def near_spans(
     others = [part for part in (*world.free, *world.fixed) if part not in held]
     if not _still(world, data, others):
         return [(0, n)]
-    obstacles = [obstacle(scene.boxes[part], _pose(world, data, part)) for part in others]
+    obstacles = [obstacle(scene.pieces[part], _pose(world, data, part)) for part in others]
     far = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
     looks = np.unique(np.append(np.searchsorted(s, np.arange(0.0, s[-1], _apart(far))), n))
     near = _near(moving, obstacles, line, s[looks], near_m[len(held) > 1])
@@ -104,8 +104,8 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
     tips, near = start + s[:, None] * (line.end[:3, 3] - start), np.zeros(len(s), dtype=np.bool_)
     turns = float(np.linalg.norm(line.turn)) > _UPRIGHT
     bounds = np.array([(each.low, each.high) for each in obstacles])
-    for boxes, T_tip in moving:
-        low, high = upright_bounds(boxes, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
+    for pieces, T_tip in moving:
+        low, high = upright_bounds(pieces, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
         if turns:
             low, high = _swept(low, high, R @ line.turn)
         low, high = tips + (low - margin), tips + (high + margin)
@@ -118,7 +118,7 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
                 near[look] = (
-                    intrusion_depths(boxes, R @ T_tip[:3, :3], at, obstacles[i].boxes, obstacles[i].T) > -margin
+                    intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T) > -margin
                 )
     return near
 

@@ -237,7 +237,7 @@ class Robot:
     def _moving(self, opening: float) -> list[Moving]:
         """The hand and what it holds, as they move with the tip."""
         tip = pose.inverse(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
-        held = [Moving(self.scene.boxes[p], tip @ part_pose(self.scene.work, self.data, p)) for p in self._held]
+        held = [Moving(self.scene.pieces[p], tip @ part_pose(self.scene.work, self.data, p)) for p in self._held]
         return [Moving(gripper_boxes(self.scene.kinematics, self.arm, round(opening, 4)), np.eye(4)), *held]
 
     def _fast_forward(self, q: Array, velocity: Array, steps: int) -> None:

@@ -11,8 +11,8 @@ import mujoco
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_boxes
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.solid import Piece
 from apo_bench.parts import read_part
 from apo_bench.records.settings import check
 from apo_bench.records.thresholds import Criteria
@@ -44,8 +44,8 @@ class Scene:
     grasp: _Grasp
     arm: Arm
     physics: Physics
-    boxes: Mapping[str, tuple[Box, ...]]
-    """Part -> its boxes as it is made, with clearance."""
+    pieces: Mapping[str, tuple[Piece, ...]]
+    """Part -> its pieces as it is made, with clearance."""
     shown: World
     """Parts and hands: where the human demonstrates."""
     work: World
@@ -82,7 +82,7 @@ def build_scene(
         grasp="weld" if grasp == "weld" else "friction",
         arm=found,
         physics=settings,
-        boxes={name: physical_boxes(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
+        pieces={name: physical_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=shown,
         work=_compiled(scenario, _compose(scenario, clearance, settings, found, grasp)),
         kinematics=Kinematics(found),
@@ -155,12 +155,12 @@ def _add_part(
 ) -> Any:
     """Attach a part's file at T, its fit faces receded; returns the body that has the mass (its frame has none)."""
     file, solid = read_part(scenario.part_files[part]), scenario.assembly.solids[part]
-    if [box.name for box in file.boxes] != [box.name for box in solid.boxes]:
-        raise InputError(f"{file.path}: the boxes are others than those of part '{part}'; load the scenario again.")
+    if [box.name for box in file.boxes] != [piece.name for piece in solid.pieces]:
+        raise InputError(f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.")
     model = mjcf.from_xml_string(file.xml)
     model.model = part
     _set_contact(model, settings)
-    for box in physical_boxes(solid, clearance_mm * 1e-3):
+    for box in physical_pieces(solid, clearance_mm * 1e-3):
         geom = model.find("geom", box.name)
         geom.pos, geom.size = box.center, box.half
     if part in scenario.colors:

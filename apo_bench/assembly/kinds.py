@@ -1,0 +1,43 @@
+"""What kind of contact two faces make, and how much play their sizes leave."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face
+
+ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
+CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)
+_SAME_SLOPE = 2e-3
+"""A cone sits in another one if their half angles differ by less, about 0.1 degrees."""
+
+
+def contact_kind(a: Face | RoundFace, b: Face | RoundFace) -> ContactKind | None:
+    """The kind of contact that two faces can make, in either order; None if they can make none."""
+    if isinstance(a, Face) and isinstance(b, Face):
+        return "plane on plane"
+    if isinstance(a, Face) or isinstance(b, Face):
+        wall = b if isinstance(a, Face) else a
+        assert isinstance(wall, RoundFace)
+        return "shaft on plane" if wall.kind == "cylinder" and not wall.hole else None
+    if a.kind == "rim" or b.kind == "rim":
+        rim, cone = (a, b) if a.kind == "rim" else (b, a)
+        return "cone on rim" if cone.kind == "cone" and rim.hole != cone.hole else None
+    if a.hole == b.hole or a.kind != b.kind:
+        return None
+    if a.kind == "cylinder":
+        return "shaft in hole"
+    return "cone in cone" if abs(abs(a.slope) - abs(b.slope)) < _SAME_SLOPE else None
+
+
+def geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
+    """By how much the radius of a hole is larger than that of its shaft, [m]; 0 of every other contact.
+
+    Negative where the shaft is thicker than the hole.
+    """
+    if contact_kind(a, b) != "shaft in hole":
+        return 0.0
+    assert isinstance(a, RoundFace)
+    assert isinstance(b, RoundFace)
+    return a.radius - b.radius if a.hole else b.radius - a.radius

@@ -1,0 +1,107 @@
+"""Convex pieces that are no boxes: their corners, the sides between them, and cylinders among them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
+
+SAGITTA_M = 5e-6
+"""A round wall is stood for by flat ones that are nowhere farther from it."""
+FEWEST_SIDES = 16
+_FLAT = 1e-7
+"""Normals of triangles, and directions of edges, are the same within this."""
+
+
+def sides_of(radius_m: float) -> int:
+    """Into how many sides a round wall is cut: r (1 / cos(pi / N) - 1) is at most `SAGITTA_M`."""
+    return max(FEWEST_SIDES, int(np.ceil(np.pi / np.arccos(radius_m / (radius_m + SAGITTA_M)))))
+
+
+class Cylinder(NamedTuple):
+    """A cylinder in the frame of its solid."""
+
+    center: Array
+    """(3,), [m]."""
+    axis: Array
+    """Unit vector, (3,)."""
+    radius: float
+    half_length: float
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """The smallest convex piece that contains its corners, in the frame of its solid."""
+
+    name: str
+    corners: Array
+    """(k, 3), each a corner of the piece, [m]."""
+    cylinder: Cylinder | None = None
+    """The cylinder that it stands for; its corners lie on the edges of that one."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "corners", frozen(self.corners, None, 3))
+
+    @cached_property
+    def center(self) -> Array:
+        """The middle of the box around it, (3,), [m]."""
+        return frozen((self.corners.min(axis=0) + self.corners.max(axis=0)) / 2, 3)
+
+    @cached_property
+    def half(self) -> Array:
+        """Half the size of the box around it, (3,), [m]."""
+        return frozen((self.corners.max(axis=0) - self.corners.min(axis=0)) / 2, 3)
+
+    @cached_property
+    def planes(self) -> Array:
+        """Its sides, (s, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
+        from scipy.spatial import ConvexHull
+
+        found = ConvexHull(self.corners).equations * [1.0, 1.0, 1.0, -1.0]
+        return frozen(found[_first_of_each(found[:, :3], signed=True)], None, 4)
+
+    @cached_property
+    def normals(self) -> Array:
+        """Directions across its sides, (s, 3), each once up to its sign."""
+        return frozen(self.planes[_first_of_each(self.planes[:, :3]), :3], None, 3)
+
+    @cached_property
+    def edges(self) -> Array:
+        """Directions of its edges, (e, 3), each once up to its sign."""
+        n, d = self.planes[:, :3], self.planes[:, 3]
+        on = np.abs(n @ self.corners.T - d[:, None]) < 1e-7 * (1.0 + np.abs(d[:, None]))
+        both = on.astype(np.int64) @ on.T.astype(np.int64)
+        pairs = np.argwhere(np.triu(both >= 2, k=1))
+        along = np.cross(n[pairs[:, 0]], n[pairs[:, 1]])
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        return frozen(along[_first_of_each(along)], None, 3)
+
+
+def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
+    """A cylinder as a piece: a prism whose corners lie on its edges."""
+    n = sides_of(cylinder.radius)
+    z = cylinder.axis
+    x = np.eye(3)[int(np.abs(z).argmin())]
+    x = x - (x @ z) * z
+    x /= np.sqrt(x @ x)
+    angle = 2.0 * np.pi * np.arange(n) / n
+    ring = cylinder.radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), np.cross(z, x)))
+    ends = [cylinder.center + sign * cylinder.half_length * z + ring for sign in (-1.0, 1.0)]
+    return Hull(name, np.concatenate(ends), cylinder)
+
+
+def _first_of_each(directions: Array, signed: bool = False) -> Array:
+    """Row numbers of unit vectors, (k, 3), none of which is another one of them, or its opposite."""
+    kept: list[int] = []
+    for i, n in enumerate(directions):
+        cosine = directions[kept] @ n if kept else np.zeros(0)
+        if not ((cosine if signed else np.abs(cosine)) > 1.0 - _FLAT).any():
+            kept.append(i)
+    return np.array(kept, dtype=np.intp)

@@ -1,0 +1,89 @@
+"""Faces of revolution: the walls of holes, shafts, chamfers and tapers, and the rims of holes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.records import copyable
+
+RoundKind = Literal["cylinder", "cone", "rim"]
+WHOLE_TURN = 2.0 * np.pi
+_SAME_M = 1e-9
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class RoundFace:
+    """A piece of a cylinder or a cone, or the circle at its end, in the frame of its solid."""
+
+    name: str
+    point: Array
+    """A point of the axis, (3,), [m]."""
+    axis: Array
+    """Unit vector, (3,). Its sense has no meaning for a cylinder; of a rim it looks out of the part."""
+    span: tuple[float, float]
+    """From where to where along the axis, from `point`, [m]; both the same: a rim."""
+    radii: tuple[float, float]
+    """At both ends of the span, [m]."""
+    hole: bool
+    """The part is outside: a hole. Otherwise it is inside: a shaft."""
+    fit: bool = False
+    """The physical part recedes here by the clearance; the nominal face does not."""
+    extent_rad: float = WHOLE_TURN
+    """How far around the axis it reaches."""
+    toward: Array | None = None
+    """From the axis to the middle of the face, unit vector, (3,); None of a whole turn."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", frozen(self.point, 3))
+        object.__setattr__(self, "axis", frozen(self.axis, 3))
+        if self.toward is not None:
+            object.__setattr__(self, "toward", frozen(self.toward, 3))
+
+    @property
+    def kind(self) -> RoundKind:
+        if self.span[1] - self.span[0] < _SAME_M:
+            return "rim"
+        return "cylinder" if abs(self.radii[1] - self.radii[0]) < _SAME_M else "cone"
+
+    @property
+    def length(self) -> float:
+        """Along the axis, [m]."""
+        return self.span[1] - self.span[0]
+
+    @property
+    def radius(self) -> float:
+        """Of a cylinder or a rim; in the middle of a cone, [m]."""
+        return (self.radii[0] + self.radii[1]) / 2
+
+    @property
+    def slope(self) -> float:
+        """By how much the radius grows along the axis, 1 for a cone of 45 degrees to its axis."""
+        return (self.radii[1] - self.radii[0]) / self.length if self.length >= _SAME_M else 0.0
+
+    @cached_property
+    def ends(self) -> Array:
+        """Where the axis enters and leaves the face, (2, 3), [m]."""
+        return frozen(self.point + np.outer(self.span, self.axis), 2, 3)
+
+    @property
+    def middle(self) -> Array:
+        """The middle of the axis within the face, (3,), [m]."""
+        return np.asarray(self.ends.mean(axis=0))
+
+    @cached_property
+    def frame(self) -> Array:
+        """A frame on the axis, z along it, x towards the middle of the face if there is one, (4, 4)."""
+        z = self.axis
+        x = self.toward if self.toward is not None else np.eye(3)[int(np.abs(z).argmin())]
+        x = x - (x @ z) * z
+        x = x / np.sqrt(x @ x)
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), self.point
+        return frozen(T, 4, 4)

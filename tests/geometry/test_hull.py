@@ -1,0 +1,93 @@
+"""Convex pieces: as boxes where they are boxes, as their formulas say where they are round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, sides_of
+from apo_bench.geometry.intrusion import intrusion, intrusion_depths
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Box, Solid, extent
+from apo_bench.geometry.swept import Posed, overlap_intervals
+
+
+def posed(rng: np.random.Generator, reach: float = 0.05) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+    T[:3, 3] = rng.uniform(-reach, reach, 3)
+    return T
+
+
+def solid(*pieces: Box | Hull, **rounds: RoundFace) -> Solid:
+    return Solid("part", {}, pieces, np.zeros(3), 1.0, rounds)
+
+
+def as_hull(box: Box) -> Hull:
+    return Hull(box.name, piece_corners(box))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_box_as_a_hull_is_as_deep_in_another_one_as_the_box(seed: int):
+    rng = np.random.default_rng(seed)
+    a, b = (Box(name, rng.uniform(-0.02, 0.02, 3), rng.uniform(0.005, 0.03, 3)) for name in "ab")
+    T_a, T_b = posed(rng), posed(rng)
+    wanted = intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
+    found = intrusion_depths((as_hull(a),), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
+    if wanted[0] > 0.0:
+        assert found == pytest.approx(wanted, abs=1e-12)
+    assert (found > 0.0) == (wanted > 0.0)
+    way = rng.standard_normal(3)
+    way /= np.linalg.norm(way)
+    spans = overlap_intervals(Posed((a,), T_a), way, Posed((b,), T_b))
+    same = overlap_intervals(Posed((as_hull(a),), T_a), way, Posed((as_hull(b),), T_b))
+    assert same == pytest.approx(spans, abs=1e-9)
+
+
+def test_a_cylinder_is_as_wide_as_its_sagitta_allows():
+    hull = cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.02))
+    assert len(hull.corners) == 2 * sides_of(0.005)
+    for angle in np.linspace(0.0, 6.0, 50):
+        low, high = extent((hull,), np.array([np.cos(angle), np.sin(angle), 0.0]))
+        assert 0.005 - SAGITTA_M <= high <= 0.005 + 1e-12
+        assert -0.005 - 1e-12 <= low <= -0.005 + SAGITTA_M
+
+
+def wedges(radius: float, n: int) -> tuple[Hull, ...]:
+    """A square plate of 40 x 40 x 20 mm with a round hole, as prisms."""
+    k, found = radius / np.cos(np.pi / n), []
+    for i in range(n):
+        turn = 2.0 * np.pi * (i + np.array([-0.5, 0.5])) / n
+        ring = np.column_stack([np.cos(turn), np.sin(turn)])
+        flat = np.concatenate([k * ring, 0.02 * ring])
+        found.append(Hull(f"w{i}", np.concatenate([np.column_stack([flat, np.full(4, z)]) for z in (0.0, 0.02)])))
+    return tuple(found)
+
+
+def bore(radius: float, fit: bool) -> RoundFace:
+    return RoundFace("bore", np.zeros(3), np.array([0.0, 0.0, 1.0]), (0.0, 0.02), (radius, radius), True, fit)
+
+
+@pytest.mark.parametrize("clearance_mm", [0.05, 0.25])
+def test_a_hole_that_fits_gets_wider_by_the_clearance(clearance_mm: float):
+    plate = solid(*wedges(0.005, 70), bore=bore(0.005, fit=True))
+    made = physical_pieces(plate, 1e-3 * clearance_mm)
+    inner = [np.linalg.norm(piece_corners(p)[:, :2], axis=1).min() * np.cos(np.pi / 70) for p in made]
+    assert inner == pytest.approx(np.full(70, 0.005 + 1e-3 * clearance_mm), abs=1e-9)
+    outer = [np.linalg.norm(piece_corners(p)[:, :2], axis=1).max() for p in made]
+    assert outer == pytest.approx(np.full(70, 0.02), abs=1e-9)
+    plain = solid(*wedges(0.005, 70), bore=bore(0.005, fit=False))
+    assert physical_pieces(plain, 1e-3 * clearance_mm) is plain.pieces
+
+
+@pytest.mark.parametrize("off_mm", [0.0, 0.1, 0.2, 0.3, 0.5])
+def test_a_shaft_beside_the_middle_of_its_hole_is_as_deep_as_it_is_off(off_mm: float):
+    plate = solid(*physical_pieces(solid(*wedges(0.005, 70), bore=bore(0.005, True)), 0.25e-3))
+    shaft = solid(cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.03)))
+    T = np.eye(4)
+    T[:2, 3] = 1e-3 * off_mm * np.array([np.cos(0.4), np.sin(0.4)])
+    deep = intrusion(shaft, T, plate, np.eye(4))
+    assert deep == pytest.approx(max(0.0, 1e-3 * (off_mm - 0.25)), abs=2 * SAGITTA_M)
