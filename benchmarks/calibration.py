@@ -76,7 +76,7 @@ def main() -> None:
     KEPT.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
     page = PAGE.read_text(encoding="utf-8")
     head, rest = page.split(BEGIN)
-    PAGE.write_text(f"{head}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+    PAGE.write_text(f"{head}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
 def drawn(name: str, draws: int) -> Iterator[Draw]:

@@ -85,7 +85,7 @@ def keep(folder: Path, full: Path | None) -> None:
     PAGE.write_text("\n".join(told) + "\n", encoding="utf-8")
     before, rest = README.read_text(encoding="utf-8").split(BEGIN)
     kept = "\n".join([BEGIN, "", *short(cells), "", END])
-    README.write_text(before + kept + rest.split(END)[1], encoding="utf-8")
+    README.write_text(before + kept + rest.split(END, 1)[1], encoding="utf-8")
     print(f"Wrote {KEPT}, {PAGE} and the table of {README}")
 
 

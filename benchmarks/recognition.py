@@ -101,7 +101,7 @@ def written(rows: list[dict[str, Any]]) -> None:
     if PAGE.exists() and BEGIN in (text := PAGE.read_text(encoding="utf-8")):
         before, rest = text.split(BEGIN)
         middle = "\n".join(table(found))
-        PAGE.write_text(f"{before}{BEGIN}\n\n{middle}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        PAGE.write_text(f"{before}{BEGIN}\n\n{middle}\n\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
 def place(row: dict[str, Any]) -> tuple[str, float, float]:

@@ -127,7 +127,7 @@ def main() -> int:
     print(table(found))
     if tuple(found) == OURS and BEGIN in (text := PAGE.read_text(encoding="utf-8")):
         before, rest = text.split(BEGIN)
-        PAGE.write_text(f"{before}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        PAGE.write_text(f"{before}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
     return int(any(row["same way"] for row in found.values()))
 
 
