@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 FACE_OR_PART_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""
-_LONGEST_NAME = 64
+LONGEST_NAME = 64
 _LARGEST_M = 10.0
 _THINNEST_M = 0.0005
-"""Half of the least thickness of a box."""
+"""Half of the least thickness of a box or a cylinder."""
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -53,10 +53,28 @@ class NameRule(NamedTuple):
     """A name."""
 
     def allows(self, text: str) -> bool:
-        return len(text) <= _LONGEST_NAME and FACE_OR_PART_NAME.fullmatch(text) is not None
+        return len(text) <= LONGEST_NAME and FACE_OR_PART_NAME.fullmatch(text) is not None
 
     def said(self) -> str:
-        return f"a name is a letter, then letters, digits and underscores, {_LONGEST_NAME} in all at most"
+        return f"a name is a letter, then letters, digits and underscores, {LONGEST_NAME} in all at most"
+
+
+class CornersRule(NamedTuple):
+    """The corners of a convex piece, three numbers each."""
+
+    most: int
+
+    def allows(self, text: str) -> bool:
+        words = text.split()
+        if len(words) % 3 or not 12 <= len(words) <= 3 * self.most or not all(map(_NUMBER.fullmatch, words)):
+            return False
+        return all(abs(float(word)) <= _LARGEST_M for word in words)
+
+    def said(self) -> str:
+        return f"4 to {self.most} corners of three numbers of {-_LARGEST_M:g} to {_LARGEST_M:g} m each"
+
+
+Rule = NumbersRule | WordsRule | NameRule | CornersRule
 
 
 class ElementRule(NamedTuple):
@@ -64,36 +82,53 @@ class ElementRule(NamedTuple):
 
     inside: Mapping[str, int]
     """Elements, and how many of each."""
-    attributes: Mapping[str, NumbersRule | WordsRule | NameRule]
+    attributes: Mapping[str, Rule]
 
 
 _NAMED = NameRule()
 _POINT = NumbersRule(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
-_HALF_SIZES = NumbersRule(((_THINNEST_M, _LARGEST_M),) * 3, 3, " m")
+_HALF_SIZES = NumbersRule(((_THINNEST_M, _LARGEST_M),) * 3, 2, " m")
+_DIRECTION = NumbersRule(((-1.0, 1.0),) * 3, 3)
 _COLOR = NumbersRule((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
 """What cannot be seen, a range finder of MuJoCo would not see."""
-_SURFACE: Mapping[str, NumbersRule | WordsRule | NameRule] = {
-    "type": WordsRule(("box",)),
+FRICTION = NumbersRule(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1)
+_SURFACE: Mapping[str, Rule] = {
+    "type": WordsRule(("box", "mesh", "cylinder")),
     "density": NumbersRule(((1.0, 25_000.0),), 1, " kg/m^3"),
-    "friction": NumbersRule(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1),
+    "friction": FRICTION,
     "rgba": _COLOR,
 }
-_DOT: Mapping[str, NumbersRule | WordsRule | NameRule] = {
+_DOT: Mapping[str, Rule] = {
     "size": NumbersRule(((1e-4, 0.1),) * 3, 1, " m"),
     "group": WordsRule(tuple("012345")),
     "rgba": _COLOR,
 }
-MOST_BOXES, MOST_SITES, MOST_CLASSES = 100, 600, 20
+MOST_BOXES, MOST_PIECES, MOST_CORNERS, MOST_FACES = 100, 2000, 1000, 1000
+"""Boxes of a part of boxes alone, pieces of any other, corners of a piece, faces of any part."""
+MOST_SITES, MOST_CLASSES = 600, 20
 _DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
 ELEMENT_RULES: Mapping[str, ElementRule] = {
-    "mujoco": ElementRule({"default": 1, "worldbody": 1}, {"model": _NAMED}),
+    "mujoco": ElementRule({"default": 1, "asset": 1, "worldbody": 1}, {"model": _NAMED}),
     "mujoco/default": ElementRule(_DEFAULTS, {"class": WordsRule(("main",))}),
     "default/default": ElementRule(_DEFAULTS, {"class": _NAMED}),
     "default/geom": ElementRule({}, _SURFACE),
     "default/site": ElementRule({}, _DOT),
+    "mujoco/asset": ElementRule({"mesh": MOST_PIECES}, {}),
+    "asset/mesh": ElementRule({}, {"name": _NAMED, "vertex": CornersRule(MOST_CORNERS)}),
     "mujoco/worldbody": ElementRule({"body": 1}, {}),
-    "worldbody/body": ElementRule({"geom": MOST_BOXES, "site": MOST_SITES}, {"name": _NAMED}),
-    "body/geom": ElementRule({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, "size": _HALF_SIZES, **_SURFACE}),
+    "worldbody/body": ElementRule({"geom": MOST_PIECES, "site": MOST_SITES}, {"name": _NAMED}),
+    "body/geom": ElementRule(
+        {},
+        {
+            "name": _NAMED,
+            "class": _NAMED,
+            "pos": _POINT,
+            "size": _HALF_SIZES,
+            "zaxis": _DIRECTION,
+            "mesh": _NAMED,
+            **_SURFACE,
+        },
+    ),
     "body/site": ElementRule({}, {"name": _NAMED, "class": _NAMED, "pos": _POINT, **_DOT}),
 }
 """Element, behind the one that it stands in -> what it may have."""
@@ -106,12 +141,13 @@ REMEDIES: Mapping[str, str] = {
     "mass": "the density gives the mass",
     "option": "the scene says how it is simulated",
     "compiler": "lengths are in metres",
-    "mesh": 'parts are made of boxes (type="box", pos, size)',
-    "fromto": 'parts are made of boxes (type="box", pos, size)',
-    "type": 'parts are made of boxes (type="box", pos, size)',
+    "file": "give the corners of each convex piece with vertex=",
+    "face": "a piece is convex, its corners (vertex=) say all",
+    "fromto": "say where with pos=, zaxis= and size=",
+    "type": "pieces are boxes (pos, size), cylinders (pos, size, zaxis) and meshes (mesh)",
     **dict.fromkeys(
-        ("quat", "euler", "axisangle", "xyaxes", "zaxis"),
-        "boxes are aligned with the body, exchange the entries of size= instead",
+        ("quat", "euler", "axisangle", "xyaxes"),
+        "boxes are aligned with the body (exchange the entries of size= instead), cylinders turned by zaxis=",
     ),
 }
 """What to do instead, of elements and attributes that people often try."""

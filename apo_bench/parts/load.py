@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.parts.allowed import MOST_FACES
 from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import SIDES, Surface, unite
 from apo_bench.parts.mjcf import Mark, PartFile, read_part
+from apo_bench.parts.stated import StatedPart
 from apo_bench.resources import folder
 
 _ON_FACE_M = 1e-6
 """A site lies on a face if it is this near to its plane and this far from its edges."""
-MOST_FACES = 1000
 _LIGHTEST_KG, _HEAVIEST_KG = 1e-4, 1e6
 
 
@@ -38,10 +39,12 @@ def part_path(given: str | Path) -> Path:
 
 
 def load_part(given: str | Path) -> Solid:
-    """The solid of a part file: the union of its boxes, faces named by the sites that lie on them.
+    """The solid of a part file, named after the file.
 
-    Faces without a site are called `auto_px_1`, ...: outward direction, and their number along it. The solid is
-    named after the file. What does not come with the package is held against a mesh of the same boxes.
+    Of boxes alone it is their union, with faces named by the sites that lie on them; those without a site are called
+    `auto_px_1`, ...: outward direction, and their number along it. Of other pieces, faces, volume, centroid and inertia
+    are those that `NAME.toml` beside it states. What does not come with the package is held against a mesh of the same
+    pieces.
 
     Args:
         given: The short name of a part of the package, or the path of an MJCF file.
@@ -50,24 +53,37 @@ def load_part(given: str | Path) -> Solid:
         InputError: The file breaks a rule; the message names file, element and remedy.
     """
     file = read_part(part_path(given))
-    union = unite(file.boxes, MOST_FACES + 1)
-    if union.pieces != 1:
-        raise InputError(f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece.")
-    if len(union.surfaces) > MOST_FACES:
-        raise InputError(f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.")
-    mass = file.density * union.volume
+    solid = _stated(file, file.stated) if file.stated else _united(file)
+    mass = file.density * solid.volume
     if not _LIGHTEST_KG <= mass <= _HEAVIEST_KG:
         raise InputError(
             f"{file.path}: the part weighs {mass:.3g} kg; from {_LIGHTEST_KG:g} to {_HEAVIEST_KG:g} kg are allowed, "
             "so change its size or its density."
         )
+    if file.stated is None and file.path.parent != folder("assets") / "parts":
+        check_solid(solid, str(file.path))
+    return solid
+
+
+def _stated(file: PartFile, said: StatedPart) -> Solid:
+    """The solid of any convex pieces, with the faces that are stated."""
+    return Solid(
+        file.path.stem, said.faces, file.pieces, said.centroid, said.volume, rounds=said.rounds, inertia=said.inertia
+    )
+
+
+def _united(file: PartFile) -> Solid:
+    """The union of boxes, with the faces that sites mark."""
+    boxes = tuple(piece for piece in file.pieces if isinstance(piece, Box))
+    union = unite(boxes, MOST_FACES + 1)
+    if union.pieces != 1:
+        raise InputError(f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece.")
+    if len(union.surfaces) > MOST_FACES:
+        raise InputError(f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.")
     marks = _matched(file, union.surfaces)
     faces = [_face(surface, marks.get(k), _number(union.surfaces, k)) for k, surface in enumerate(union.surfaces)]
     faces.sort(key=lambda face: face.name.startswith("auto_"))
-    solid = Solid(file.path.stem, {face.name: face for face in faces}, file.boxes, union.centroid, union.volume)
-    if file.path.parent != folder("assets") / "parts":
-        check_solid(solid, str(file.path))
-    return solid
+    return Solid(file.path.stem, {face.name: face for face in faces}, boxes, union.centroid, union.volume)
 
 
 def _matched(file: PartFile, surfaces: tuple[Surface, ...]) -> dict[int, Mark]:

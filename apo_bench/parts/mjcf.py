@@ -1,4 +1,4 @@
-"""A part file: MJCF with one body of named, axis-aligned boxes, and sites that name faces. No simulator needed."""
+"""A part file: MJCF with one body of named convex pieces; of boxes alone, sites name faces. No simulator needed."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry.convex import all_boxes
+from apo_bench.geometry.hull import Cylinder, cylinder_hull
+from apo_bench.geometry.solid import Box, Piece
+from apo_bench.parts.allowed import MOST_BOXES
+from apo_bench.parts.hulls import checked_hull
+from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated
 from apo_bench.parts.tree import read_tree
 
 _FIT_CLASS = "fit"
-_DENSITY = 1000.0
-"""[kg/m^3], where none is stated."""
+_SHORTEST_AXIS = 1e-3
 
 
 @final
@@ -38,8 +42,12 @@ class PartFile:
     """What a part file says."""
 
     path: Path
-    boxes: tuple[Box, ...]
+    pieces: tuple[Piece, ...]
+    """Named and ordered as the geoms."""
     marks: tuple[Mark, ...]
+    """Of boxes alone."""
+    stated: StatedPart | None
+    """What stands beside it; None of boxes alone."""
     density: float
     """[kg/m^3]."""
     xml: str
@@ -50,7 +58,7 @@ def read_part(path: Path) -> PartFile:
     """Read a part file.
 
     Raises:
-        InputError: The file cannot be read, is no XML, or is not one body of named, aligned boxes and sites.
+        InputError: The file cannot be read, is no XML, or is not one body of named pieces; or so the one beside it.
     """
     root = read_tree(path)
     body = root.find("worldbody/body")
@@ -58,18 +66,53 @@ def read_part(path: Path) -> PartFile:
         raise InputError(f"{path}: there is no body; put the boxes of the part into one <body> in <worldbody>.")
     defaults = _defaults(path, root)
     elements = [(child, _resolved(path, child, defaults)) for child in body]
-    geoms = [(_box(path, e, a), a) for e, a in elements if e.tag == "geom"]
+    meshes = _meshes(path, root)
+    geoms = [(_piece(path, e, a, meshes), a) for e, a in elements if e.tag == "geom"]
     marks = tuple(_mark(path, e, a) for e, a in elements if e.tag == "site")
     if not geoms:
         raise InputError(f"{path}: body '{body.get('name', '')}' has no geom; give it at least one named box.")
-    _check_names(path, "geom", [box.name for box, _ in geoms])
+    if meshes:
+        raise InputError(f"{path}: no geom has the mesh '{min(meshes)}'; give it one, or remove the mesh.")
+    pieces = tuple(piece for piece, _ in geoms)
+    _check_names(path, "geom", [piece.name for piece in pieces])
     _check_names(path, "site", [mark.name for mark in marks])
-    densities = sorted({float(said.get("density", _DENSITY)) for _, said in geoms})
+    if all_boxes(pieces):
+        if len(pieces) > MOST_BOXES:
+            raise InputError(f"{path}: the part has {len(pieces)} boxes; {MOST_BOXES} are the most that it may have.")
+        density = _density(path, [said for _, said in geoms])
+        return PartFile(path, pieces, marks, None, density, tostring(root, encoding="unicode"))
+    if marks:
+        raise InputError(
+            f"{path}: site '{marks[0].name}' is given; where pieces are not boxes alone, faces stand in "
+            f"{path.with_suffix('.toml').name}, so remove it."
+        )
+    stated = read_stated(path.with_suffix(".toml"))
+    _state_matter(path, root, body, stated)
+    return PartFile(path, pieces, (), stated, stated.density, tostring(root, encoding="unicode"))
+
+
+def _density(path: Path, said: list[Mapping[str, str]]) -> float:
+    densities = sorted({float(each.get("density", USUAL_DENSITY)) for each in said})
     if len(densities) > 1:
         raise InputError(
             f"{path}: the geoms have densities from {densities[0]:g} to {densities[-1]:g} kg/m^3; a part has one."
         )
-    return PartFile(path, tuple(box for box, _ in geoms), marks, densities[0], tostring(root, encoding="unicode"))
+    return densities[0]
+
+
+def _state_matter(path: Path, root: Element, body: Element, stated: StatedPart) -> None:
+    """Write density and friction of the file beside it into the geoms, which may not say them."""
+    for geom in root.iter("geom"):
+        for key in ("density", "friction"):
+            if key in geom.attrib:
+                raise InputError(
+                    f"{path}: {_called(geom)} has {key}=; where pieces are not boxes alone, it stands in "
+                    f"{path.with_suffix('.toml').name}, so remove it here."
+                )
+    for geom in body.iter("geom"):
+        geom.set("density", repr(stated.density))
+        if stated.friction:
+            geom.set("friction", " ".join(map(repr, stated.friction)))
 
 
 def _check_names(path: Path, kind: str, names: list[str]) -> None:
@@ -115,11 +158,59 @@ def _resolved(path: Path, element: Element, defaults: _Defaults) -> Mapping[str,
     return {**defaults[name].get(element.tag, {}), **element.attrib}
 
 
-def _box(path: Path, element: Element, said: Mapping[str, str]) -> Box:
-    for key, words in (("type", 'which MuJoCo takes for a sphere; say type="box"'), ("size", "give half of each side")):
+def _meshes(path: Path, root: Element) -> dict[str, Array]:
+    """Mesh -> its corners, (k, 3)."""
+    meshes = root.findall("asset/mesh")
+    _check_names(path, "mesh", [mesh.attrib["name"] for mesh in meshes])
+    for mesh in meshes:
+        if "vertex" not in mesh.attrib:
+            raise InputError(f"{path}: {_called(mesh)} has no vertex=; give its corners.")
+    return {mesh.attrib["name"]: _numbers(mesh.attrib["vertex"]).reshape(-1, 3) for mesh in meshes}
+
+
+_NEEDED: Mapping[str, Mapping[str, str]] = {
+    "box": {"size": "give half of each side"},
+    "cylinder": {"size": "give the radius and half of the length"},
+    "mesh": {"mesh": "name one of those in <asset>"},
+}
+"""Type -> attribute -> what to do where it is missing."""
+_OF_TYPE: Mapping[str, tuple[str, ...]] = {
+    "box": ("pos", "size"),
+    "cylinder": ("pos", "size", "zaxis"),
+    "mesh": ("mesh",),
+}
+
+
+def _piece(path: Path, element: Element, said: Mapping[str, str], meshes: dict[str, Array]) -> Piece:
+    """The piece of a geom; its mesh is taken out of those that are left."""
+    name, kind = element.attrib["name"], said.get("type")
+    if kind is None:
+        raise InputError(
+            f'{path}: {_called(element)} has no type=, which MuJoCo takes for a sphere; say type="box", or another one.'
+        )
+    for key, words in _NEEDED[kind].items():
         if key not in said:
             raise InputError(f"{path}: {_called(element)} has no {key}=; {words}.")
-    return Box(element.attrib["name"], _numbers(said.get("pos", "0 0 0")), _numbers(said["size"]))
+    for key in ("pos", "size", "zaxis", "mesh"):
+        if key in said and key not in _OF_TYPE[kind]:
+            raise InputError(f"{path}: {_called(element)} has {key}=, which a {kind} has not; remove it.")
+    at, size = _numbers(said.get("pos", "0 0 0")), _numbers(said.get("size", ""))
+    if kind == "mesh":
+        if said["mesh"] not in meshes:
+            raise InputError(
+                f"{path}: {_called(element)} has the mesh '{said['mesh']}', which <asset> has not, or another geom "
+                "has; give each geom its own."
+            )
+        return checked_hull(path, name, meshes.pop(said["mesh"]))
+    if len(size) != (3 if kind == "box" else 2):
+        raise InputError(f"{path}: {_called(element)} has {len(size)} numbers in size=; {_NEEDED[kind]['size']}.")
+    if kind == "box":
+        return Box(name, at, size)
+    axis = _numbers(said.get("zaxis", "0 0 1"))
+    length = float(np.linalg.norm(axis))
+    if length < _SHORTEST_AXIS:
+        raise InputError(f"{path}: {_called(element)} has a zaxis= of no length; give a direction.")
+    return cylinder_hull(name, Cylinder(at, axis / length, float(size[0]), float(size[1])))
 
 
 def _mark(path: Path, element: Element, said: Mapping[str, str]) -> Mark:

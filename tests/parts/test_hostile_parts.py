@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from apo_bench.errors import InputError
 from apo_bench.geometry.solid import Box
 from apo_bench.parts import load_part, part_names, part_path, read_part
-from apo_bench.parts.allowed import ELEMENT_RULES, MOST_BOXES, MOST_SITES
+from apo_bench.parts.allowed import ELEMENT_RULES, MOST_FACES, MOST_PIECES, MOST_SITES
 from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import unite
-from apo_bench.parts.load import MOST_FACES
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 
@@ -43,7 +42,8 @@ ELEMENTS = {
     "weld": ('<equality><weld body1="thing"/></equality>', "<equality>"),
     "actuator": ('<actuator><motor joint="x"/></actuator>', "<actuator>"),
     "plugin": ('<extension><plugin plugin="mujoco.elasticity.cable"/></extension>', "<extension>"),
-    "asset": ('<asset><mesh name="m" file="/etc/passwd"/></asset>', "<asset>"),
+    "file": ('<asset><mesh name="m" file="/etc/passwd"/></asset>', "has file=, which a part may not say"),
+    "texture": ('<asset><texture name="t" type="2d"/></asset>', "<texture> stands in <asset>"),
     "contact": ('<contact><exclude body1="a" body2="b"/></contact>', "<contact>"),
     "include": ('<include file="/etc/passwd"/>', "write the boxes into the file itself"),
     "another world": ("<worldbody/>", "more than 1 <worldbody>"),
@@ -76,7 +76,6 @@ OF_GEOM = {
     "fluidcoef": "9 9 9 9 9",
     "group": "3",
     "material": "m",
-    "mesh": "m",
     "hfield": "h",
     "fromto": "0 0 0 1 1 1",
     "fitscale": "9",
@@ -93,7 +92,7 @@ VALUES = {
     "rgba": ("0.5 0.5 0.5 0", "2 0 0 1", "0.5 0.5 0.5", "red"),
     "size": ("0.02 0.02 1e-9", "0.02 0.02 -0.01", "1e9 1 1", "0.02", "0.02 0.02 0.01 0.01"),
     "pos": ("0 0 1e9", "0 0", "0 0 0 0", "0 0 0\0"),
-    "type": ("mesh", "sphere", "Box", ""),
+    "type": ("sdf", "sphere", "Box", ""),
     "name": ("a/b", "a b", "", "world!", "../a", "x" * 65, "é"),
     "class": ("/", "a/b"),
 }
@@ -176,7 +175,7 @@ COSTLY = {
         PART.replace("</body>", (SITE + 'pos="0 0 0"/>') * 20_000 + "</body>"),
         f"{MOST_SITES} <site>",
     ),
-    "boxes": (PART.replace("</body>", (GEOM + 'size="1 1 1"/>') * 20_000 + "</body>"), f"{MOST_BOXES} <geom>"),
+    "boxes": (PART.replace("</body>", (GEOM + 'size="1 1 1"/>') * 20_000 + "</body>"), f"{MOST_PIECES} <geom>"),
     "nested classes": (PART.replace("</default>", '<default class="c">' * 8_000 + "</default>" * 8_001, 1), "at most"),
     "classes": (PART.replace("</default>", '<default class="c"/>' * 8_000 + "</default>", 1), "<default>"),
     "nested bodies": (PART.replace("</body>", "<body>" * 50_000 + "</body>" * 50_001), "<body> stands in <body>"),

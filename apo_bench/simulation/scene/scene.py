@@ -155,7 +155,7 @@ def _add_part(
 ) -> Any:
     """Attach a part's file at T, its fit faces receded; returns the body that has the mass (its frame has none)."""
     file, solid = read_part(scenario.part_files[part]), scenario.assembly.solids[part]
-    if [box.name for box in file.boxes] != [piece.name for piece in solid.pieces]:
+    if [piece.name for piece in file.pieces] != [piece.name for piece in solid.pieces]:
         raise InputError(f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.")
     model = mjcf.from_xml_string(file.xml)
     model.model = part

@@ -1,0 +1,28 @@
+"""Parts built from outlines, bores and shafts, and written as part files; lengths in mm."""
+
+from apo_bench.parts.making.body import Body, join
+from apo_bench.parts.making.extrude import Bore, bore, extrude
+from apo_bench.parts.making.outline import Edge, Outline, circle, polygon, rectangle, rounded, slot
+from apo_bench.parts.making.steps import Step
+from apo_bench.parts.making.turned import shaft, turned
+from apo_bench.parts.making.writing import solid_of, write_part
+
+__all__ = [
+    "Body",
+    "Bore",
+    "Edge",
+    "Outline",
+    "Step",
+    "bore",
+    "circle",
+    "extrude",
+    "join",
+    "polygon",
+    "rectangle",
+    "rounded",
+    "shaft",
+    "slot",
+    "solid_of",
+    "turned",
+    "write_part",
+]

@@ -1,0 +1,125 @@
+"""Flat areas cut into convex ones: exactly, along their own corners."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.polygon import straightened
+
+_SAME_MM = 1e-6
+_SLIVER_MM2 = 1e-9
+_REACHES = (2.0, 1.6, 1.35, 1.2, 1.1, 1.05, 1.02)
+"""How far the cell of a bore reaches, in radii; the first one that there is room for."""
+
+
+def convex_cells(area: Any) -> list[Array]:
+    """The convex areas, (k, 2) each, counter-clockwise, that a shapely area is cut into.
+
+    Triangles are joined across their common sides while what they make stays convex (Hertel and Mehlhorn), so that
+    there are at most four times as many as need be.
+    """
+    found: list[Array] = []
+    for polygon in getattr(area, "geoms", (area,)):
+        if polygon.area > _SLIVER_MM2:
+            found += _cut(polygon)
+    return found
+
+
+def _cut(polygon: Any) -> list[Array]:
+    from manifold3d import triangulate
+    from shapely.geometry.polygon import orient
+
+    shape = orient(polygon)
+    rings = [straightened(np.asarray(each.coords)[:-1]) for each in (shape.exterior, *shape.interiors)]
+    if len(rings) == 1 and is_convex(rings[0]):
+        return rings
+    points = np.concatenate(rings)
+    cells = {i: [int(k) for k in triangle] for i, triangle in enumerate(np.asarray(triangulate(rings)))}
+    owner = {(a, b): i for i, cell in cells.items() for a, b in zip(cell, [*cell[1:], cell[0]], strict=True)}
+    diagonals = sorted({(a, b) for a, b in owner if a < b and (b, a) in owner}, key=lambda d: -_length(points, d))
+    for a, b in diagonals:
+        i, k = owner[a, b], owner[b, a]
+        joined = _joined(cells[i], cells[k], a, b)
+        if i != k and is_convex(points[joined]):
+            cells[i] = joined
+            for edge in zip(joined, [*joined[1:], joined[0]], strict=True):
+                owner[edge] = i
+            del cells[k]
+    return [straightened(points[cell]) for cell in cells.values()]
+
+
+def _length(points: Array, side: tuple[int, int]) -> float:
+    return float(np.linalg.norm(points[side[0]] - points[side[1]]))
+
+
+def _joined(one: list[int], other: list[int], a: int, b: int) -> list[int]:
+    """Two cells as one, without their common side, which goes from a to b in the first one."""
+    i, k = one.index(b), other.index(a)
+    return [*one[i:], *one[:i], *(other[k:] + other[:k])[1:-1]]
+
+
+def is_convex(ring: Array) -> bool:
+    """Whether no corner of a ring, counter-clockwise, turns to the right."""
+    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    return bool((across > -_SAME_MM * np.linalg.norm(into, axis=1)).all())
+
+
+def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, float]]) -> Array | None:
+    """A convex area around a bore inside of the free one, counter-clockwise; None if there is no room for one.
+
+    Args:
+        radius: Of the corners of its widest polygon.
+        others: Middles and radii of the other bores: between two bores each has its side.
+    """
+    from shapely import Polygon, box
+    from shapely.geometry.polygon import orient
+
+    for reach in (radius * share for share in _REACHES):
+        square = np.asarray(orient(box(*(at - reach), *(at + reach))).exterior.coords)[:-1]
+        for middle, r in others:
+            gap = np.linalg.norm(middle - at)
+            n = (middle - at) / gap
+            square = clipped(square, n, float(n @ at + (gap + radius - r) / 2.0))
+        cell = Polygon(square).intersection(free)
+        if cell.geom_type != "Polygon" or cell.interiors:
+            continue
+        corners = straightened(np.asarray(orient(cell).exterior.coords)[:-1])
+        if is_convex(corners) and _holds(corners, at, radius):
+            return corners
+    return None
+
+
+def _holds(cell: Array, at: Array, radius: float) -> bool:
+    """Whether a circle lies inside of a convex area."""
+    along = np.roll(cell, -1, axis=0) - cell
+    n = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    return bool((((cell - at) * n).sum(axis=1) > radius + _SAME_MM).all())
+
+
+def clipped(ring: Array, n: Array, d: float) -> Array:
+    """What of a convex area has n . x <= d; (0, 2) if nothing has."""
+    found: list[Array] = []
+    height = ring @ n - d
+    height[np.abs(height) < _SAME_MM * 1e-3] = 0.0
+    for i in range(len(ring)):
+        k = (i + 1) % len(ring)
+        if height[i] <= 0.0:
+            found.append(ring[i])
+        if height[i] * height[k] < 0.0:
+            found.append(ring[i] + height[i] / (height[i] - height[k]) * (ring[k] - ring[i]))
+    return np.array(found).reshape(-1, 2)
+
+
+def wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
+    """A convex area around a point cut into sectors: the middle direction of each, (2,), and its area, (k, 2)."""
+    found = []
+    for i in range(sides):
+        a, b, m = (2.0 * np.pi * (i + off) / sides for off in (-0.5, 0.5, 0.0))
+        right, left = np.array([np.sin(a), -np.cos(a)]), np.array([-np.sin(b), np.cos(b)])
+        area = clipped(clipped(cell, right, float(right @ at)), left, float(left @ at))
+        found.append((np.array([np.cos(m), np.sin(m)]), area))
+    return found

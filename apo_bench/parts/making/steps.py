@@ -1,0 +1,96 @@
+"""Lengths of bores and shafts: how wide they are, from where to where along their axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import sides_of
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.parts.making.moments import Moments, frustum_moments
+from apo_bench.parts.making.outline import COARSE_SIDES
+
+_SAME_MM = 1e-6
+
+
+@final
+@dataclass(frozen=True)
+class Step:
+    """One length of a bore or of a shaft, a cylinder or a cone, [mm]."""
+
+    low: float
+    """Where it begins along the axis."""
+    high: float
+    radius: float
+    """Where it begins."""
+    end_radius: float | None = None
+    """Where it ends, of a cone."""
+    name: str = ""
+    """Of its wall; else one is found."""
+    fit: bool = False
+    sides: int | None = None
+    """Into how many its wall is cut; else as a contact needs if it has a name, and few if not."""
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        return self.radius, self.radius if self.end_radius is None else self.end_radius
+
+    @property
+    def count(self) -> int:
+        """Into how many sides its wall is cut."""
+        if self.sides is not None:
+            return self.sides
+        return sides_of(1e-3 * max(self.radii)) if self.name else COARSE_SIDES
+
+    def at(self, height: float) -> float:
+        """Its radius at a height."""
+        a, b = self.radii
+        return a + (b - a) * (height - self.low) / (self.high - self.low)
+
+    def part(self, low: float, high: float) -> tuple[float, float] | None:
+        """Its radii at both ends of a shorter length; None beside it."""
+        if low < self.low - _SAME_MM or high > self.high + _SAME_MM:
+            return None
+        return self.at(low), self.at(high)
+
+    def moments(self) -> Moments:
+        """[mm]."""
+        return frustum_moments(self.low, self.high, *self.radii)
+
+    def wall(self, at: tuple[float, float], hole: bool) -> RoundFace:
+        """Its face, about an axis along z."""
+        (a, b), span = self.radii, (1e-3 * self.low, 1e-3 * self.high)
+        point, axis = np.array([1e-3 * at[0], 1e-3 * at[1], 0.0]), np.array([0.0, 0.0, 1.0])
+        return RoundFace(self.name, point, axis, span, (1e-3 * a, 1e-3 * b), hole, self.fit)
+
+
+def at_height(steps: Sequence[Step], height: float, above: bool) -> tuple[float, int]:
+    """Radius and sides just above or just below a height; (0, 0) where no step is."""
+    for step in steps:
+        inside = step.low - _SAME_MM <= height < step.high - _SAME_MM
+        if not above:
+            inside = step.low + _SAME_MM < height <= step.high + _SAME_MM
+        if inside:
+            return step.at(height), step.count
+    return 0.0, 0
+
+
+def heights_of(steps: Sequence[Step], *more: float) -> list[float]:
+    """Where steps begin and end, and other heights, ascending, each once."""
+    every = np.sort([*more, *(h for step in steps for h in (step.low, step.high))])
+    return [float(h) for h in every[np.diff(every, prepend=-np.inf) > _SAME_MM]]
+
+
+def tangent(at: tuple[float, float], radius: float, sides: int) -> Array:
+    """A polygon, (k, 2), counter-clockwise, whose sides touch a circle from outside."""
+    return inscribed(at, radius / np.cos(np.pi / sides), sides)
+
+
+def inscribed(at: tuple[float, float], radius: float, sides: int) -> Array:
+    """A polygon, (k, 2), counter-clockwise, whose corners lie on a circle; no corner, but a side lies towards +x."""
+    angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    return np.asarray(np.array(at) + radius * np.column_stack([np.cos(angle), np.sin(angle)]))

@@ -1,0 +1,122 @@
+"""Bodies of revolution: shafts with chamfers, discs and bushes with bores, cones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
+from apo_bench.geometry.solid import Face
+from apo_bench.parts.making.body import Body
+from apo_bench.parts.making.cells import clipped, wedges
+from apo_bench.parts.making.extrude import flat_face
+from apo_bench.parts.making.moments import Moments
+from apo_bench.parts.making.steps import Step, at_height, heights_of, inscribed, tangent
+
+_SAME_MM, _NARROW_MM = 1e-6, 6e-3
+
+
+def turned(
+    outer: Sequence[Step],
+    inner: Sequence[Step] = (),
+    *,
+    flats: Mapping[float, str] | None = None,
+    fit: Sequence[str] = (),
+) -> Body:
+    """A body of revolution about z, [mm].
+
+    Lengths without a bore are true cylinders, or cones with corners on their edges; those with one are wedges, tangent
+    to the bore from outside, with corners on the outer wall.
+
+    Args:
+        outer: Its lengths, one after the other.
+        inner: Those of its bore, inside of the outer ones.
+        flats: Height -> name of the flat face there: ends, shoulders, the bottom of a blind bore.
+        fit: Which flat faces, by name, recede by the clearance.
+    """
+    heights = heights_of((*outer, *inner))
+    moments = outer[0].moments()
+    for step in outer[1:]:
+        moments = moments.plus(step.moments())
+    for step in inner:
+        moments = moments.plus(step.moments(), -1.0)
+    pieces = [p for a, b in pairwise(heights) for p in _length(outer, inner, a, b)]
+    rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
+    return Body(
+        tuple(pieces),
+        tuple(face for z in heights for face in _flats(outer, inner, z, (flats or {}).get(z, ""), fit)),
+        tuple(rounds),
+        Moments(1e-9 * moments.size, 1e-12 * moments.first, 1e-15 * moments.second),
+    )
+
+
+def shaft(
+    radius: float,
+    low: float,
+    high: float,
+    name: str,
+    *,
+    chamfer_low: float = 0.0,
+    chamfer_high: float = 0.0,
+    bottom: str = "",
+    top: str = "",
+) -> Body:
+    """A cylinder along z with chamfers of 45 degrees, [mm]; those of `name` are `name_chamfer_low` and `..._high`."""
+    a, b = chamfer_low, chamfer_high
+    steps = [Step(low + a, high - b, radius, name=name)]
+    if a:
+        steps.insert(0, Step(low, low + a, radius - a, radius, name and f"{name}_chamfer_low"))
+    if b:
+        steps.append(Step(high - b, high, radius, radius - b, name and f"{name}_chamfer_high"))
+    return turned(steps, flats={low: bottom, high: top})
+
+
+def _length(outer: Sequence[Step], inner: Sequence[Step], a: float, b: float) -> Iterator[Hull]:
+    """The pieces between two heights between which nothing changes."""
+    around = next((s for s in outer if s.part(a, b)), None)
+    bore = next((s for s in inner if s.part(a, b)), None)
+    if around is None:
+        raise ValueError(f"no outer step reaches from {a:g} to {b:g} mm")
+    (low, high) = (around.at(a), around.at(b))
+    if bore is None and abs(low - high) < _SAME_MM:
+        center, half = np.array([0.0, 0.0, 5e-4 * (a + b)]), 5e-4 * (b - a)
+        yield cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, half))
+    elif bore is None:
+        yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
+    else:
+        n = max(around.count, bore.count)
+        cells = [wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)]
+        for (u, first), (_, last) in zip(*cells, strict=True):
+            ends = [(clipped(first, -u, -bore.at(a)), a), (clipped(last, -u, -bore.at(b)), b)]
+            yield Hull("", 1e-3 * np.concatenate([np.column_stack([c, np.full(len(c), z)]) for c, z in ends]))
+
+
+def _ring(radius: float, sides: int, z: float) -> Array:
+    """The corners of a level polygon on a circle; its middle, if it is a point."""
+    if radius < _SAME_MM:
+        return np.array([[0.0, 0.0, z]])
+    return np.column_stack([inscribed((0.0, 0.0), radius, sides), np.full(sides, z)])
+
+
+def _flats(outer: Sequence[Step], inner: Sequence[Step], z: float, name: str, fit: Sequence[str]) -> Iterator[Face]:
+    """The rings that look up or down at a height: what is full below and not above, or above and not below."""
+    from shapely import Polygon
+
+    areas = []
+    for above in (False, True):
+        (R, n), (r, k) = at_height(outer, z, above), at_height(inner, z, above)
+        n, k = (max(n, k), max(n, k)) if n and k else (n, k)
+        disc = Polygon(inscribed((0.0, 0.0), R, n)) if R else Polygon()
+        areas.append(disc.difference(Polygon(tangent((0.0, 0.0), r, k))) if r else disc)
+    below, over = areas
+    for rest, up in ((below.difference(over), True), (over.difference(below), False)):
+        for polygon in getattr(rest, "geoms", (rest,)):
+            if polygon.buffer(-_NARROW_MM / 2).is_empty:
+                continue
+            from shapely.geometry.polygon import orient
+
+            rings = [np.asarray(each.coords)[:-1] for each in (orient(polygon).exterior, *orient(polygon).interiors)]
+            yield flat_face(name, rings[0], [hole[::-1] for hole in rings[1:]], z, up, name in fit and bool(name))
