@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, product, simplified
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -134,7 +135,8 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
 
     Args:
         goals: (n, 4, 4), where the vertices are taken, world frame, [m].
-        free: Operations counted from 0; None stands for every contact, in the order of `assembly.relations()`.
+        free: Operations counted from 0; None stands for every contact, in the order of `assembly.relations()`, where
+            contacts of round faces are those of sheets (`lowered`).
     """
     known = pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
@@ -174,11 +176,15 @@ class Pattern:
     """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
     freed: tuple[int, ...]
     """The operations whose motion parameters occur, the most recent first."""
+    opposing: NDArray[np.bool_]
+    """(c,): whether the two faces look at each other when they touch; planes through an axis do not."""
 
 
 @remembered
 def pattern(assembly: Assembly) -> Pattern:
-    """What the equations of an assembly have in common."""
+    """What the equations of an assembly have in common; its contacts are those of `lowered(assembly)`."""
+    if (low := lowered(assembly)) is not assembly:
+        return pattern(low)
     parts = tuple(assembly.solids)
     chosen = _words(assembly, parts)
     c, width = len(chosen), max((len(word) for _, _, word in chosen), default=0)
@@ -204,6 +210,7 @@ def pattern(assembly: Assembly) -> Pattern:
         freed=tuple(
             sorted({k - len(parts) for _, _, word in chosen for k, _ in word if k >= len(parts)}, reverse=True)
         ),
+        opposing=np.array([assembly.face(contact.manipulated).opposes for contact, _, _ in chosen], dtype=np.bool_),
     )
 
 

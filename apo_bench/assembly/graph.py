@@ -12,6 +12,7 @@ from typing import final
 
 from apo_bench.assembly.equations import equations, largest
 from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, inverted, simplified, spelled
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -108,9 +109,10 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
 
 def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
     """The largest |e| of every arc, [m], at `goals` (n, 4, 4), world frame, [m] (Section 3.3)."""
-    done, reached = assembly.first(graph.step), goals[: graph.step]
+    done, reached = lowered(assembly.first(graph.step)), goals[: graph.step]
     gaps = equations(done, start, reached).gaps(reached)
-    mine = [[r.made == arc.made and r.contact in arc.contacts for r in done.relations()] for arc in graph.arcs]
+    named = [(relation.made, done.given(relation.contact)) for relation in done.relations()]
+    mine = [[made == arc.made and contact in arc.contacts for made, contact in named] for arc in graph.arcs]
     return tuple(largest(gaps[chosen]) for chosen in mine)
 
 

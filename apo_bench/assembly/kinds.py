@@ -9,6 +9,8 @@ from apo_bench.geometry.solid import Face
 
 ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
 CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)
+WALLS = 8
+"""Planes through an axis that stand for the disc of a round fit: sixteen walls, whose corners lie on its circle."""
 _SAME_SLOPE = 2e-3
 """A cone sits in another one if their half angles differ by less, about 0.1 degrees."""
 

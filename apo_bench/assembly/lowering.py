@@ -1,128 +1,177 @@
 """Contacts of round faces as contacts of planes, which is all that the face contact equations know.
 
 A contact says that points of one part lie on planes of another one (Eq. 1). Of round faces these are points and planes
-of the axis: two points of the axis of a hole on two planes through the axis of its shaft, say. Which two planes does
-not matter, as long as they are perpendicular. Here every contact of round faces becomes contacts of sheets, flat faces
-that no part has: a plane that goes through the axis or stands on it, or a few points of it.
+of the axis: two points of the axis of a hole on two planes through the axis of its shaft, say. Here every contact of
+round faces becomes contacts of sheets, flat faces that no part has: a plane that goes through the axis or stands on it,
+or a few points of it.
 
 | contact | points | planes | fixes |
 |---|---|---|---|
-| shaft in hole | two of the one axis | two through the other axis | 4 |
-| shaft on plane | two of the axis | the plane, a radius in front of the face | 2 |
-| cone in cone | two of the one axis | two through the other axis, one across it where the radii are the same | 5 |
+| shaft in hole | both ends of the axis of the shorter face | two through the axis of the longer one | 4 |
+| shaft on plane | both ends of the axis | the plane, a radius in front of the face | 2 |
+| cone in cone | as shaft in hole, and the middle of the shorter | and one across it where the radii are the same | 5 |
 | cone on rim | the middle of the rim | two through the axis of the cone, one across it where it is as wide | 3 |
+
+Which two planes through an axis does not matter, as long as they are perpendicular; they follow the axes of the frame
+of the face (`RoundFace.frame`), and the equations of the paper take these as well. Play of a shaft is a disc: where
+anything within it is allowed, there are `WALLS` planes in place of two.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.kinds import WALLS, contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
+from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry.solid import Face
 
 _BEHIND = "|"
 """Between the name of a face and what a sheet adds to it: no name of a face has it."""
-_WALLS = 8
-"""Planes through the axis where play is a disc: sixteen walls, whose corners lie on its circle."""
+_SAME_M = 1e-9
 
 
-class Lowered(NamedTuple):
-    """An assembly in which all contacts are of planes."""
+def lowered(assembly: Assembly) -> Assembly:
+    """An assembly in which all contacts are of planes, with sheets for round faces; the same if it has none.
 
-    assembly: Assembly
-    contacts: Mapping[Contact, Contact]
-    """Each of its contacts -> the one that it is part of."""
+    Operations, ODLs and arcs are the same, solids too. `Assembly.given` says what each contact is part of.
+
+    Raises:
+        InputError: A contact of round faces asks for a gap that it cannot have.
+    """
+    return _lowered(assembly) or assembly
+
+
+def lowered_observation(observation: Observation) -> Observation:
+    """An observation of such an assembly; the same if nothing is round."""
+    low = lowered(observation.assembly)
+    return observation if low is observation.assembly else replace(observation, assembly=low)
 
 
 @remembered
-def lowered(assembly: Assembly) -> Lowered:
-    """An assembly with sheets for round faces; the same object if it has no contact of round faces."""
+def _lowered(assembly: Assembly) -> Assembly | None:
+    """None of an assembly without round contacts: what is remembered of an object must not keep it alive."""
     if not any(assembly.is_round(contact) for operation in assembly.operations for contact in operation.contacts):
-        return Lowered(assembly, {relation.contact: relation.contact for relation in assembly.relations()})
-    sheets: dict[PartFace, Face] = {}
-    gaps, origin, operations = dict(assembly.gaps), dict[Contact, Contact](), []
+        return None
+    gaps, operations, made = dict(assembly.gaps), [], _Sheets(assembly)
     for operation in assembly.operations:
-        made = []
-        for contact in operation.contacts:
-            for low in _sheets(assembly, contact, sheets):
-                made.append(low)
-                origin[low] = contact
-                if contact in assembly.gaps:
-                    gaps[low] = assembly.gaps[contact]
-        operations.append(replace(operation, contacts=tuple(made)))
-    solids = {name: _with_sheets(solid, name, sheets) for name, solid in assembly.solids.items()}
-    return Lowered(replace(assembly, solids=solids, operations=tuple(operations), gaps=gaps), origin)
+        lower = tuple(low for contact in operation.contacts for low in made.of(contact))
+        operations.append(replace(operation, contacts=lower))
+    gaps.update({low: gaps[contact] for low, contact in made.origin.items() if contact in gaps})
+    return replace(assembly, operations=tuple(operations), gaps=gaps, sheets=made.sheets, origin=made.origin)
 
 
-def _with_sheets(solid: Solid, part: str, sheets: Mapping[PartFace, Face]) -> Solid:
-    own = {of.face: face for of, face in sheets.items() if of.part == part}
-    return replace(solid, faces={**solid.faces, **own}) if own else solid
+class _Sheets:
+    """The sheets of an assembly, as they are asked for."""
 
+    def __init__(self, assembly: Assembly) -> None:
+        self._assembly = assembly
+        self.sheets: dict[PartFace, Face] = {}
+        self.origin: dict[Contact, Contact] = {}
 
-def _sheets(assembly: Assembly, contact: Contact, sheets: dict[PartFace, Face]) -> list[Contact]:
-    """The contacts of sheets that a contact stands for; new sheets are added to those there are."""
-    a, b = (assembly.face_of(of) for of in contact)
-    if isinstance(a, Face) and isinstance(b, Face):
-        return [contact]
-    fit = a.fit or b.fit
-    kind = contact_kind(a, b)
+    def of(self, contact: Contact) -> list[Contact]:
+        """The contacts that one stands for."""
+        if not self._assembly.is_round(contact):
+            return [contact]
+        kind = contact_kind(*map(self._assembly.face_of, contact))
+        gap = self._assembly.gaps.get(contact, Gap())
+        _check_gap(contact, kind, gap)
+        if kind == "shaft on plane":
+            made = [self._on_plane(contact)]
+        elif kind == "cone on rim":
+            cone_of, rim_of = _first(contact, self._assembly.round_face(contact.manipulated).kind == "cone")
+            made = [*self._coaxial(cone_of, rim_of, 2), self._seated(cone_of, rim_of)]
+        else:
+            lengths = [self._assembly.round_face(of).length for of in contact]
+            long, short = _first(contact, lengths[0] >= lengths[1] - _SAME_M)
+            made = self._coaxial(long, short, WALLS if gap.kind == "clearance" else 2)
+            made += [self._seated(long, short)] if kind == "cone in cone" else []
+        swapped = made[0].manipulated.part != contact.manipulated.part
+        made = [self._marked(low) if swapped else low for low in made]
+        self.origin.update(dict.fromkeys(made, contact))
+        return made
 
-    def sheet(of: PartFace, tail: str, points: Array, normal: Array) -> PartFace:
+    def _on_plane(self, contact: Contact) -> Contact:
+        """A shaft on a plane: its axis, in the plane a radius in front."""
+        flat, wall = _first(contact, contact.environment.face in self._assembly.solids[contact.environment.part].rounds)
+        face, shaft = self._assembly.face(flat), self._assembly.round_face(wall)
+        raised = face.outline + shaft.radius * face.normal
+        plane = self._sheet(flat, f"{1e6 * shaft.radius:.3f}", raised, face.normal, face.fit, opposes=False)
+        return Contact(plane, self._axis(wall, "1 of 1", 0.0))
+
+    def _coaxial(self, planes_of: PartFace, points_of: PartFace, count: int) -> list[Contact]:
+        """The axis of one face, or its point of a rim, in planes through the axis of another one, evenly turned."""
+        face, made = self._assembly.round_face(planes_of), []
+        for i in range(count):
+            tail, n = f"{i + 1} of {count}", _across(face, np.pi * i / count)
+            sheet = self._sheet(planes_of, tail, face.middle[None], n, face.fit, opposes=False)
+            made.append(Contact(sheet, self._axis(points_of, tail, np.pi * i / count)))
+        return made
+
+    def _seated(self, cone_of: PartFace, other_of: PartFace) -> Contact:
+        """The middle of a face in the plane across a cone where both are as wide."""
+        cone, other = self._assembly.round_face(cone_of), self._assembly.round_face(other_of)
+        height = cone.span[0] + (other.radius - cone.radii[0]) / cone.slope
+        at = (cone.point + height * cone.axis)[None]
+        plane = self._sheet(cone_of, f"{1e6 * other.radius:.3f}", at, _outward(cone), cone.fit)
+        return Contact(plane, self._sheet(other_of, "middle", other.middle[None], _outward(other), other.fit))
+
+    def _axis(self, of: PartFace, tail: str, turn: float) -> PartFace:
+        """The ends of the axis of a face, a single point of a rim; each of several planes has points of its own."""
+        face = self._assembly.round_face(of)
+        points = face.ends[:1] if face.kind == "rim" else face.ends
+        return self._sheet(of, f"axis {tail}", points, _across(face, turn), face.fit, opposes=False)
+
+    def _sheet(
+        self, of: PartFace, tail: str, points: Array, normal: Array, fit: bool, opposes: bool = True
+    ) -> PartFace:
         named = PartFace(of.part, f"{of.face}{_BEHIND}{tail}")
-        sheets[named] = Face(named.face, points, fit=fit, stated_normal=normal)
+        self.sheets[named] = Face(named.face, points, fit=fit, stated_normal=normal, opposes=opposes)
         return named
 
-    if kind == "shaft on plane":
-        flat, wall = (contact[0], contact[1]) if isinstance(a, Face) else (contact[1], contact[0])
-        plane, shaft = assembly.face(flat), assembly.round_face(wall)
-        tail = f"{1e6 * shaft.radius:.3f}"
-        raised = sheet(flat, tail, plane.outline + shaft.radius * plane.normal, plane.normal)
-        return [Contact(raised, sheet(wall, "axis", shaft.ends, -shaft.frame[:3, 0]))]
-    if kind == "cone on rim":
-        rim_first = assembly.round_face(contact[0]).kind == "rim"
-        cone_of, rim_of = (contact[1], contact[0]) if rim_first else (contact[0], contact[1])
-        cone, rim = assembly.round_face(cone_of), assembly.round_face(rim_of)
-        points = sheet(rim_of, "middle", rim.ends[:1], rim.axis)
-        planes = [*_through(cone, 2), _across(cone, rim.radius)]
-    else:
-        cone_of, other_of = contact
-        cone, other = assembly.round_face(cone_of), assembly.round_face(other_of)
-        ends = _two_points(other, cone)
-        points = sheet(other_of, f"axis {1e6 * min(other.length, cone.length):.3f}", ends, other.frame[:3, 0])
-        count = _WALLS if assembly.gaps.get(contact, Gap()).kind == "clearance" else 2
-        planes = list(_through(cone, count))
-    made = [Contact(sheet(cone_of, tail, at[None], n), points) for tail, at, n in planes]
-    if kind == "cone in cone":
-        cone, other = assembly.round_face(contact[0]), assembly.round_face(contact[1])
-        middle = sheet(contact[1], "middle", other.middle[None], other.axis)
-        tail, at, n = _across(cone, other.radius)
-        made.append(Contact(sheet(contact[0], tail, at[None], n), middle))
-    return made
+    def _marked(self, low: Contact) -> Contact:
+        """A contact whose plane belongs to the environment of the given one, under a name that says so."""
+        named = low.manipulated._replace(face=f"{low.manipulated.face}, turned round")
+        self.sheets[named] = replace(self.sheets[low.manipulated], name=named.face)
+        return Contact(named, low.environment)
 
 
-def _through(face: RoundFace, count: int) -> list[tuple[str, Array, Array]]:
-    """Planes through the axis, evenly turned: what each is called, a point on it, its normal."""
-    x, y = face.frame[:3, 0], face.frame[:3, 1]
-    turns = np.pi * np.arange(count) / count
-    names = ("x", "y") if count == 2 else tuple(f"{i}" for i in range(count))
-    return [(name, face.middle, np.cos(t) * x + np.sin(t) * y) for name, t in zip(names, turns, strict=True)]
+def _first(contact: Contact, manipulated: bool) -> tuple[PartFace, PartFace]:
+    """Both faces of a contact, beginning with the manipulated one or with the other."""
+    return (contact.manipulated, contact.environment) if manipulated else (contact.environment, contact.manipulated)
 
 
-def _across(face: RoundFace, radius: float) -> tuple[str, Array, Array]:
-    """The plane across the axis of a cone where it has a radius."""
-    height = face.span[0] + (radius - face.radii[0]) / face.slope
-    return f"{1e6 * radius:.3f}", face.point + height * face.axis, face.axis
+def _across(face: RoundFace, turn: float) -> Array:
+    """A direction across the axis of a face, turned from that of its frame, [rad]."""
+    return np.asarray(np.cos(turn) * face.frame[:3, 0] + np.sin(turn) * face.frame[:3, 1])
 
 
-def _two_points(face: RoundFace, other: RoundFace) -> Array:
-    """Two points of the axis, (2, 3), about its middle, as far apart as the shorter of two faces is long."""
-    reach = min(face.length, other.length) / 2
-    return np.asarray(face.middle + np.outer((-reach, reach), face.axis))
+def _outward(face: RoundFace) -> Array:
+    """Which way a cone or a rim looks out of its part: a countersink where it widens, a taper where it narrows."""
+    if face.kind == "rim":
+        return face.axis
+    return face.axis * (np.sign(face.slope) if face.hole else -np.sign(face.slope))
+
+
+def _check_gap(contact: Contact, kind: str | None, gap: Gap) -> None:
+    """Refuse what cannot be asked of round faces."""
+    if kind is None:
+        raise InputError(f"{contact}: these two faces make no contact; name a shaft and its hole, say.")
+    if kind in ("cone in cone", "cone on rim") and gap.kind != "centred":
+        raise InputError(f"{contact} is a {kind} and asks for '{gap}'; only 'centred' is allowed, so leave it out.")
+    if kind == "shaft in hole" and gap.kind == "contact":
+        raise InputError(
+            f"{contact} is a shaft in a hole and asks for 'contact', which does not say where on the wall; "
+            "use 'centred' or 'clearance'."
+        )
+    if kind == "shaft in hole" and gap.low_m is not None and gap.high_m is not None and gap.low_m != -gap.high_m:
+        raise InputError(
+            f"{contact} is a shaft in a hole and asks for '{gap}'; the play of a shaft is a disc, so state the same "
+            "length twice, from minus it to it."
+        )

@@ -21,7 +21,7 @@ few degrees."""
 
 def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:
     """Which contacts have faces that do not look at each other when they are made, (*, c), in the order of
-    `relations()`.
+    `relations()`; those of round faces as `lowered` has them.
 
     Args:
         goals: (*, n, 4, 4), world frame, [m].
@@ -42,4 +42,4 @@ def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.b
     n = np.broadcast_to(known.plane[:, None, :3], (*lead, len(rows), 1, 3))
     for j in range(rows.shape[1]):
         n = n @ turned[..., rows[:, j], :, :]
-    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > OPPOSING)
+    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > OPPOSING) & known.opposing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,6 +12,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.records import copyable
@@ -117,17 +119,23 @@ class Assembly:
     """Stable objects (Section 2.3): parts that no operation moves, such as the table."""
     gaps: Mapping[Contact, Gap] = field(default_factory=dict)
     """Contacts that are not simply asked to coincide."""
+    sheets: Mapping[PartFace, Face] = field(default_factory=dict)
+    """Planes and points that stand for round faces, which no part has: `lowering` makes them."""
+    origin: Mapping[Contact, Contact] = field(default_factory=dict)
+    """Contacts of sheets -> the contact of a round face that they are part of."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))
         object.__setattr__(self, "gaps", MappingProxyType(dict(self.gaps)))
+        object.__setattr__(self, "sheets", MappingProxyType(dict(self.sheets)))
+        object.__setattr__(self, "origin", MappingProxyType(dict(self.origin)))
 
     def __len__(self) -> int:
         return len(self.operations)
 
     def face(self, of: PartFace) -> Face:
-        """A flat face."""
-        return self.solids[of.part].faces[of.face]
+        """A flat face, or a sheet."""
+        return self.sheets[of] if of in self.sheets else self.solids[of.part].faces[of.face]
 
     def round_face(self, of: PartFace) -> RoundFace:
         return self.solids[of.part].rounds[of.face]
@@ -135,7 +143,7 @@ class Assembly:
     def face_of(self, of: PartFace) -> Face | RoundFace:
         """A face, flat or round."""
         solid = self.solids[of.part]
-        return solid.rounds[of.face] if of.face in solid.rounds else solid.faces[of.face]
+        return solid.rounds[of.face] if of.face in solid.rounds else self.face(of)
 
     def is_round(self, contact: Contact) -> bool:
         """Whether a contact is of other faces than two flat ones."""
@@ -145,9 +153,32 @@ class Assembly:
         """Whether the physical faces stay apart by the clearance when the nominal ones touch."""
         return self.face_of(contact.manipulated).fit or self.face_of(contact.environment).fit
 
+    def given(self, contact: Contact) -> Contact:
+        """The contact that one of sheets is part of; any other is itself."""
+        return self.origin.get(contact, contact)
+
+    def play(self, contact: Contact, play_m: float) -> float:
+        """How far from nominal a contact may really be, [m]: the clearance of parts that fit, and what shapes leave."""
+        whole = self.given(contact)
+        fits = play_m if self.is_fit(whole) else 0.0
+        if not self.is_round(whole):
+            return fits
+        return max(0.0, fits + geometric_play(self.face_of(whole.manipulated), self.face_of(whole.environment)))
+
     def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
-        """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play."""
-        return self.gaps.get(contact, Gap()).interval(play_m if self.is_fit(contact) else 0.0)
+        """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play.
+
+        The play of a shaft in its hole is a disc, and what stands for it a polygon with its corners on the circle.
+        """
+        gap = self.gaps.get(contact, Gap())
+        low, high = gap.interval(self.play(contact, play_m))
+        if gap.kind == "clearance" and contact in self.origin and self._in_hole(self.origin[contact]):
+            inside = math.cos(math.pi / (2 * WALLS))
+            return low * inside, high * inside
+        return low, high
+
+    def _in_hole(self, contact: Contact) -> bool:
+        return contact_kind(*map(self.face_of, contact)) == "shaft in hole"
 
     @remembered
     def intervals(self, play_m: float) -> Array:
@@ -213,7 +244,7 @@ class Assembly:
             return kept
         for i, arc in enumerate(self.arcs(), start=1):
             for j in arc:
-                kept[j] = not {f"R{i}", f"R{i}: {relations[j].contact}"}.intersection(left_out)
+                kept[j] = not {f"R{i}", f"R{i}: {self.given(relations[j].contact)}"}.intersection(left_out)
         return kept
 
 

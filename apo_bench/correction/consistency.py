@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.equations import pattern
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.play import plays
 from apo_bench.correction.posterior import jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations
@@ -58,9 +58,11 @@ def contact_suspects(
     assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, relation: str
 ) -> tuple[Suspect, ...]:
     """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
-    arc = assembly.arcs()[int(relation.removeprefix("R")) - 1]
-    contacts = assembly.relations()
-    return _ranked(assembly, among, measure, [(f"{relation}: {contacts[j].contact}", (j,)) for j in arc if among[j]])
+    contacts, together = assembly.relations(), dict[Contact, list[int]]()
+    for j in assembly.arcs()[int(relation.removeprefix("R")) - 1]:
+        if among[j]:
+            together.setdefault(assembly.given(contacts[j].contact), []).append(j)
+    return _ranked(assembly, among, measure, [(f"{relation}: {one}", tuple(js)) for one, js in together.items()])
 
 
 def _ranked(
@@ -72,7 +74,7 @@ def _ranked(
         kept = among.copy()
         kept[list(group)] = False
         tested = measure(kept)
-        contacts = tuple(relations[j].contact for j in group)
+        contacts = tuple(dict.fromkeys(assembly.given(relations[j].contact) for j in group))
         numbers = tested.chi_square, tested.freedom, tested.p_value
         found.append(Suspect(name, contacts, relations[group[0]].made, *numbers))
     return tuple(sorted(found, key=lambda s: (-s.p_value, (s.chi_square - s.freedom) / sqrt(2 * s.freedom + 1))))
@@ -84,7 +86,8 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
 
     A row stands for all vertices of its contact, so it is off by as much as they are together.
     """
-    each = play_m / sqrt(3.0) * np.sqrt(plays(assembly) * np.diff(pattern(assembly).begin))
+    count, unit_m = plays(assembly, play_m)
+    each = unit_m / sqrt(3.0) * np.sqrt(count * np.diff(pattern(assembly).begin))
     return frozen(np.repeat(each, 3))
 
 

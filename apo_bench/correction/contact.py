@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
 from apo_bench.assembly.equations import largest, pattern
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.ending import opposing, refused_correction, status_sentence
 from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
@@ -64,6 +65,7 @@ class ContactCorrector:
         Raises:
             InputError: A covariance is not positive definite.
         """
+        observation = lowered_observation(observation)
         made = self.together((observation,))
         return self.given(observation, None) if made is None else made[0]
 
@@ -73,6 +75,7 @@ class ContactCorrector:
         Raises:
             InputError: As of one.
         """
+        observations = [lowered_observation(one) for one in observations]
         loops = compiled.kept_loops() if self.solver is None else None
         known = None if loops is None else layout(observations[0].assembly, observations[0].play_m)
         if loops is None or known is None or any(one.shared or one.tails for one in observations):
@@ -83,6 +86,7 @@ class ContactCorrector:
 
     def given(self, observation: Observation, found: NearestGoals | None) -> Correction:
         """Correct an observation; `found` are its nearest goals without inequalities, if they are known already."""
+        observation = lowered_observation(observation)
         if not observation.seen.all():
             return refused_correction(observation)
         asked = problem(observation, self.chosen_solver())
@@ -108,6 +112,7 @@ class ContactCorrector:
 
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
+        observation = lowered_observation(observation)
         asked = problem(observation, self.chosen_solver())
         kept = asked.without(dropped)
         solved = asked.solve(kept)

@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.correction.solvers.newton import Solution
 from apo_bench.records import outcomes
@@ -32,12 +33,13 @@ def opposing(observation: Observation, made: Correction) -> Correction:
     """A correction as it is; `inconsistent` in place of `converged` where faces that should touch look the same way."""
     if not made.ok:
         return made
-    away = looking_away(observation.assembly, observation.start, made.goals)
+    assembly = lowered(observation.assembly)
+    away = looking_away(assembly, observation.start, made.goals)
     if made.dropped:
-        away &= observation.assembly.without(made.dropped)
+        away &= assembly.without(made.dropped)
     if not away.any():
         return made
-    contact = observation.assembly.relations()[int(np.argmax(away))].contact
+    contact = assembly.given(assembly.relations()[int(np.argmax(away))].contact)
     said = (
         f"the faces of {contact} look the same way at the goals that were found; a part was probably seen turned over"
     )

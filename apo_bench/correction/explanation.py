@@ -15,8 +15,11 @@ from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import ODL, Assembly, Operation
 from apo_bench.correction.directions import Direction, directions, held
@@ -122,6 +125,7 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
     """
+    given, observation = observation.assembly, lowered_observation(observation)
     n, assembly = len(goals), observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
@@ -157,16 +161,22 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
             )
         )
     return Explanation(
-        assembly=assembly,
+        assembly=given,
         goals=goals,
         operations=tuple(found),
         parts=_standing(assembly, observation.start, goals, B, spans),
         rank=known.rank,
         freedom=known.free.shape[1],
-        redundant=known.redundant - 3 * int(np.count_nonzero(~kept)),
+        redundant=known.redundant - _void(assembly, kept),
         spectral_gap=known.spectral_gap,
         shared=shared,
     )
+
+
+def _void(assembly: Assembly, kept: NDArray[np.bool_]) -> int:
+    """How many compact equations say nothing: of contacts that are not kept, and of fewer than three points."""
+    said = np.where(kept, np.minimum(np.diff(pattern(assembly).begin), 3), 0)
+    return int((3 - said).sum())
 
 
 def _deviation(C: Array, direction: Direction) -> float:

@@ -42,7 +42,8 @@ def relation_holds(assembly: Assembly) -> tuple[Hold, ...]:
     relations, history = assembly.relations(), assembly.odls()
     found = []
     for i, arc in enumerate(assembly.arcs(), start=1):
-        (a, b), made, lost = relations[arc[0]]
+        contact, made, lost = relations[arc[0]]
+        a, b = assembly.given(contact)
         word = simplified((*inverted(history[made].get(a.part, ())), *history[made].get(b.part, ())))
         found.append(Hold(f"R{i}", (a.part, b.part), made, lost, word))
     return tuple(found)

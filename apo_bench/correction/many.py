@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.solvers.batch import compact_many
@@ -54,6 +55,7 @@ def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> 
     if any(one.shared or one.tails for one in observations):
         return [corrector.given(one, None) for one in observations]
     goals, L = np.array([one.goals for one in observations]), np.array([scales(one.covariance) for one in observations])
+    observations = [lowered_observation(one) for one in observations]
     plain = equations(observations[0].assembly, observations[0].start, observations[0].goals)
     system, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)
     solve = corrector.chosen_solver()

@@ -1,24 +1,32 @@
 """What the play of parts that fit does to the contact equations: by how much each is off, and which are off together.
 
 Two parts that fit are off by one displacement, uniform within the play along every normal at which they fit: faces
-that look opposite ways are off by the same amount. A part that is carried inside another one also shifts within their
-play until it is let go of, so its later contacts are off by where it lay in its carrier before, and by where it lies
-then: play adds up along what is carried.
+that look opposite ways are off by the same amount. In a round hole it is anywhere in a disc. A part that is carried
+inside another one also shifts within their play until it is let go of, so its later contacts are off by where it lay in
+its carrier before, and by where it lies then: play adds up along what is carried.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly.equations import pattern
-from apo_bench.assembly.topology import Assembly, PartFace
+from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.remembered import remembered
 
 LARGEST_CORRELATED = 300
 """Contacts above which the play of each is taken for its own: a covariance of all of them is a dense matrix."""
+
+
+_DISC = sqrt(3.0) / 2.0
+"""A component of a point that is anywhere in a disc deviates by this part of one that is anywhere in an interval."""
+_Loose = Mapping[Contact, float]
+"""By how much each contact may be off, as a part of the largest play."""
 
 
 class _Shift(NamedTuple):
@@ -33,9 +41,12 @@ class _Shift(NamedTuple):
 
 
 @remembered
-def plays(assembly: Assembly) -> Array:
-    """How many independent plays each contact is off by, (c,), in the order of `relations()`."""
-    return frozen(np.array([sum(float(n @ n) for n in shifts.values()) for shifts in _shifts(assembly)]))
+def plays(assembly: Assembly, play_m: float) -> tuple[Array, float]:
+    """How many independent plays each contact is off by, (c,), in the order of `relations()`, and how large one is,
+    [m].
+    """
+    shifts, unit_m = _shifts(assembly, play_m)
+    return frozen(np.array([sum(float(n @ n) for n in own.values()) for own in shifts])), unit_m
 
 
 @remembered
@@ -45,15 +56,15 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     Only the first row of each contact, its centre, goes with others: what turns parts within their play turns each in
     its own way.
     """
-    shifts, count = _shifts(assembly), plays(assembly)
-    if not count.any() or not play_m or len(shifts) > LARGEST_CORRELATED:
+    (shifts, _), (count, unit_m) = _shifts(assembly, play_m), plays(assembly, play_m)
+    if not count.any() or len(shifts) > LARGEST_CORRELATED:
         return None
     every = {shift: 3 * i for i, shift in enumerate(dict.fromkeys(shift for own in shifts for shift in own))}
     by = np.zeros((len(shifts), 3 * len(every)))
     for row, own in zip(by, shifts, strict=True):
         for shift, n in own.items():
             row[every[shift] : every[shift] + 3] = n
-    each = play_m**2 / 3.0 * np.diff(pattern(assembly).begin)
+    each = unit_m**2 / 3.0 * np.diff(pattern(assembly).begin)
     by *= np.sqrt(each)[:, None]
     S = np.diag(np.repeat(count * each, 3))
     S[::3, ::3] = by @ by.T
@@ -61,25 +72,27 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
 
 
 @remembered
-def _shifts(assembly: Assembly) -> tuple[dict[_Shift, Array], ...]:
+def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array], ...], float]:
     """What each contact is off by, in the order of `relations()`: by how much, (3,), of each displacement.
 
     A face comes nearer if its part moves along the normal; where a part is thought to be is off by how much it has
-    moved within its carrier since.
+    moved within its carrier since. The second number is the unit of displacements, the largest play, [m].
     """
-    found = []
-    for contact, made, _ in assembly.relations():
+    relations, found = assembly.relations(), []
+    unit_m = max((assembly.play(relation.contact, play_m) for relation in relations), default=0.0)
+    loose = {one.contact: _looseness(assembly, one.contact, play_m, unit_m) for one in relations}
+    for contact, made, _ in relations:
         own = dict[_Shift, Array]()
-        if assembly.is_fit(contact):
+        if loose[contact]:
             inner, outer = contact if not _ever_carries(assembly, *contact) else contact[::-1]
-            own[_Shift(inner.part, outer.part, made, made)] = -assembly.face(inner).normal
+            own[_Shift(inner.part, outer.part, made, made)] = -loose[contact] * assembly.face(inner).normal
         for face in contact:
             n = assembly.face(face).normal
-            for shift, way in _carried(assembly, face.part, made):
-                added = own.get(shift, np.zeros(3)) + way * (_fitting(assembly, shift) @ n)
+            for shift, way in _carried(assembly, face.part, made, loose):
+                added = own.get(shift, np.zeros(3)) + way * (_fitting(assembly, shift, loose) @ n)
                 own[shift] = added
         found.append(own)
-    return tuple(found)
+    return tuple(found), unit_m
 
 
 def _ever_carries(assembly: Assembly, a: PartFace, b: PartFace) -> bool:
@@ -87,7 +100,13 @@ def _ever_carries(assembly: Assembly, a: PartFace, b: PartFace) -> bool:
     return any(operation.main == a.part and b.part in operation.carries for operation in assembly.operations)
 
 
-def _carried(assembly: Assembly, part: str, after: int) -> list[tuple[_Shift, float]]:
+def _looseness(assembly: Assembly, contact: Contact, play_m: float, unit_m: float) -> float:
+    """How far a contact may be off, in units of the largest play."""
+    size = assembly.play(contact, play_m) / unit_m if unit_m else 0.0
+    return size * _DISC if contact in assembly.origin and not assembly.face(contact.manipulated).opposes else size
+
+
+def _carried(assembly: Assembly, part: str, after: int, loose: _Loose) -> list[tuple[_Shift, float]]:
     """The displacements within carriers by which a part is off after an operation: as it lay at first, and then."""
     found = list[tuple[_Shift, float]]()
     for k in range(after, -1, -1):
@@ -95,25 +114,28 @@ def _carried(assembly: Assembly, part: str, after: int) -> list[tuple[_Shift, fl
         if part == operation.main:
             break
         if part in operation.carries:
-            made = max((m for m, *_ in _together(assembly, part, operation.main, k)), default=None)
+            made = max((m for m, *_ in _together(assembly, part, operation.main, k, loose)), default=None)
             if made is not None:
                 before = _Shift(part, operation.main, made, made)
                 found += [(before, -1.0), (before._replace(until=k), 1.0)]
     return found
 
 
-def _together(assembly: Assembly, part: str, other: str, before: int) -> list[tuple[int, Array]]:
-    """The contacts that fit of a part with another one that stand before an operation: who made it, its normal."""
+def _together(assembly: Assembly, part: str, other: str, before: int, loose: _Loose) -> list[tuple[int, Array, float]]:
+    """The contacts that fit of a part with another one that stand before an operation: who made it, its normal, its
+    play in units.
+    """
     found = []
     for contact, made, lost in assembly.relations():
         faces = {face.part: face for face in contact}
         stands = made < before and (lost is None or lost >= before)
-        if stands and faces.keys() == {part, other} and assembly.is_fit(contact):
-            found.append((made, assembly.face(faces[part]).normal))
+        if stands and faces.keys() == {part, other} and loose[contact]:
+            found.append((made, assembly.face(faces[part]).normal, loose[contact]))
     return found
 
 
-def _fitting(assembly: Assembly, shift: _Shift) -> Array:
-    """The projection onto the directions along which a part fits into another one, (3, 3)."""
-    normals = np.array([n for _, n in _together(assembly, shift.part, shift.other, shift.made + 1)])
-    return np.asarray(np.linalg.pinv(normals) @ normals)
+def _fitting(assembly: Assembly, shift: _Shift, loose: _Loose) -> Array:
+    """The projection onto the directions along which a part fits into another one, (3, 3), times its play in units."""
+    known = _together(assembly, shift.part, shift.other, shift.made + 1, loose)
+    normals = np.array([n for _, n, _ in known])
+    return np.asarray(np.linalg.pinv(normals) @ normals) * max(size for _, _, size in known)

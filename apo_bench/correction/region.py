@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.posterior import freedom
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.solvers.joint import linearised_by
@@ -30,7 +31,7 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
 
     if correction.covariance is None or not correction.ok:
         return None
-    observation = correction.believed or observation
+    observation = lowered_observation(correction.believed or observation)
     L = noise_factor(observation)
     xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
     system = seen_system(observation).among(_equal(observation, correction.dropped))

@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.opposing import OPPOSING
+from apo_bench.assembly.opposing import OPPOSING, looking_away
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.consistency import SOFT_M, softened_length
 from apo_bench.correction.ending import status_sentence
@@ -66,7 +66,8 @@ def correct_compiled(
     chi_square = (found.z * found.z).sum(axis=1) if S is None else softened_length(found.z, found.Jt, S)
     p = np.where(rank > 0, chdtrc(np.maximum(rank, 1), chi_square), 1.0)
     holds = np.abs(found.e).max(axis=1, initial=0.0) <= SOFT_M
-    trusted = (cosine <= OPPOSING) & ~turned_far(goals, found.goals)
+    trusted = (cosine <= OPPOSING) if known.opposing else ~looking_away(first.assembly, first.start, found.goals).any(1)
+    trusted &= ~turned_far(goals, found.goals)
     simple = definite & found.finite & found.at_rest & clear & holds & trusted & (trusting | (p >= level))
     made = []
     numbers = (before, after, rank, chi_square, p, turns.ended, simple)
@@ -118,6 +119,8 @@ class Layout:
     correlated: Array | None
     """(3 c, 3 c), as of `fit_covariance`."""
     freed: tuple[int, ...]
+    opposing: bool
+    """Whether the faces of every contact look at each other when they touch."""
 
 
 @remembered
@@ -142,4 +145,5 @@ def layout(assembly: Assembly, play_m: float) -> Layout | None:
         moments=corner_moments(known),
         correlated=fit_covariance(assembly, play_m),
         freed=known.freed,
+        opposing=bool(known.opposing.all()),
     )

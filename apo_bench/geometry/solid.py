@@ -31,6 +31,8 @@ class Face:
     """The physical part recedes here by the clearance; the nominal face does not."""
     stated_normal: Array | None = None
     """Of a sheet, whose corners need not make a polygon: points, or the ends of a line."""
+    opposes: bool = True
+    """Whether what touches it looks the other way; a plane through an axis has two sides that are alike."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", frozen(self.outline, None, 3))

@@ -29,11 +29,11 @@ def by_contact(name, values):
 
 def test_each_fit_on_the_way_adds_its_play():
     """In the carrier before, in the carrier then, and in the slot: only along directions in which the carrier fits."""
-    bridge = by_contact("carried_bridge", plays(shown("carried_bridge")[0].assembly))
+    bridge = by_contact("carried_bridge", plays(shown("carried_bridge")[0].assembly, PLAY_M)[0])
     assert bridge["cube.nz on castle1.topP"] == 0.0
     assert bridge["stick.pz on cube.hpz"] == pytest.approx(1.0)
     assert bridge["stick.nz on castle1.sfl"] == pytest.approx(3.0)
-    pocket = by_contact("pocket_table", plays(shown("pocket_table")[0].assembly))
+    pocket = by_contact("pocket_table", plays(shown("pocket_table")[0].assembly, PLAY_M)[0])
     assert pocket["cube2.nz on table.top"] == 0.0
     assert pocket["cube2.nz on table.A_fl"] == pytest.approx(2.0)
     assert pocket["cube2.px on table.A_px"] == pytest.approx(1.0)

@@ -24,10 +24,11 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.placement import placements
-from apo_bench.assembly.topology import PartFace, Relation
+from apo_bench.assembly.topology import Assembly, PartFace, Relation
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import all_boxes
 from apo_bench.records import outcomes
 
 _MM = 1e3
@@ -48,8 +49,9 @@ def cadquery(observation: Observation) -> Correction:
         if the solver gave up, with what was seen.
 
     Raises:
-        InputError: CadQuery is not installed or cannot be loaded beside GTSAM.
+        InputError: CadQuery is not installed or cannot be loaded beside GTSAM, or a contact or a part is not flat.
     """
+    _check_flat(observation.assembly)
     module = _module()
     try:
         return as_it_ends(
@@ -58,6 +60,18 @@ def cadquery(observation: Observation) -> Correction:
     except _NoSolution:
         now = largest_gap(observation.assembly, observation.start, observation.goals)
         return Correction(observation.goals, "not_converged", outcomes.sentence("not_converged"), (), now, now, 0)
+
+
+def _check_flat(assembly: Assembly) -> None:
+    """Its mates are those of flat faces of boxes."""
+    round_ = [r.contact for r in assembly.relations() if assembly.is_round(r.contact)]
+    odd = [f"the contact {contact}" for contact in round_]
+    odd += [f"the part '{name}'" for name, solid in assembly.solids.items() if not all_boxes(solid.pieces)]
+    if odd:
+        raise InputError(
+            f"the corrector 'cadquery' knows flat contacts of parts made of boxes, and {odd[0]} is neither; "
+            "use another corrector."
+        )
 
 
 def _module() -> Any:

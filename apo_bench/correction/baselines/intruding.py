@@ -2,7 +2,7 @@
 
 The deepest corner v of one box behind the side n of the other has e = n D_a^-1 D_b v = -depth, the form of Eq. 3, so
 the Jacobian of contacts serves here too. Of the six directions along which two boxes may part, those normal to their
-sides, the shortest way out counts; cross products of edges are left aside.
+sides, the shortest way out counts; cross products of edges are left aside, and so are pieces that are no boxes.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from apo_bench.assembly.equations import Equations
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Box
 
 
 @final
@@ -44,8 +45,8 @@ def meeting(assembly: Assembly, system: Equations) -> Meeting:
     pairs = [
         (w, a, b)
         for w, i in enumerate(first)
-        for a in assembly.solids[contacts[i].manipulated.part].pieces
-        for b in assembly.solids[contacts[i].environment.part].pieces
+        for a in _boxes(assembly, contacts[i].manipulated.part)
+        for b in _boxes(assembly, contacts[i].environment.part)
     ]
     letters, inverse = system.letters[first], system.inverse[first]
     words = Equations(
@@ -63,6 +64,10 @@ def meeting(assembly: Assembly, system: Equations) -> Meeting:
         centers=np.array([[a.center for _, a, _ in pairs], [b.center for _, _, b in pairs]]).reshape(2, -1, 3),
         halves=np.array([[a.half for _, a, _ in pairs], [b.half for _, _, b in pairs]]).reshape(2, -1, 3),
     )
+
+
+def _boxes(assembly: Assembly, part: str) -> list[Box]:
+    return [piece for piece in assembly.solids[part].pieces if isinstance(piece, Box)]
 
 
 def intruding(meetings: Meeting, goals: Array) -> Equations:

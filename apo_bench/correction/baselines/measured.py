@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.ending import refused_correction, status_sentence
 from apo_bench.correction.solvers.inequalities import demanded, violations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, least_step
@@ -45,6 +46,7 @@ def gap_of(observation: Observation, goals: Array, dropped: Collection[str] = ()
     Args:
         dropped: Relations, or single contacts, that do not count.
     """
+    observation = lowered_observation(observation)
     plain = equations(observation.assembly, observation.start, observation.goals)
     system, exact, inequalities = demanded(plain, observation.assembly, observation.play_m)
     return largest(violations(system, exact, inequalities, goals)[observation.assembly.without(dropped)])
@@ -62,6 +64,7 @@ def as_it_ends(observation: Observation, mended: Callable[[Observation], Array],
     """
     if not observation.seen.all():
         return refused_correction(observation)
+    observation = lowered_observation(observation)
     goals = mended(observation) if observation.assembly.relations() else observation.goals
     left_m = largest_gap(observation.assembly, observation.start, goals)
     return goals_as_given(observation, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

@@ -10,6 +10,7 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.correction.baselines.candidates import candidates
@@ -29,6 +30,7 @@ def no_history(observation: Observation) -> Correction:
         The status says whether the standing contacts hold at the object poses; the gaps are those of every contact
         ever made. `freed` are the operations that got a new motion parameter.
     """
+    observation = lowered_observation(observation)
     if not observation.seen.all():
         return refused_correction(observation)
     last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}

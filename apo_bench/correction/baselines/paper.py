@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.ending import refused_correction, solver_status, status_sentence
@@ -22,6 +23,7 @@ def paper(observation: Observation) -> Correction:
         `inconsistent`, `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the
         candidates; rank and trace are those of their joint solution.
     """
+    observation = lowered_observation(observation)
     return at_once(observation, np.ones(len(observation.assembly.relations()), dtype=np.bool_))
 
 

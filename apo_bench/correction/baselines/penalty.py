@@ -6,9 +6,9 @@ loss, in units of stated standard deviations, is
 
     sum (e / PENALTY_CONTACT_M)^2 + sum (depth / PENALTY_CONTACT_M)^2 + sum |z_k|^2
 
-with e of every contact ever made, the depth of every two boxes of parts in contact, at the time the contact was made,
-and z_k = L_k^-1 xi_k. Adam (Kingma and Ba, arXiv 1412.6980) takes `ADAM_STEPS` steps in z, whose length falls from
-`LENGTH` to nothing along a quarter of a cosine. It ends there, at rest or not.
+with e of every contact ever made, the depth of every two boxes (of no other pieces) of parts in contact, at the time
+the contact was made, and z_k = L_k^-1 xi_k. Adam (Kingma and Ba, arXiv 1412.6980) takes `ADAM_STEPS` steps in z, whose
+length falls from `LENGTH` to nothing along a quarter of a cosine. It ends there, at rest or not.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Correction, Iterate, Try
 from apo_bench.assembly.equations import Equations, equations, largest
 from apo_bench.assembly.goals import Observation, Step
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.ending import refused_correction, solver_status, status_sentence
@@ -58,6 +59,7 @@ class TrackedOperation:
 
 def track_operations(observation: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
+    observation = lowered_observation(observation)
     if not observation.seen.all():
         return refused_correction(observation)
     now, schedule, targets = np.array(observation.goals), list[Step](), list[Array]()

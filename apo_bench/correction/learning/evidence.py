@@ -16,6 +16,7 @@ import numpy as np
 
 from apo_bench.assembly.equations import equations, pattern
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.posterior import RANK_CUT_OFF
 from apo_bench.correction.solvers.compact import compact_equations
@@ -48,7 +49,7 @@ def readings(observation: Observation, goals: Array, sets: Iterable[Collection[i
     Args:
         goals: (n, 4, 4), corrected, consistent with every contact.
     """
-    n = len(goals)
+    observation, n = lowered_observation(observation), len(goals)
     system = compact_equations(equations(observation.assembly, observation.start, goals), n)
     _, blocks = system.blocks(goals, np.broadcast_to(np.diag(UNITS), (n, 6, 6)))
     J = system.gathered(blocks).T

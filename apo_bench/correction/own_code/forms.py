@@ -15,7 +15,9 @@ from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
-from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.geometry.hull import Cylinder, Hull
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Box, Face, Piece, Solid
 
 
 def observation_message(observation: Observation) -> CorrectorMessage:
@@ -149,9 +151,11 @@ def _solid_form(solid: Solid) -> MessageForm:
             [key, face.name, face.outline.tolist(), [hole.tolist() for hole in face.holes], bool(face.fit)]
             for key, face in solid.faces.items()
         ],
-        "boxes": [[box.name, box.center.tolist(), box.half.tolist()] for box in solid.pieces],
+        "pieces": [_piece_form(piece) for piece in solid.pieces],
         "centroid": solid.centroid.tolist(),
         "volume": float(solid.volume),
+        "rounds": [[key, _round_form(face)] for key, face in solid.rounds.items()],
+        "inertia": None if solid.inertia is None else solid.inertia.tolist(),
     }
 
 
@@ -159,10 +163,48 @@ def _solid(form: MessageForm) -> Solid:
     return Solid(
         form["name"],
         {key: Face(name, outline, tuple(holes), fit) for key, name, outline, holes, fit in form["faces"]},
-        tuple(Box(*box) for box in form["boxes"]),
+        tuple(map(_piece, form["pieces"])),
         form["centroid"],
         form["volume"],
+        {
+            key: RoundFace(**{**face, "span": tuple(face["span"]), "radii": tuple(face["radii"])})
+            for key, face in form["rounds"]
+        },
+        form["inertia"],
     )
+
+
+def _piece_form(piece: Piece) -> list[Any]:
+    if isinstance(piece, Box):
+        return ["box", piece.name, piece.center.tolist(), piece.half.tolist()]
+    round_ = piece.cylinder
+    cylinder = None if round_ is None else [round_.center.tolist(), round_.axis.tolist(), *map(float, round_[2:])]
+    return ["hull", piece.name, piece.corners.tolist(), cylinder]
+
+
+def _piece(form: list[Any]) -> Piece:
+    kind, name, *shape = form
+    if kind == "box":
+        return Box(name, *shape)
+    corners, cylinder = shape
+    if cylinder is None:
+        return Hull(name, corners)
+    center, axis, radius, half_length = cylinder
+    return Hull(name, corners, Cylinder(np.array(center), np.array(axis), radius, half_length))
+
+
+def _round_form(face: RoundFace) -> MessageForm:
+    return {
+        "name": face.name,
+        "point": face.point.tolist(),
+        "axis": face.axis.tolist(),
+        "span": [*map(float, face.span)],
+        "radii": [*map(float, face.radii)],
+        "hole": bool(face.hole),
+        "fit": bool(face.fit),
+        "extent_rad": float(face.extent_rad),
+        "toward": None if face.toward is None else face.toward.tolist(),
+    }
 
 
 def _ends(contact: Contact) -> list[list[str]]:

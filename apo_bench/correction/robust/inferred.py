@@ -1,8 +1,9 @@
 """Where operations led whose observation is missing or not believed: inferred from their contacts and what is around.
 
 A contact says that two normals oppose, that a point lies in a plane, and that two faces cover each other, so their
-middles are not far apart. With the poses of all other operations in its equations known, a contact of an operation
-says this of its goal alone. The operation of which most is said is inferred first; then it is known to the others.
+middles are not far apart; or that two axes are one line. With the poses of all other operations in its equations known,
+a contact of an operation says this of its goal alone. The operation of which most is said is inferred first; then it is
+known to the others.
 """
 
 from __future__ import annotations
@@ -10,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from itertools import permutations
 from itertools import product as pairs
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, product
+from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly.topology import Assembly, Contact, product
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.remembered import remembered
@@ -28,31 +30,50 @@ _PLANE_M = 1e-3
 _SAME_WAY = 0.99
 
 
+_Lie = Literal["opposite", "along", "across"]
+"""How two directions lie to each other: two normals, two axes of whichever sense, an axis and a normal."""
+_MOST_AXES = 6
+"""Axes whose senses are tried with each other; of more, each points as it was seen."""
+
+
 class Ends(NamedTuple):
     """The two faces of a contact, each in the frame of its own part."""
 
-    normals: tuple[Array, Array]
-    """(3,) each: of the manipulated part, of the environment part."""
+    directions: tuple[Array, Array]
+    """(3,) each, of the manipulated part, of the environment part: normals, or axes."""
     middles: tuple[Array, Array]
     """(3,) each, [m]."""
     reach_m: float
     """How far apart the middles of faces that touch may be: half the larger face."""
+    lie: _Lie = "opposite"
+    seated: bool = False
+    """Whether the middles are the same point."""
 
 
 class _Said(NamedTuple):
-    """What one contact says of the pose T of an operation: R own = way, and way . (R at + t - there) = 0."""
+    """What one contact says of the pose T of an operation: R own = way, and u . (R at + t - there) = 0 for some u."""
 
     own: Array
-    """A normal in the frame of the main part, (3,)."""
+    """A normal or an axis in the frame of the main part, (3,)."""
     at: Array
     """The middle of the face there, (3,), [m]."""
     way: Array
-    """The opposite of the other normal, (3,), world."""
+    """The opposite of the other normal, or the other axis, (3,), world."""
     there: Array
     """The middle of the other face, (3,), world, [m]."""
     beside: Array
     """The orientation of the other part, (3, 3), world."""
-    reach_m: float
+    ends: Ends
+    of_first: bool
+    """Whether the main part has the manipulated face."""
+
+    def exact(self, R: Array) -> Array:
+        """The directions u in which the middles are in one place, (k, 3), world."""
+        if self.ends.seated:
+            return np.eye(3)
+        if self.ends.lie == "along":
+            return np.asarray(np.linalg.svd(self.way[None])[2][1:])
+        return (R @ self.own if self.ends.lie == "across" and self.of_first else self.way)[None]
 
 
 class Inferred(NamedTuple):
@@ -83,14 +104,41 @@ def inferred_goals(observation: Observation, unknown: Collection[int]) -> Inferr
 
 
 @remembered
-def contact_ends(assembly: Assembly) -> tuple[Ends, ...]:
-    """The faces of every contact, in the order of `relations()`."""
-    found = []
-    for relation in assembly.relations():
-        a, b = (assembly.face(of) for of in relation.contact)
-        reach = max(float(np.ptp(face.outline, axis=0).max()) for face in (a, b)) / 2
-        found.append(Ends((a.normal, b.normal), (a.outline.mean(axis=0), b.outline.mean(axis=0)), reach))
+def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
+    """The faces of every contact, in the order of `relations()`; None of contacts of sheets that add nothing.
+
+    Args:
+        assembly: As `lowered` makes it.
+    """
+    found, told = list[Ends | None](), set[tuple[int, Contact]]()
+    for contact, made, _ in assembly.relations():
+        given = assembly.given(contact)
+        ends = _flat_ends(assembly, contact) if given is contact else _round_ends(assembly, contact, given)
+        new = ends is not None and (given is contact or (made, given) not in told)
+        found.append(ends if new else None)
+        if new:
+            told.add((made, given))
     return tuple(found)
+
+
+def _flat_ends(assembly: Assembly, contact: Contact) -> Ends:
+    a, b = (assembly.face(of) for of in contact)
+    reach = max(float(np.ptp(face.outline, axis=0).max()) for face in (a, b)) / 2
+    return Ends((a.normal, b.normal), (a.outline.mean(axis=0), b.outline.mean(axis=0)), reach)
+
+
+def _round_ends(assembly: Assembly, contact: Contact, given: Contact) -> Ends | None:
+    """What a contact of sheets tells of that of round faces; of cones the one that says where they sit tells all."""
+    kind, ends = contact_kind(*map(assembly.face_of, given)), _flat_ends(assembly, contact)
+    own = {of.part: of.face for of in given}
+    a, b = (assembly.solids[of.part].rounds.get(own[of.part]) for of in contact)
+    assert b is not None
+    if a is None:
+        return ends._replace(directions=(ends.directions[0], b.axis), lie="across")
+    if kind == "shaft in hole":
+        return Ends((a.axis, b.axis), (a.middle, b.middle), max(a.length, b.length) / 2, "along")
+    seats = assembly.face(contact.manipulated).opposes
+    return ends._replace(reach_m=max(a.radius, b.radius), seated=True) if seats else None
 
 
 def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collection[int]) -> list[_Said]:
@@ -99,7 +147,7 @@ def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collecti
     others = {p + other for other in left if other != k}
     for word, ends in zip(pattern(assembly).words, contact_ends(assembly), strict=True):
         letters = [letter for letter, _ in word]
-        if letters.count(p + k) != 1 or others.intersection(letters):
+        if ends is None or letters.count(p + k) != 1 or others.intersection(letters):
             continue
         j = letters.index(p + k)
         before, behind, inverted = (
@@ -107,29 +155,36 @@ def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collecti
             product(word[j + 1 :], poses),
             word[j].inverse,
         )
-        a = before[:3, :3] @ ends.normals[0], pose.apply(before, ends.middles[0][None])[0]
-        b = behind[:3, :3] @ ends.normals[1], pose.apply(behind, ends.middles[1][None])[0]
+        a = before[:3, :3] @ ends.directions[0], pose.apply(before, ends.middles[0][None])[0]
+        b = behind[:3, :3] @ ends.directions[1], pose.apply(behind, ends.middles[1][None])[0]
         (own, at), (other, there) = (a, b) if inverted else (b, a)
         beside = behind[:3, :3] if inverted else before[:3, :3]
-        found.append(_Said(own, at, -other, there, beside, ends.reach_m))
+        way = -other if ends.lie == "opposite" else other
+        found.append(_Said(own, at, way, there, beside, ends, inverted))
     return found
 
 
 def _rank(told: Sequence[_Said]) -> int:
     """In how many directions normals look."""
-    return int((np.linalg.svd(np.array([one.own for one in told]), compute_uv=False) > _APART).sum()) if told else 0
+    return _directions(np.array([one.own for one in told])) if told else 0
+
+
+def _directions(own: Array) -> int:
+    """How many directions these are, (k, 3), the same within a few degrees."""
+    return int((np.linalg.svd(own, compute_uv=False) > _APART).sum())
 
 
 def _placed(told: Sequence[_Said], seen: Array) -> Array:
     """The pose that agrees best with what is said; what is not said of its orientation is as it was seen."""
     T = np.eye(4)
     T[:3, :3] = R = _turned(told, seen[:3, :3])
-    A, b, fixed = np.zeros((3, 3)), np.zeros(3), _across(np.array([one.way for one in told]))
-    for one in told:
-        off, across, along = one.there - R @ one.at, 1.0 / one.reach_m**2, 1.0 / _PLANE_M**2
-        way = fixed @ one.way
-        A += along * np.outer(way, way) + across * np.eye(3)
-        b += along * way * (way @ off) + across * off
+    exact = [one.exact(R) for one in told]
+    A, b, fixed = np.zeros((3, 3)), np.zeros(3), _across(np.concatenate(exact))
+    for one, known in zip(told, exact, strict=True):
+        off, across, along = one.there - R @ one.at, 1.0 / one.ends.reach_m**2, 1.0 / _PLANE_M**2
+        ways = [fixed @ way for way in known]
+        A += sum(along * np.outer(way, way) for way in ways) + across * np.eye(3)
+        b += sum(along * way * (way @ off) for way in ways) + across * off
     T[:3, 3] = np.linalg.solve(A, b)
     return T
 
@@ -145,11 +200,43 @@ def _across(ways: Array) -> Array:
 
 
 def _turned(told: Sequence[_Said], seen: Array) -> Array:
-    """(3, 3): normals oppose. Where they look along one line, parts stand square to each other, as near as can be."""
+    """(3, 3): normals oppose, axes point the way that fits best; what is left of a shaft on a plane turns the least."""
+    sure = [one for one in told if one.ends.lie != "across"]
+    R = _sensed(sure, seen) if sure else seen
+    if len(sure) == len(told) or _rank(sure) > 1:
+        return R
+    own = np.array([one.own for one in told])
+    way = np.array([_beside(R @ one.own, one.way) if one.ends.lie == "across" else R @ one.own for one in told])
+    return _nearest(way.T @ own + _PLANE_M * R)
+
+
+def _beside(direction: Array, way: Array) -> Array:
+    """The nearest direction across another one, (3,)."""
+    found = direction - (direction @ way) * way
+    size = np.sqrt(found @ found)
+    return found / size if size > _APART else np.asarray(np.linalg.svd(way[None])[2][1])
+
+
+def _sensed(told: Sequence[_Said], seen: Array) -> Array:
+    """(3, 3): the best of all senses of axes; of several that fit as well the nearest to what was seen."""
     own, way = (np.array([getattr(one, name) for one in told]) for name in ("own", "way"))
-    rank = _rank(told)
+    axes = [i for i, one in enumerate(told) if one.ends.lie == "along"]
+    if not axes:
+        return _fitted(own, way, told[0].beside, seen)
+    tried = list[tuple[float, float, Array]]()
+    likely = tuple(np.where(np.einsum("ki,ij,kj->k", way[axes], seen, own[axes]) < 0.0, -1.0, 1.0))
+    for signs in pairs((1.0, -1.0), repeat=len(axes)) if len(axes) <= _MOST_AXES else (likely,):
+        ways = np.array(way)
+        ways[axes] *= np.array(signs)[:, None]
+        R = _fitted(own, ways, told[0].beside, seen)
+        tried.append((round(float((ways * (own @ R.T)).sum()), 3), float(np.trace(R.T @ seen)), R))
+    return max(tried, key=lambda one: one[:2])[2]
+
+
+def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:
+    """(3, 3): R own = way. Where these look along one line, parts stand square to each other, as near as can be."""
+    rank = _directions(own)
     if rank == 1:
-        beside = told[0].beside
         square = [beside @ Q for Q in _quarter_turns() if (beside @ Q @ own[0]) @ way[0] > _SAME_WAY]
         if square:
             return max(square, key=lambda R: float(np.trace(R.T @ seen)))

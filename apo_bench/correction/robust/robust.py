@@ -15,6 +15,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.look import Look
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
@@ -56,6 +57,7 @@ class RobustCorrector:
 
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
+        given, observation = observation, lowered_observation(observation)
         views, again, first = views_of(observation), list[int](), None
         while True:
             case = Case(observation, views, self.outliers or observation.outliers or OutlierModel())
@@ -69,7 +71,10 @@ class RobustCorrector:
             again += asked
         if found is None:
             return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
-        return _report(observation, first or found, search, with_room(found), again)
+        made = _report(observation, first or found, search, with_room(found), again)
+        if made.believed is None:
+            return made
+        return replace(made, believed=replace(made.believed, assembly=given.assembly))
 
 
 contact_robust = RobustCorrector()

@@ -18,6 +18,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.overlap import face_area, overlap
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face
 
 TRIED, LEAST_TRIED = 24, 8
 """Places that are tried for all operations together, and for each at least."""
@@ -50,12 +52,23 @@ def crowding(observation: Observation, goals: Array) -> Crowding:
                 if other not in operation.moves and frozenset((part, other)) not in touching:
                     deep = intrusion(assembly.solids[part], at[part], assembly.solids[other], at[other])
                     depth += deep if deep > _DEEP_M else 0.0
-        for m, e in operation.contacts:
-            faces = assembly.face(m), assembly.face(e)
-            found = overlap(faces[0], at[m.part], faces[1], at[e.part])
-            covered = found.area / min(map(face_area, faces))
+        for m, e in dict.fromkeys(map(assembly.given, operation.contacts)):
+            covered = _covered(assembly.face_of(m), at[m.part], assembly.face_of(e), at[e.part])
             bare, missed = bare + 1.0 - covered, missed + (covered < _COVERED)
     return Crowding(missed, depth, bare)
+
+
+def _covered(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
+    """How much of the smaller of two faces that touch covers the other one, 0 to 1; of axes, by their length."""
+    if isinstance(a, Face) and isinstance(b, Face):
+        return overlap(a, T_a, b, T_b).area / min(face_area(a), face_area(b))
+    if isinstance(a, Face) or isinstance(b, Face) or "rim" in (a.kind, b.kind):
+        return 1.0
+    axis = T_b[:3, :3] @ b.axis
+    low_a, high_a = sorted(pose.apply(T_a, a.ends) @ axis)
+    low_b, high_b = sorted(pose.apply(T_b, b.ends) @ axis)
+    common = min(high_a, high_b) - max(low_a, low_b)
+    return float(max(0.0, common) / min(a.length, b.length))
 
 
 def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
