@@ -11,6 +11,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import all_boxes, separating_axes, shadow
@@ -18,6 +19,7 @@ from apo_bench.geometry.solid import Piece
 
 _SLACK_M = 5e-5
 """Pieces are less than this deep in each other where they touch."""
+_ANYWHERE = (-np.inf, np.inf)
 
 
 class Posed(NamedTuple):
@@ -28,15 +30,16 @@ class Posed(NamedTuple):
     """(4, 4), world, [m]."""
 
 
-def overlap_intervals(moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M) -> Array:
+def overlap_intervals(
+    moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M, within: tuple[float, float] = _ANYWHERE
+) -> Array:
     """Where along a line the pieces of two parts overlap by more than a slack, (k, 2), [m]: from and until.
 
     Args:
         way: Unit vector of the motion, (3,), world.
         slack_m: Negative: pieces count that are still this far apart.
+        within: Overlaps that end before or begin after these places may be left out, [m].
     """
-    if not (all_boxes(moving.pieces) and all_boxes(resting.pieces)):
-        return _pair_by_pair(moving, way, resting, slack_m)
     a, half_a = _world(moving)
     b, half_b = _world(resting)
     axes = _axes(moving.T[:3, :3], resting.T[:3, :3])
@@ -44,22 +47,23 @@ def overlap_intervals(moving: Posed, way: Array, resting: Posed, slack_m: float 
     reach_b = half_b @ np.abs(axes @ resting.T[:3, :3]).T
     reach = (reach_a[:, None] + reach_b[None]).reshape(-1, len(axes)) - slack_m
     at = ((a @ axes.T)[:, None] - (b @ axes.T)[None]).reshape(-1, len(axes))
-    return _intervals(at, axes @ way, reach)
+    if all_boxes(moving.pieces) and all_boxes(resting.pieces):
+        return _intervals(at, axes @ way, reach)[1]
+    near, spans = _intervals(at, axes @ way, reach)
+    near = near[(spans[:, 1] > within[0]) & (spans[:, 0] < within[1])]
+    return _pair_by_pair(moving, way, resting, slack_m, near)
 
 
-def _pair_by_pair(moving: Posed, way: Array, resting: Posed, slack_m: float) -> Array:
-    """`overlap_intervals` where sides look anywhere."""
+def _pair_by_pair(moving: Posed, way: Array, resting: Posed, slack_m: float, pairs: NDArray[np.intp]) -> Array:
+    """`overlap_intervals` where sides look anywhere, of those pairs whose boxes overlap; pairs by number, (p,)."""
     found = [np.zeros((0, 2))]
     (R_a, R_b), between = (moving.T[:3, :3], resting.T[:3, :3]), moving.T[:3, 3] - resting.T[:3, 3]
-    for a, b in product(moving.pieces, resting.pieces):
-        line = R_a @ a.center - R_b @ b.center + between
-        across = line - (line @ way) * way
-        if across @ across > (np.linalg.norm(a.half) + np.linalg.norm(b.half) + abs(slack_m)) ** 2:
-            continue
+    for i, j in zip(*np.divmod(pairs, len(resting.pieces)), strict=True):
+        a, b = moving.pieces[i], resting.pieces[j]
         axes = separating_axes(a, R_a, b, R_b)
         (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, R_b, axes)
         at, reach = middle_a - middle_b + axes @ between, half_a + half_b - slack_m
-        found.append(_intervals(at[None], axes @ way, reach[None]))
+        found.append(_intervals(at[None], axes @ way, reach[None])[1])
     return np.concatenate(found)
 
 
@@ -67,7 +71,7 @@ def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: S
     """Whether parts can be moved so far as one without coming into any other."""
     for m, r in product(moving, resting):
         if _near(m, way, length_m, r):
-            spans = overlap_intervals(m, way, r)
+            spans = overlap_intervals(m, way, r, within=(0.0, length_m))
             if ((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any():
                 return False
     return True
@@ -97,8 +101,9 @@ def _ball(posed: Posed) -> tuple[Array, float]:
     return posed.T[:3, :3] @ (low + high) / 2 + posed.T[:3, 3], float(np.linalg.norm(high - low)) / 2
 
 
-def _intervals(at: Array, speed: Array, reach: Array) -> Array:
-    """Where |at + s speed| < reach holds along all axes at once: (k, axes) -> (l, 2), empty ones left out."""
+def _intervals(at: Array, speed: Array, reach: Array) -> tuple[NDArray[np.intp], Array]:
+    """Where |at + s speed| < reach holds along all axes at once: (k, axes) -> which rows, (l,), and from and until,
+    (l, 2); rows where it holds nowhere are left out."""
     still = np.abs(speed) < 1e-9
     apart = (np.abs(at) >= reach) & still
     rate = np.where(still, 1.0, speed)
@@ -106,11 +111,11 @@ def _intervals(at: Array, speed: Array, reach: Array) -> Array:
     low = np.where(still, -np.inf, ends.min(axis=0)).max(axis=1)
     high = np.where(still, np.inf, ends.max(axis=0)).min(axis=1)
     kept = (low < high) & ~apart.any(axis=1) & (reach > 0.0).all(axis=1)
-    return np.column_stack([low[kept], high[kept]])
+    return np.flatnonzero(kept), np.column_stack([low[kept], high[kept]])
 
 
 def _world(posed: Posed) -> tuple[Array, Array]:
-    """Centres in the world and half sizes, (k, 3) each."""
+    """Centres in the world and half sizes, (k, 3) each, of boxes or of those around pieces."""
     centers = np.array([box.center for box in posed.pieces])
     return centers @ posed.T[:3, :3].T + posed.T[:3, 3], np.array([box.half for box in posed.pieces])
 

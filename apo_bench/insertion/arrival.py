@@ -10,8 +10,9 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.assembly.touching import TouchedContact, corners, touched_contacts
+from apo_bench.assembly.touching import TouchedContact, corners, mouth, touched_contacts
 from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.solid import extent
 from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
 from apo_bench.insertion.line import Attach, Preference
 from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
@@ -24,6 +25,8 @@ _TRAVEL_M = 0.03
 """How far before its goal the line begins at least."""
 _CLEAR_M = 0.3
 """A part comes from above to where its way in begins: so much above that place must be free."""
+_LIFTED = 0.1
+"""A contact opens when the part is lifted if the sine of its normal to the level is above this."""
 _SAME = 1e-9
 ANY = Preference()
 
@@ -38,7 +41,7 @@ class Arrival:
     """(4, 4), where the main part then is; directions below are in the frame of the same world."""
     touched: tuple[TouchedContact, ...]
     chain: Chain
-    """The macros by which the part comes, contacts by their number in `touched`."""
+    """The macros by which the part comes; `touched` by number, in which a round contact stands once per normal."""
     departs: tuple[Macro, ...]
     """By which the part leaves again, apart from being lifted."""
     line: Attach
@@ -58,8 +61,8 @@ class Arrival:
         return self.chain.macros
 
     def contacts(self, macro: Macro) -> tuple[Contact, ...]:
-        """The contacts that a macro makes, or opens."""
-        return tuple(self.touched[i].contact for i in macro.makes)
+        """The contacts that a macro makes, or opens, each once."""
+        return tuple(dict.fromkeys(self.touched[i].contact for i in macro.makes))
 
     def own(self, direction: Array) -> Array:
         """A direction, (3,), in the frame of the part."""
@@ -111,22 +114,47 @@ def arrive(
     def out(along: Array, walls: tuple[int, ...]) -> Way:
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
         floors = [normals[i] for i in range(len(normals)) if i not in walls]
-        there = [-(T[:3, :3] @ direction)] if direction is not None else list(_directions(along, floors, T))
-        ways = [Way(u, exit_distance(moving, u, around), False) for u in there]
-        found = (way._replace(free=True) for way in ways if clear(way.direction, reach(way.length_m)))
-        return next(found, ways[0])
+        there = [-(T[:3, :3] @ direction)] if direction is not None else _directions(along, floors, T)
+
+        def length(u: Array) -> float:
+            ends = (_out_of(assembly, touched[i], poses, u) for i in walls)
+            return max(exit_distance(moving, u, around), *ends)
+
+        ways = list[Way]()
+        for u in there:
+            ways.append(Way(u, length(u), False))
+            if clear(u, reach(ways[-1].length_m)):
+                return ways[-1]._replace(free=True)
+        return ways[0]
 
     found = chain(normals, out, float(np.sin(angle_rad)))
     if found.way is not None:
         line, is_free = Attach(_own(-found.way.direction, T), reach(found.way.length_m)), found.way.free
     else:
         there = list(_admissible(found, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
-        way = next((way for way in there if clear(way, reach(0.0))), None)
-        line, is_free = Attach(_own(-(there[0] if way is None else way), T), reach(0.0)), way is not None
+        over = [resting[part] for part in dict.fromkeys(each.rests for each in touched if each.normal @ UP < -_LIFTED)]
+        tried = [(way, reach(far)) for way in there for far in dict.fromkeys((0.0, _past(moving, way, over)))]
+        found_free = next((each for each in tried if clear(*each)), None)
+        (way, length_m), is_free = found_free or tried[0], found_free is not None
+        line = Attach(_own(-way, T), length_m)
     if direction is not None:
         line = Attach(direction, line.travel_m)
-    supports = tuple(i for i, n in enumerate(normals) if n @ UP > 0.5)
+    supports = tuple(i for i, n in enumerate(normals) if n @ UP > _LIFTED)
     return Arrival(moves[0], T, touched, found, departure(found, supports), line, is_free and not found.locked)
+
+
+def _out_of(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Array) -> float:
+    """How far a part must be moved until round walls no longer enclose it, however loosely, [m]; 0 of flat ones."""
+    if touched.points is None:
+        return 0.0
+    m, e = touched.contact
+    return mouth(assembly, *((e, m) if touched.rests == m.part else (m, e)), poses, -way)
+
+
+def _past(moving: Sequence[Posed], way: Array, roofs: Sequence[Posed]) -> float:
+    """How far parts must be moved until no roof is above any of them, at most, [m]."""
+    ends = [[np.add(extent(p.pieces, p.T[:3, :3].T @ way), p.T[:3, 3] @ way) for p in of] for of in (moving, roofs)]
+    return max(0.0, float(np.max(ends[1]) - np.min(ends[0]))) if roofs and abs(way @ UP) < 0.5 else 0.0
 
 
 def turning_state(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
@@ -137,24 +165,25 @@ def turning_state(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
 def _readable(basis: Array, T: Array) -> Array:
     """A basis of the span of (m, 3) that people can read: axes of the part at T that lie in it, then what is left."""
     found: list[Array] = []
-    for axis in (*T[:3, :3].T, *basis):
+    inside = [axis for axis in T[:3, :3].T if np.linalg.norm(basis.T @ (basis @ axis) - axis) < 1e-6]
+    for axis in (*inside, *basis):
         rest = basis.T @ (basis @ axis)
         rest = rest - sum(((rest @ other) * other for other in found), np.zeros(3))
-        inside = np.linalg.norm(rest - axis) < 1e-6 or any(axis is row for row in basis)
-        if inside and np.linalg.norm(rest) > 1e-6 and len(found) < len(basis):
-            found.append(rest / np.linalg.norm(rest))
+        if np.linalg.norm(rest) > 1e-6 and len(found) < len(basis):
+            found.append(rest / np.linalg.norm(rest) + 0.0)
     return np.array(found).reshape(-1, 3)
 
 
 def _admissible(found: Chain, normals: Array, T: Array) -> Iterator[Array]:
-    """Ways off contacts that enclose nothing: straight up if that is one, as the first contact opens, any other."""
+    """Ways off contacts that enclose nothing: straight up if that is one, as the first contact or the last one opens,
+    any other."""
     cone = classify(normals)
     if found.locked:
         yield UP
         return
-    first = [-found.macros[0].direction] if found.macros else []
+    back = [-found.macros[i].direction for i in (0, -1)] if found.macros else []
     inside = [cone.direction] if cone.direction.any() else []
-    for way in (UP, *first, *inside, *(sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0))):
+    for way in (UP, *back, *inside, *(sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0))):
         if cone.admits(way):
             yield way
 

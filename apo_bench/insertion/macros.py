@@ -7,14 +7,14 @@ until it is felt; walls that enclose the part are made by an insertion to a plac
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, final
 
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.insertion.peeling import Layer, peel
-from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space
+from apo_bench.insertion.states import ANGLE_RAD, State, classify, evenly_open, null_space
 
 MacroName = Literal[
     "move-to-contact",
@@ -143,8 +143,7 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
         along = null_space(normals[list(made)]) if made else np.eye(3)
         off, closed = _next(normals, left, along, slack)
         if not closed:  # nothing is left to move along, so the rest closes with what was made last
-            macros[-1] = Macro(macros[-1].name, macros[-1].direction, (*macros[-1].makes, *left), macros[-1].keeps)
-            break
+            return _together(normals, layer, macros, left)
         name: MacroName = "slide-to-contact" if macros else "move-to-contact"
         if layer.cone.state.constraining == 2:
             name = "move-to-bottom"
@@ -153,13 +152,32 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
     return macros
 
 
+def _together(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int, ...]) -> list[Macro]:
+    """Motions of which the last closes what is left, too: turned where that would leave a wall, else one for all."""
+    last = macros[-1]
+    makes, off = (*last.makes, *left), -last.direction
+    if (normals[list(left)] @ off <= 0.0).any():
+        off = _evenly_off(normals, makes, last.keeps)
+        if not off.any():
+            return [replace(macros[0], direction=-_evenly_off(normals, layer.breaks, layer.keeps), makes=layer.breaks)]
+    return [*macros[:-1], replace(last, direction=-off, makes=makes)]
+
+
+def _evenly_off(normals: Array, makes: Sequence[int], keeps: Sequence[int]) -> Array:
+    """The direction that opens some contacts best while others stay closed, (3,); zero if there is none."""
+    along = null_space(normals[list(keeps)]) if keeps else np.eye(3)
+    return np.asarray(evenly_open(normals[list(makes)] @ along.T) @ along)
+
+
 def _next(normals: Array, left: Sequence[int], along: Array, slack: float) -> tuple[Array, tuple[int, ...]]:
-    """In which direction some contacts open while those made before stay closed, and which: up, if that opens any."""
+    """In which direction some contacts open while those made before stay closed, and which: up, if that opens any and
+    leads into none."""
     up = _along(UP, along)
-    carried = tuple(i for i in left if normals[i] @ up > slack)
-    if up[2] > 0.5 and carried:
+    opened = normals[list(left)] @ up
+    carried = tuple(i for i, rate in zip(left, opened, strict=True) if rate > slack)
+    if up[2] > 0.5 and carried and (opened >= -slack).all():
         return up, carried
-    for i in left:
+    for i in sorted(left, key=lambda i: -max(0.5, round(float(normals[i] @ UP), 6))):
         off = _along(normals[i], along)
         if off.any():
             return off, tuple(j for j in left if normals[j] @ normals[i] > 1.0 - slack)

@@ -110,6 +110,23 @@ def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
     return opens, x / max(float(np.linalg.norm(x)), 1e-300)
 
 
+def evenly_open(rows: Array) -> Array:
+    """The motion, (n,), of components up to 1, that opens contacts with these rows, (k, n), the fastest, counting the
+    slowest of them; as a unit vector, or zero if none opens all."""
+    from scipy.optimize import linprog
+
+    k, n = rows.shape
+    found = linprog(
+        np.append(np.zeros(n), -1.0),
+        A_ub=np.hstack([-rows, np.ones((k, 1))]),
+        b_ub=np.zeros(k),
+        bounds=[(-1.0, 1.0)] * n + [(0.0, None)],
+        method="highs",
+    )
+    x = found.x[:n] if found.x[n] > 1.0 / _FASTEST else np.zeros(n)
+    return np.asarray(x / max(float(np.linalg.norm(x)), 1e-300))
+
+
 def row_rank(rows: Array) -> int:
     """How many rows, (k, n), are independent."""
     if not len(rows):

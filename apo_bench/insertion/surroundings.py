@@ -6,9 +6,10 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.assembly.touching import mouth, outline_points, touched_contacts
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Solid, extent
+from apo_bench.geometry.solid import Face, Solid, extent
 from apo_bench.insertion.arrival import Arrival
 
 _SLOW_M = 0.003
@@ -24,13 +25,20 @@ def slide_directions(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[
     for macro in found.macros:
         if macro.name == "slide-to-contact":
             first = found.touched[macro.makes[0]]
-            (rests,) = (of for of in first.contact if of.part == first.rests)
-            side = -poses[rests.part][:3, :3] @ assembly.face(rests).normal
+            side = -_now(assembly, found, macro.makes[0], poses)
             if first.normal @ macro.direction > -1.0 + _STRAIGHT:
                 side = poses[found.main][:3, :3] @ found.own(macro.direction)
             if abs(side[2]) < 0.5:
                 sides.append(side)
     return tuple(sides)
+
+
+def _now(assembly: Assembly, found: Arrival, i: int, poses: Poses) -> Array:
+    """A normal of what is touched, (3,), world, where the parts are believed to be."""
+    contact, rests = found.touched[i].contact, found.touched[i].rests
+    place = sum(each.contact == contact for each in found.touched[:i])
+    moves = [of.part for of in contact if of.part != rests]
+    return touched_contacts(assembly, [contact], moves, poses)[place].normal
 
 
 def _walls(found: Arrival) -> tuple[Contact, ...]:
@@ -41,35 +49,41 @@ def _walls(found: Arrival) -> tuple[Contact, ...]:
 def slow_before(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> float:
     """How far before the goal a motion from above turns slow: where an insertion begins, or just above the floor."""
     depth = _SLOW_M
-    for m, e in _walls(found):
-        corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
-        if len(corners):
-            depth = max(depth, float(np.ptp(corners @ way)) + WALL_MARGIN_M)
+    for contact in _walls(found):
+        depth = max(depth, _reach(assembly, contact, poses, way) + WALL_MARGIN_M)
     return depth
+
+
+def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> float:
+    """How much of a way the faces of a contact have in common, [m]; 0 if nothing."""
+    m, e = contact
+    if assembly.is_round(contact):
+        ends = [outline_points(assembly, of, poses) @ way for of in contact]
+        return max(0.0, float(min(end.max() for end in ends) - max(end.min() for end in ends)))
+    corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+    return float(np.ptp(corners @ way)) if len(corners) else 0.0
 
 
 def mouths(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
     """How far before the goal the part comes to where walls begin that it goes between, [m], the first one first."""
-    ends = set[float]()
-    for m, e in _walls(found):
-        moved, stands = (poses[of.part] for of in (m, e))
-        ahead = (assembly.face(m).outline @ moved[:3, :3].T + moved[:3, 3]) @ way
-        before = (assembly.face(e).outline @ stands[:3, :3].T + stands[:3, 3]) @ way
-        ends.add(float(ahead.max() - before.min()))
+    ends = {mouth(assembly, *contact, poses, way) for contact in _walls(found)}
     return tuple(sorted(ends, reverse=True))
 
 
 def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
     """Normals of the part's faces, (3,) each, that later operations fit or slide something against.
 
-    Only those before the part is moved by itself again.
+    Of a round face two directions across its axis. Only those before the part is moved by itself again.
     """
-    walls = []
+    walls = list[Array]()
     for operation in assembly.operations[k + 1 :]:
         if operation.main == part:
             break
         for contact in operation.contacts:
-            walls += [assembly.face(of).normal for of in contact if of.part == part]
+            for of in contact:
+                if of.part == part:
+                    face = assembly.face_of(of)
+                    walls += [face.normal] if isinstance(face, Face) else list(face.frame[:3, :2].T)
     return walls
 
 
