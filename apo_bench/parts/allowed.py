@@ -106,6 +106,8 @@ _DOT: Mapping[str, Rule] = {
 MOST_BOXES, MOST_PIECES, MOST_CORNERS, MOST_FACES = 100, 2000, 1000, 1000
 """Boxes of a part of boxes alone, pieces of any other, corners of a piece, faces of any part."""
 MOST_SITES, MOST_CLASSES = 600, 20
+LARGEST_BYTES = 4_000_000
+"""Of a part file."""
 _DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
 ELEMENT_RULES: Mapping[str, ElementRule] = {
     "mujoco": ElementRule({"default": 1, "asset": 1, "worldbody": 1}, {"model": _NAMED}),

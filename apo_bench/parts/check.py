@@ -1,4 +1,4 @@
-"""A second opinion on a solid: the mesh that manifold3d makes of its boxes, measured by trimesh."""
+"""A second opinion on a solid: the mesh that manifold3d makes of its pieces, measured by trimesh."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.overlap import face_area
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.solid import Box, Solid
 
 _APART_M = 1e-8
 """The largest distance between the surfaces of the two; planes of boxes are one within a tenth of it."""
+_SHARE = 1e-3
+"""Of the volume."""
 
 
 def check_solid(solid: Solid, file: str) -> None:
@@ -38,11 +40,41 @@ def check_solid(solid: Solid, file: str) -> None:
         raise InputError(f"{file}: the centroid is {1e3 * off:.3g} mm from that of a mesh of the same boxes.")
 
 
+def check_matter(solid: Solid, file: str, rounded: float) -> None:
+    """Raise an `InputError` unless volume, centroid and inertia are those of the pieces, within 0.1 percent.
+
+    Args:
+        rounded: By how much round walls that are cut into flat ones may change the volume, [m^3].
+    """
+    assert solid.inertia is not None
+    mesh = _mesh(solid)
+    room = _SHARE * solid.volume + rounded
+    reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
+    if abs(solid.volume - mesh.volume) > room:
+        raise InputError(
+            f"{file}, volume_mm3: {1e9 * solid.volume:.6g} is stated, the pieces have {1e9 * mesh.volume:.6g}, over "
+            "0.1 % and what round walls explain off; state that of the exact solid, or mend the pieces."
+        )
+    off = np.abs(mesh.center_mass - solid.centroid).max()
+    if off * solid.volume > room * reach:
+        at = ", ".join(f"{1e3 * x:.5g}" for x in mesh.center_mass)
+        raise InputError(f"{file}, centroid_mm: that of the pieces is ({at}), {1e3 * off:.3g} mm from it; state that.")
+    J = np.asarray(mesh.moment_inertia)
+    if np.abs(J - solid.inertia).max() > room * reach**2 / 3.0:
+        six = ", ".join(f"{1e15 * J[i, k]:.5g}" for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+        raise InputError(f"{file}, inertia_mm5: that of the pieces about their centroid is [{six}]; state that.")
+
+
 def _mesh(solid: Solid) -> Any:
-    """The union of the boxes as a mesh; vertices stay apart where the surface touches itself."""
+    """The union of the pieces as a mesh; vertices stay apart where the surface touches itself."""
     import manifold3d
     import trimesh
 
-    boxes = [manifold3d.Manifold.cube(2.0 * box.half, center=True).translate(box.center) for box in solid.pieces]
-    mesh = manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add).to_mesh64()
+    pieces = [
+        manifold3d.Manifold.cube(2.0 * piece.half, center=True).translate(piece.center)
+        if isinstance(piece, Box)
+        else manifold3d.Manifold.hull_points(piece.corners)
+        for piece in solid.pieces
+    ]
+    mesh = manifold3d.Manifold.batch_boolean(pieces, manifold3d.OpType.Add).to_mesh64()
     return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)

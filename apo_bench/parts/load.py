@@ -8,8 +8,9 @@ import numpy as np
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.parts.agreement import check_faces, check_one_piece
 from apo_bench.parts.allowed import MOST_FACES
-from apo_bench.parts.check import check_solid
+from apo_bench.parts.check import check_matter, check_solid
 from apo_bench.parts.faces import SIDES, Surface, unite
 from apo_bench.parts.mjcf import Mark, PartFile, read_part
 from apo_bench.parts.stated import StatedPart
@@ -60,9 +61,19 @@ def load_part(given: str | Path) -> Solid:
             f"{file.path}: the part weighs {mass:.3g} kg; from {_LIGHTEST_KG:g} to {_HEAVIEST_KG:g} kg are allowed, "
             "so change its size or its density."
         )
-    if file.stated is None and file.path.parent != folder("assets") / "parts":
-        check_solid(solid, str(file.path))
+    if file.path.parent != folder("assets") / "parts":
+        check_part(file, solid)
     return solid
+
+
+def check_part(file: PartFile, solid: Solid) -> None:
+    """Raise an `InputError` unless what is stated of a part is so of its pieces."""
+    if file.stated is None:
+        check_solid(solid, str(file.path))
+        return
+    check_one_piece(solid.pieces, file.path)
+    beside = file.path.with_suffix(".toml")
+    check_matter(solid, str(beside), check_faces(solid, beside))
 
 
 def _stated(file: PartFile, said: StatedPart) -> Solid:

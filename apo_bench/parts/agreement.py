@@ -1,0 +1,264 @@
+"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import SAGITTA_M, Hull
+from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
+from apo_bench.geometry.solid import Face, Piece, Solid
+
+_IN_PLANE_M, _PARALLEL = 1e-6, 1e-7
+_ROUNDED_M = 1e-6
+"""What coordinates in files are rounded by at most, and so walls."""
+_BESIDE_M = SAGITTA_M + _ROUNDED_M
+_ABOVE_M = 2e-5
+"""So far above a face nothing of the part is."""
+_COARSE = 0.09
+"""Sides of a wall that no contact uses may be this part of its radius away from it: eight of them are."""
+_RAYS, _SHARES = 72, np.array([0.02, 0.25, 0.5, 0.75, 0.98])
+_LEAST_WALL = 0.5
+"""So much of a round face must be there; bores may cross it."""
+_NEAR = 0.05
+"""So many radii to the free side of a wall nothing of the part is."""
+
+
+class _Sides(NamedTuple):
+    """The sides of pieces in one list."""
+
+    planes: Array
+    """(s, 4): n and d, n . x <= d inside."""
+    first: Any
+    """Where those of each piece begin."""
+    pieces: tuple[Piece, ...]
+
+
+def check_faces(solid: Solid, path: Path) -> float:
+    """Raise an `InputError` unless every stated face lies on the pieces, with nothing of them before it.
+
+    Returns:
+        By how much round walls that are cut into flat ones may change the volume, [m^3].
+    """
+    sides = _sides(solid.pieces)
+    for name, flat in solid.faces.items():
+        _check_flat(flat, sides, f"{path}, faces, {name}")
+    _check_once(solid, path)
+    return sum(_check_round(wall, sides, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
+
+
+def _sides(pieces: tuple[Piece, ...]) -> _Sides:
+    found = [piece.planes if isinstance(piece, Hull) else _box_planes(piece) for piece in pieces]
+    first = np.cumsum([0, *(len(planes) for planes in found[:-1])])
+    return _Sides(np.concatenate(found), first, pieces)
+
+
+def _box_planes(box: Any) -> Array:
+    n = np.concatenate([np.eye(3), -np.eye(3)])
+    return np.column_stack([n, n @ box.center + np.tile(box.half, 2)])
+
+
+def _near(sides: _Sides, low: Array, high: Array) -> _Sides:
+    """Those of the pieces that reach into a box."""
+    ends = np.append(sides.first[1:], len(sides.planes))
+    kept = [
+        k
+        for k, piece in enumerate(sides.pieces)
+        if (piece.center - piece.half <= high).all() and (piece.center + piece.half >= low).all()
+    ]
+    if not kept:
+        return _Sides(np.zeros((0, 4)), np.zeros(0, dtype=np.intp), ())
+    first = np.cumsum([0, *(ends[k] - sides.first[k] for k in kept[:-1])])
+    planes = np.concatenate([sides.planes[sides.first[k] : ends[k]] for k in kept])
+    return _Sides(planes, first, tuple(sides.pieces[k] for k in kept))
+
+
+def _check_flat(face: Face, sides: _Sides, place: str) -> None:
+    """A face is made of sides of pieces that look its way, and lies bare."""
+    import shapely
+
+    n = face.normal
+    margin = np.full(3, _ABOVE_M)
+    sides = _near(sides, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
+    to_plane = _plane(n)
+    stated = shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes])
+    on = (sides.planes[:, :3] @ n > 1.0 - _PARALLEL) & (
+        np.abs(sides.planes[:, 3] - n @ face.outline[0]) < 2.0 * _IN_PLANE_M
+    )
+    owner = np.searchsorted(sides.first, np.flatnonzero(on), side="right") - 1
+    below = [_shadow(sides.pieces[k], side, to_plane) for k, side in zip(owner, sides.planes[on], strict=True)]
+    bare = stated.difference(shapely.unary_union(below).buffer(_BESIDE_M))
+    if not bare.is_empty:
+        at = bare.representative_point()
+        x, y, z = 1e3 * (to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0]) * n)
+        _fail(place, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+    for area in below:
+        common = stated.intersection(area)
+        if common.area < _BESIDE_M**2:
+            continue
+        at = common.representative_point()
+        point = to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0] + _ABOVE_M) * n
+        inside = np.maximum.reduceat(sides.planes[:, :3] @ point - sides.planes[:, 3], sides.first)
+        if inside.min() < -_ROUNDED_M:
+            piece = sides.pieces[int(inside.argmin())]
+            x, y, z = 1e3 * point
+            _fail(place, f"piece '{piece.name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+
+
+def _plane(n: Array) -> Array:
+    """Two directions across a normal, as columns, (3, 2)."""
+    u = np.eye(3)[int(np.abs(n).argmin())]
+    u = u - (u @ n) * n
+    u /= np.linalg.norm(u)
+    return np.column_stack([u, np.cross(n, u)])
+
+
+def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
+    """A side of a piece as a flat area."""
+    from shapely import MultiPoint
+
+    from apo_bench.geometry.convex import piece_corners
+
+    corners = piece_corners(piece)
+    return MultiPoint(corners[np.abs(corners @ side[:3] - side[3]) < _IN_PLANE_M] @ to_plane).convex_hull
+
+
+def _check_once(solid: Solid, path: Path) -> None:
+    """Refuse faces that lie on each other."""
+    from shapely import Polygon
+
+    by_plane: dict[tuple[float, ...], list[Face]] = {}
+    for face in solid.faces.values():
+        key = tuple(np.round([*face.normal, 1e-1 * face.plane[3] / _IN_PLANE_M], 4) + 0.0)
+        by_plane.setdefault(key, []).append(face)
+    for faces in by_plane.values():
+        for a, b in combinations(faces, 2):
+            to_plane = _plane(a.normal)
+            areas = [Polygon(f.outline @ to_plane, [hole @ to_plane for hole in f.holes]) for f in (a, b)]
+            if areas[0].intersection(areas[1]).buffer(-_BESIDE_M).area > 0.0:
+                _fail(f"{path}, faces, {b.name}", f"the face lies on '{a.name}', so state one of them")
+    for r, s in combinations(solid.rounds.values(), 2):
+        if _same_wall(r, s):
+            _fail(f"{path}, faces, {s.name}", f"the face lies on '{r.name}', so state one of them")
+
+
+def _same_wall(a: RoundFace, b: RoundFace) -> bool:
+    """Whether two whole turns of wall, or two rims, are in one place."""
+    if a.kind != b.kind or a.hole != b.hole or abs(a.axis @ b.axis) < 1.0 - _PARALLEL:
+        return False
+    if min(a.extent_rad, b.extent_rad) < WHOLE_TURN - 1e-9:
+        return False
+    off = b.middle - a.middle
+    along = float(off @ a.axis)
+    return bool(
+        np.linalg.norm(off - along * a.axis) < _IN_PLANE_M
+        and abs(a.radius + a.slope * along - b.radius) < _IN_PLANE_M
+        and abs(along) < (a.length + b.length) / 2 + _IN_PLANE_M * (1.0 if a.kind == "rim" else -1.0)
+    )
+
+
+def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
+    """A wall is as far from its axis as it says; returns what of the volume lies between it and the sides, [m^3]."""
+    heights, radii = _samples(wall)
+    middle = wall.toward is None
+    angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if middle else 0.5))
+    x, y = wall.frame[:3, 0], wall.frame[:3, 1]
+    out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
+    reach = max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M
+    low, high = wall.ends.min(axis=0) - reach, wall.ends.max(axis=0) + reach
+    sides = _near(sides, low, high)
+    if not sides.pieces:
+        _fail(place, "no piece is near the face")
+    found, off = 0, 0.0
+    allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
+    for height, radius in zip(heights, radii, strict=True):
+        enter, leave = _crossed(sides, wall.point + height * wall.axis, out)
+        sign = 1.0 if wall.hole else -1.0
+        free = sorted((radius - sign * _BESIDE_M, radius - sign * max(_NEAR * radius, 2.0 * _BESIDE_M)))
+        into = (np.minimum(leave, free[1]) - np.maximum(enter, free[0]) > _ROUNDED_M).any(axis=0)
+        at = (
+            np.where(leave > radius, enter, np.inf).min(axis=0)
+            if wall.hole
+            else (np.where(enter < radius, leave, -np.inf).max(axis=0))
+        )
+        if into.any():
+            true = np.abs(at[into][0])
+            said = f"{1e3 * true:.4f} mm from its axis" if np.isfinite(true) else "before it"
+            _fail(place, f"pieces have a side {said}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm")
+        gap = np.maximum(sign * (at - radius), 0.0)
+        found += int((gap <= allowed).sum())
+        off = max(off, float(gap[gap <= allowed].max(initial=0.0)))
+    if found < _LEAST_WALL * _RAYS * len(heights):
+        _fail(
+            place,
+            f"pieces lie along {found / (_RAYS * len(heights)):.0%} of the wall, within {1e3 * allowed:.3g} mm; "
+            f"{_LEAST_WALL:.0%} is needed",
+        )
+    return off * wall.extent_rad * max(wall.radii) * max(wall.length, 0.0)
+
+
+def _samples(wall: RoundFace) -> tuple[Array, Array]:
+    """Heights from the point of a wall and the radii there; of a rim, just inside of the part."""
+    if wall.kind == "rim":
+        return np.array([wall.span[0] - _ROUNDED_M]), np.array([wall.radius])
+    heights = wall.span[0] + wall.length * _SHARES
+    return heights, wall.radii[0] + wall.slope * (heights - wall.span[0])
+
+
+def _crossed(sides: _Sides, origin: Array, out: Array) -> tuple[Array, Array]:
+    """How far rays (r, 3) go until they enter and leave each piece, (pieces, r); inf and -inf if they do not."""
+    rate = sides.planes[:, :3] @ out.T
+    room = (sides.planes[:, 3] - sides.planes[:, :3] @ origin)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = room / rate
+    flat = np.abs(rate) < 1e-12
+    outside = flat & (room < 0.0)
+    enter = np.where(rate < 0.0, at, -np.inf)
+    leave = np.where(rate > 0.0, at, np.inf)
+    enter = np.where(flat, np.where(outside, np.inf, 0.0), enter)
+    leave = np.where(flat, np.where(outside, -np.inf, np.inf), leave)
+    enter = np.maximum(np.maximum.reduceat(enter, sides.first), 0.0)
+    leave = np.minimum.reduceat(leave, sides.first)
+    gone = enter >= leave
+    return np.where(gone, np.inf, enter), np.where(gone, -np.inf, leave)
+
+
+def _fail(place: str, what: str) -> NoReturn:
+    raise InputError(f"{place}: {what}; state the face as the pieces are, or mend the pieces.")
+
+
+def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
+    """Raise an `InputError` unless every piece touches the others, over some of them."""
+    owner = list(range(len(pieces)))
+    low = np.array([piece.center - piece.half for piece in pieces]) - _IN_PLANE_M
+    high = np.array([piece.center + piece.half for piece in pieces]) + _IN_PLANE_M
+    for i in range(len(pieces)):
+        for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
+            a, b = _root(owner, i), _root(owner, int(k))
+            if a != b and _gap(pieces[i], pieces[int(k)]) < _IN_PLANE_M:
+                owner[a] = b
+    count = len({_root(owner, i) for i in range(len(pieces))})
+    if count > 1:
+        raise InputError(f"{path}: the pieces make {count} separate solids; a part is one rigid piece.")
+
+
+def _root(owner: list[int], i: int) -> int:
+    while owner[i] != i:
+        owner[i] = owner[owner[i]]
+        i = owner[i]
+    return i
+
+
+def _gap(a: Piece, b: Piece) -> float:
+    """How far two pieces are apart along the direction in which it is most, [m]; negative if they overlap."""
+    from apo_bench.geometry.convex import separating_axes, shadow
+
+    axes = separating_axes(a, np.eye(3), b, np.eye(3))
+    (at, reach), (on, room) = shadow(a, np.eye(3), axes), shadow(b, np.eye(3), axes)
+    return float((np.abs(at - on) - reach - room).max())
