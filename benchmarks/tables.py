@@ -51,7 +51,7 @@ def main() -> None:
         "",
         "`anisotropic` and `camera` are worse along a line of sight, `per-part` differs from part to part, "
         "`megapose-tless-inliers` and `megapose-lmo-inliers` were measured, level 1 as measured "
-        "([how](../guide/noise.md)); "
+        "([how](../guide/noise.md)), as the files of version 0.1.0 said it before turned estimates were left out; "
         "the others: [noise models](../reference/noise-models.md).",
         "",
         *crossed(

@@ -66,10 +66,11 @@ def ray_frames(t: Array) -> Array:
     return Rotation.from_rotvec(axis / sine * np.arctan2(sine, ray[:, 2:])).as_matrix()
 
 
-def results(path: Path, where: Array, R: Array, t: Array) -> Path:
+def results(path: Path, where: Array, R: Array, t: Array, score: Array | None = None) -> Path:
+    scores = np.full(len(where), 0.9) if score is None else score
     lines = [
-        f"{s},{i},{o},0.9,{' '.join(f'{x:.9g}' for x in M)},{' '.join(f'{x:.9g}' for x in v)},-1"
-        for (s, i, o), M, v in zip(where.tolist(), R.reshape(-1, 9).tolist(), t.tolist(), strict=True)
+        f"{s},{i},{o},{p:.9g},{' '.join(f'{x:.9g}' for x in M)},{' '.join(f'{x:.9g}' for x in v)},-1"
+        for (s, i, o), M, v, p in zip(where.tolist(), R.reshape(-1, 9).tolist(), t.tolist(), scores, strict=True)
     ]
     path.write_text("\n".join([HEADER, *lines]) + "\n", encoding="utf-8")
     return path

@@ -93,7 +93,7 @@ def fit(
     from apo_bench.observation.models.residuals import match_residuals
     from apo_bench.observation.noise_file import noise_text
     from apo_bench.show.fit_picture import draw_fit
-    from apo_bench.show.fit_text import fit_form, fit_lines
+    from apo_bench.show.fit_text import fit_form, fit_lines, fit_notes
 
     written = [(out, "--out", ".toml"), (residuals, "--residuals", ".csv"), (picture, "--picture", ".png")]
     for path, option, ending in written:
@@ -112,7 +112,9 @@ def fit(
         typer.echo("\n".join(fit_lines(found, measured, figures)))
     try:
         if out is not None:
-            out.write_text(noise_text(measured), encoding="utf-8")
+            command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
+            notes = _printable(command), *fit_notes(found, measured, figures)
+            out.write_text(noise_text(measured, notes), encoding="utf-8")
         if residuals is not None:
             residuals.write_text(residuals_text(found), encoding="utf-8")
         if picture is not None:

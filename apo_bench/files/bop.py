@@ -43,6 +43,8 @@ class PoseRows:
     """(n, 3), camera from model, axes of OpenCV."""
     place: tuple[str, ...] | NDArray[np.int64]
     """Where each row stands in the file: the line, or the entry of a JSON document."""
+    score: Array
+    """(n,), of the estimator; NaN where the file has none."""
 
     def said(self, row: int) -> str:
         """Where a row stands, for messages."""
@@ -51,26 +53,28 @@ class PoseRows:
 
 
 def read_results(path: str | Path) -> PoseRows:
-    """The rows of a results file; scores and times are checked and not kept.
+    """The rows of a results file; times are checked and not kept.
 
     Raises:
         InputError: Anything that is not as described, with the line where it stands.
     """
-    ids, numbers, lines = array("q"), array("d"), array("q")
+    ids, numbers, scores, lines = array("q"), array("d"), array("d"), array("q")
     for line, text in _lines(path):
         place = f"{path}, line {line}"
         if len(lines) == MOST_ROWS:
             raise InputError(f"{place}: a file of at most {MOST_ROWS} rows is needed; split it by scenes.")
-        scene, image, part, pose = _row(text, place)
+        scene, image, part, score, pose = _row(text, place)
         ids.extend((scene, image, part))
         numbers.extend(pose)
+        scores.append(score)
         lines.append(line)
     if not lines:
         raise InputError(f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 12)
     where = np.frombuffer(ids, dtype=np.int64).reshape(-1, 3)
     R, t = cells[:, :9].reshape(-1, 3, 3), cells[:, 9:]
-    return check_rows(PoseRows(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64)))
+    stated = np.frombuffer(scores, dtype=np.float64)
+    return check_rows(PoseRows(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64), stated))
 
 
 def check_rows(rows: PoseRows) -> PoseRows:
@@ -138,16 +142,16 @@ def _check_header(text: str, place: str) -> None:
     raise InputError(f"{place}: the columns are {text[:80]}; {_WANTED}.")
 
 
-def _row(text: str, place: str) -> tuple[int, int, int, list[float]]:
-    """Scene, image, object and the twelve numbers of R and t."""
+def _row(text: str, place: str) -> tuple[int, int, int, float, list[float]]:
+    """Scene, image, object, score and the twelve numbers of R and t."""
     cells = text.split(",")
     if len(cells) != len(_COLUMNS):
         raise InputError(f"{place}: {len(_COLUMNS)} cells are needed, one for each column, {len(cells)} were given.")
     scene, image, part = (_id(cell.strip(), place, name) for cell, name in zip(cells, _COLUMNS[:3], strict=False))
-    _numbers(cells[3], 1, f"{place}, score")
+    (score,) = _numbers(cells[3], 1, f"{place}, score")
     pose = _numbers(cells[4], 9, f"{place}, R") + _numbers(cells[5], 3, f"{place}, t")
     _numbers(cells[6], 1, f"{place}, time")
-    return scene, image, part, pose
+    return scene, image, part, score, pose
 
 
 def _id(text: str, place: str, name: str) -> int:

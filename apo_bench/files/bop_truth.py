@@ -60,7 +60,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
 def _only(rows: PoseRows, kept: Any) -> PoseRows:
     """The rows of a mask."""
     place = rows.place[kept] if isinstance(rows.place, np.ndarray) else tuple(np.array(rows.place)[kept].tolist())
-    return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], place)
+    return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], place, rows.score[kept])
 
 
 def _among(where: Any, known: Any) -> Any:
@@ -88,7 +88,8 @@ def _read_scene(path: Path, scene: int) -> PoseRows:
     if not rows:
         raise InputError(f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
     where, R, t, place = zip(*rows, strict=True)
-    return check_rows(PoseRows(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), place))
+    score = np.full(len(rows), np.nan)
+    return check_rows(PoseRows(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), place, score))
 
 
 def _entries(root: JsonNode, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:

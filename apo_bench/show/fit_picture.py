@@ -22,12 +22,12 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    inlier, upright = residuals.inlier, residuals.upright
+    upright, known = residuals.upright, residuals.turn_known
     shift, turn = measured.shift_mm, measured.turn_deg
     columns = (
-        ("across the ray [mm]", residuals.across_mm[inlier], shift.cdf_across, shift.limit),
-        ("along the ray, size [mm]", residuals.along_mm[inlier], shift.cdf_along, shift.limit),
-        ("turn [deg]", residuals.angle_deg[upright], turn.cdf_length, turn.limit),
+        ("across the ray [mm]", residuals.across_mm[upright], shift.cdf_across, shift.limit),
+        ("along the ray, size [mm]", residuals.along_mm[upright], shift.cdf_along, shift.limit),
+        ("turn [deg]", residuals.angle_deg[known], turn.cdf_length, turn.limit),
     )
     figure = Figure(figsize=(11.0, 6.6), layout="constrained")
     FigureCanvasAgg(figure)
@@ -41,7 +41,9 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     axes[1, 0].set_ylabel("seen")
     axes[0, 0].legend(frameon=False)
     rates = f"{100 * measured.outliers:.1f} % outliers, {100 * measured.missed:.1f} % missed"
-    figure.suptitle(f"{_short(measured.source)}\n{int(inlier.sum())} inliers; {rates}", fontsize=11)
+    figure.suptitle(
+        f"{_short(measured.source)}\n{int(upright.sum())} inliers that are not turned; {rates}", fontsize=11
+    )
     figure.savefig(path, dpi=120)
 
 

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.fitting.fit import PERCENTILES, Figures
+from apo_bench.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
 from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.tails import Split
 
-_SCHEMA = "apo-bench/noise-fit/1"
+_SCHEMA = "apo-bench/noise-fit/2"
+_RARE = 0.01
 
 
 def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> dict[str, Any]:
@@ -29,10 +30,14 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
         "found": int(residuals.found.sum()),
         "missed_rate": measured.missed,
         "left_over": residuals.surplus,
+        "of_absent_objects": residuals.absent,
         "inliers": int(inlier.sum()),
         "outlier_rate": measured.outliers,
         "outlier_farthest_mm": measured.farthest_mm,
+        "outliers_by_score": [band._asdict() for band in outliers_by_score(residuals)],
         "turned": int(inlier.sum() - residuals.upright.sum()),
+        "turned_and_off": _turned_and_off(residuals, measured),
+        "round_objects": list(residuals.round_objects),
         "bias_mm": mean.tolist(),
         "bias_standard_error_mm": error.tolist(),
         "along_over_across": _ratio(residuals),
@@ -47,6 +52,7 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
                 "observed": f.observed.tolist(),
                 "fitted": f.fitted.tolist(),
                 "kolmogorov_smirnov": f.distance,
+                "kolmogorov_smirnov_by_chance": f.by_chance,
             }
             for f in figures
         },
@@ -58,26 +64,22 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
 def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> list[str]:
     """A fit in words, line by line."""
     n, found, inlier = len(residuals.where), int(residuals.found.sum()), int(residuals.inlier.sum())
-    turned, (mean, error) = inlier - int(residuals.upright.sum()), _bias(residuals)
+    mean, error = _bias(residuals)
     turns = _percentiles(residuals.angle_deg[residuals.inlier])[:2]
     by_trace = _percentiles(residuals.trace_deg[residuals.inlier])[:2]
     images = len(np.unique(residuals.where[:, :2], axis=0))
     facts = [
         ("source", measured.source),
         ("parts", f"{n} in {images} images, {residuals.distance_mm:.0f} mm away in the median"),
-        (
-            "found",
-            f"{found}; {n - found} missed ({100 * measured.missed:.1f} %); {residuals.surplus} estimates left over",
-        ),
+        ("found", f"{found}; {n - found} missed ({100 * measured.missed:.1f} %); {_left_over(residuals)}"),
         (
             "inliers",
             f"{inlier} off by less than {INLIER_MM:g} mm; {found - inlier} outliers "
             f"({100 * measured.outliers:.1f} % of those found)",
         ),
-        (
-            "turned",
-            f"{turned} inliers by more than {TURNED_DEG:g} deg, not told from parts that look alike when turned",
-        ),
+        *_score_fact(residuals),
+        ("turned", _turned(residuals, measured)),
+        *_round_fact(residuals),
         (
             "bias",
             ", ".join(f"{a} {m:.2f} ± {e:.2f}" for a, m, e in zip(("x", "y", "along"), mean, error, strict=True))
@@ -89,25 +91,86 @@ def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
             f"p25 {turns[0]:.2f}, p50 {turns[1]:.2f} deg of all inliers; "
             f"{by_trace[0]:.2f} and {by_trace[1]:.2f} by the traces of the matrices as written",
         ),
-        *_tail_facts("shift", ("across the ray", "along the ray"), measured.shift_mm, "mm"),
-        *_tail_facts("turn", ("across the ray", "about the ray"), measured.turn_deg, "deg"),
+        *_tail_facts("shift", ("across the ray", "along the ray"), measured.shift_mm, "mm", figures[:2]),
+        *_tail_facts("turn", ("across the ray", "about the ray"), measured.turn_deg, "deg", figures[2:]),
     ]
     width = max(len(name) for name, _ in facts)
     lines = [f"{name:{width}}  {text}" for name, text in facts]
-    lines += ["", " " * 27 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES) + "  Kolmogorov-Smirnov"]
+    lines += ["", " " * 33 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES)]
     for f in figures:
-        for word, values, more in (
-            ("seen", f.observed, ""),
-            ("fitted", f.fitted, f"{f.distance:20.3f}"),
-        ):
+        for word, values in (("seen", f.observed), ("fitted", f.fitted)):
             name = f"{f.name} [{f.unit}]" if word == "seen" else ""
-            lines.append(f"{name:20}{word:7}" + "".join(f"{v:8.2f}" for v in values) + more)
+            lines.append(f"{name:26}{word:7}" + "".join(f"{v:8.2f}" for v in values))
     return lines
 
 
+def fit_notes(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> tuple[str, ...]:
+    """What a reader of the noise file should know of the fit, one line each."""
+    upright, known = int(residuals.upright.sum()), int(residuals.turn_known.sum())
+    return (
+        f"Level 1 is as measured, {residuals.distance_mm / 1e3:.2f} m from the camera in the median: mm and degrees, "
+        "Student t, none beyond the limit.",
+        f"Shifts are of {upright} inliers turned by less than {TURNED_DEG:g} deg, turns of {known} of them.",
+        f"Symmetries are not known: {_turned(residuals, measured)}.",
+        *(f"{text[0].upper()}{text[1:]}." for _, text in _round_fact(residuals)),
+        *(f"{f.name[0].upper()}{f.name[1:]}: {_goodness(f)}." for f in figures),
+        *(f"Outliers by score: {text}." for _, text in _score_fact(residuals)),
+        f"Not drawn: {_left_over(residuals)}.",
+    )
+
+
+def _turned(residuals: Residuals, measured: MeasuredNoise) -> str:
+    """What is known of inliers that are turned."""
+    turned = int(residuals.inlier.sum() - residuals.upright.sum())
+    return (
+        f"{turned} inliers turned by more than {TURNED_DEG:g} deg are right if they look alike so, else wrong, and are "
+        f"not fitted; {_turned_and_off(residuals, measured)} of them are farther off across the ray than "
+        f"{100 * (1 - _RARE):g} % of the others"
+    )
+
+
+def _left_over(residuals: Residuals) -> str:
+    images = len(np.unique(residuals.where[:, :2], axis=0))
+    return (
+        f"{residuals.surplus} estimates left over, {residuals.surplus / images:.2g} per image, {residuals.absent} of "
+        "objects that are not in it"
+    )
+
+
+def _turned_and_off(residuals: Residuals, measured: MeasuredNoise) -> int:
+    """How many turned inliers are off across the ray by more than `_RARE` of what was fitted to the others."""
+    turned = residuals.inlier & ~residuals.upright
+    return int((measured.shift_mm.cdf_across(residuals.across_mm[turned]) > 1.0 - _RARE).sum())
+
+
+def _score_fact(residuals: Residuals) -> list[tuple[str, str]]:
+    """A line on how outliers depend on the score, if there are scores."""
+    bands = outliers_by_score(residuals)
+    said = ", ".join(f"{100 * band.outliers:.0f} % from {band.least:.7g}" for band in bands[1:])
+    return [("by score", f"{100 * bands[0].outliers:.0f} % of the lowest fifth, {said}, a fifth each")] if bands else []
+
+
+def _round_fact(residuals: Residuals) -> list[tuple[str, str]]:
+    """A line on objects whose turn is not known."""
+    named = ", ".join(map(str, residuals.round_objects))
+    said = (
+        f"objects {named} look alike turned by any angle about an axis, as estimates tell; their turns are not fitted"
+    )
+    return [("round", said)] if named else []
+
+
+def _goodness(f: Figures) -> str:
+    """How well one distribution fits."""
+    p95 = PERCENTILES.index(95)
+    return (
+        f"p95 {f.fitted[p95]:.3g}, seen {f.observed[p95]:.3g} {f.unit}; Kolmogorov-Smirnov {f.distance:.3f}, "
+        f"by chance below {f.by_chance:.3f}"
+    )
+
+
 def _bias(residuals: Residuals) -> tuple[Array, Array]:
-    """Mean and its standard error of the shifts of inliers, (3,) each, mm in the frame of the ray."""
-    shift = residuals.shift_mm[residuals.inlier]
+    """Mean and its standard error of the shifts that are fitted, (3,) each, mm in the frame of the ray."""
+    shift = residuals.shift_mm[residuals.upright]
     return shift.mean(axis=0), shift.std(axis=0) / np.sqrt(len(shift))
 
 
@@ -129,11 +192,14 @@ def _split_form(split: Split) -> dict[str, Any]:
     }
 
 
-def _tail_facts(name: str, directions: tuple[str, str], split: Split, unit: str) -> list[tuple[str, str]]:
-    """One line for each direction: the tail, and the standard deviation that follows within the limit."""
+def _tail_facts(
+    name: str, directions: tuple[str, str], split: Split, unit: str, figures: Sequence[Figures]
+) -> list[tuple[str, str]]:
+    """One line for each direction: the tail, the standard deviation within the limit, and how well it fits."""
     facts = []
-    for direction, tail, variance in zip(directions, (split.across, split.along), split.variances, strict=True):
+    each = zip(directions, (split.across, split.along), split.variances, figures, strict=True)
+    for direction, tail, variance, f in each:
         shape = f"Student t with {tail.freedom:.3g} degrees of freedom" if np.isfinite(tail.freedom) else "Gaussian"
         text = f"{direction}: scale {tail.scale:.3g} {unit}, {shape}; deviation {np.sqrt(variance):.3g} {unit} below "
-        facts.append((name, text + f"{split.limit:g} {unit}"))
+        facts.append((name, text + f"{split.limit:g} {unit}; {_goodness(f)}"))
     return facts

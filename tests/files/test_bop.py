@@ -46,6 +46,7 @@ def test_rows_are_read_in_mm_model_to_camera(tmp_path: Path) -> None:
     assert_array_equal(read.where, [[1, 7, 3], [2, 8, 4]])
     assert_array_equal(read.t_mm, [[10, 20, 900], [-1.5, 200, 1000]])
     assert_array_equal(read.R[1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    assert_array_equal(read.score, [0.5, 1e-3])
     assert read.said(1) == f"{path}, line 4"
 
 
@@ -114,6 +115,18 @@ def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
     truth = read_results(made_of.results(tmp_path / "t.csv", where[:2], R[:2], at))
     assert_array_equal(residuals.match_rows(estimates, truth), [2, 0])
     assert match_residuals(estimates, truth).surplus == 1
+
+
+def test_false_detections_are_counted(tmp_path: Path, made: Made) -> None:
+    """Of what is there, of what is not in its image, and of images that nobody gave the truth of."""
+    where, R, t = made.where, made.R, made.t
+    more = np.concatenate([where, where[:2], np.add(where[:3], [0, 0, 50]), np.add(where[:4], [0, 1000, 0])])
+    rows = np.concatenate([np.arange(len(where)), np.arange(2), np.arange(3), np.arange(4)])
+    seen = read_results(
+        made_of.results(tmp_path / "e.csv", more, R[rows], t[rows] + 1e-3 * np.arange(len(rows))[:, None])
+    )
+    found = match_residuals(seen, read_results(made_of.results(tmp_path / "t.csv", where, R, t)))
+    assert (found.surplus, found.absent) == (9, 3)
 
 
 def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path: Path) -> None:

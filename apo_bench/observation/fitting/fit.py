@@ -15,6 +15,9 @@ from apo_bench.observation.models.tails import Split, log_density_across, log_de
 
 _FEWEST = 30
 """Four numbers are not fitted to fewer errors."""
+_CHANCE = 1.358
+"""95 % quantile of Kolmogorov's distribution."""
+_BANDS = 5
 PERCENTILES = (25, 50, 75, 90, 95)
 
 
@@ -27,10 +30,21 @@ class Figures(NamedTuple):
     fitted: Array
     distance: float
     """Kolmogorov and Smirnov's distance: the largest difference of the two cumulative distributions."""
+    by_chance: float
+    """What it is not above in 95 % of cases, if errors are independent and distributed like that."""
+
+
+class Band(NamedTuple):
+    """Estimates of similar scores."""
+
+    least: float
+    """Score."""
+    outliers: float
+    """Part of them."""
 
 
 def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
-    """The noise that makes the residuals most likely.
+    """The noise that makes the residuals most likely: shifts of upright inliers, turns of those whose turn is known.
 
     Errors are taken about the truth, not about their mean: a bias of the estimator is part of their size, and the noise
     that is drawn has none.
@@ -38,8 +52,9 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
     Raises:
         InputError: Too few inliers, or they are all exactly right.
     """
-    found, inlier, upright = residuals.found, residuals.inlier, residuals.upright
-    for kept, limit in ((inlier, f"{INLIER_MM:g} mm"), (upright, f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg")):
+    found, inlier, upright, known = residuals.found, residuals.inlier, residuals.upright, residuals.turn_known
+    near = f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg"
+    for kept, limit in ((upright, near), (known, f"{near} and do not look alike when turned by any angle")):
         if kept.sum() < _FEWEST:
             raise InputError(
                 f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {_FEWEST} are "
@@ -48,8 +63,8 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
     far = residuals.off_mm[found & ~inlier]
     return MeasuredNoise(
         source=source,
-        shift_mm=fit_split(residuals.shift_mm[inlier], INLIER_MM, "places"),
-        turn_deg=fit_split(residuals.turn_deg[upright], TURNED_DEG, "rotations"),
+        shift_mm=fit_split(residuals.shift_mm[upright], INLIER_MM, "places"),
+        turn_deg=fit_split(residuals.turn_deg[known], TURNED_DEG, "rotations"),
         missed=float(1.0 - found.mean()),
         outliers=float(1.0 - inlier.sum() / found.sum()),
         farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
@@ -87,14 +102,30 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
     return of_numbers(best.x, limit)
 
 
+def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
+    """Outlier rates of `_BANDS` as large parts of what was found, the lowest scores first; none without scores."""
+    found = residuals.found & np.isfinite(residuals.score)
+    order = np.argsort(residuals.score[found], kind="stable")
+    if len(order) < _BANDS * _FEWEST:
+        return ()
+    score, inlier = residuals.score[found][order], residuals.inlier[found][order]
+    each = [
+        Band(float(s[0]), 1.0 - float(i.mean()))
+        for s, i in zip(*(np.array_split(x, _BANDS) for x in (score, inlier)), strict=True)
+    ]
+    return tuple(each) if len({band.least for band in each}) == _BANDS else ()
+
+
 def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
-    """Goodness of fit: across and along the ray of inliers, and angles of those that are not turned."""
-    inlier, upright = residuals.inlier, residuals.upright
-    shift, turn = measured.shift_mm, measured.turn_deg
+    """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
+    upright, known = residuals.upright, residuals.turn_known
+    shift, turn, turned = measured.shift_mm, measured.turn_deg, residuals.turn_deg[known]
+    tilt, about = np.linalg.norm(turned[:, :2], axis=1), np.abs(turned[:, 2])
     return (
-        _figures("across the ray", "mm", residuals.across_mm[inlier], shift.cdf_across, shift.limit),
-        _figures("along the ray", "mm", residuals.along_mm[inlier], shift.cdf_along, shift.limit),
-        _figures("turn", "deg", residuals.angle_deg[upright], turn.cdf_length, turn.limit),
+        _figures("across the ray", "mm", residuals.across_mm[upright], shift.cdf_across, shift.limit),
+        _figures("along the ray", "mm", residuals.along_mm[upright], shift.cdf_along, shift.limit),
+        _figures("tilt", "deg", tilt, turn.cdf_across, turn.limit),
+        _figures("turn about the ray", "deg", about, turn.cdf_along, turn.limit),
     )
 
 
@@ -110,4 +141,5 @@ def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], 
         observed=np.percentile(sizes, PERCENTILES),
         fitted=np.interp(np.array(PERCENTILES) / 100.0, chance, grid),
         distance=float(max((step[1:] - at).max(), (at - step[:-1]).max())),
+        by_chance=_CHANCE / float(np.sqrt(n)),
     )

@@ -1,4 +1,4 @@
-"""Tails from published quantiles, where the estimates themselves are not at hand."""
+"""Tails from published quantiles, where the estimates themselves are not published."""
 
 from __future__ import annotations
 

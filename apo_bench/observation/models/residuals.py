@@ -20,6 +20,9 @@ INLIER_MM = 50.0
 TURNED_DEG = 30.0
 """An estimate that is turned more than this is of a part that looks alike when turned, or was taken the wrong way
 round; which of the two cannot be told without the symmetries of the models."""
+_GAP_DEG, _IN_GAP = 55.0, 1.0 / 30.0
+"""Where a part looks alike only when turned by 60 degrees or more, few turns are between `TURNED_DEG` and this: less
+than this part of all, where 14 % are if any turn about an axis is as likely."""
 MOST_PAIRS = 10_000_000
 _MOST_IN_ONE_IMAGE = "at most 3000 estimates of one object in one image can be matched; leave out those of low score"
 
@@ -37,8 +40,12 @@ class Residuals:
     """(n, 3), rotation vector from the true to the estimated rotation: about x, about y, about the ray."""
     trace_deg: Array
     """(n,), the angle that the trace of the two matrices says as they are written."""
+    score: Array
+    """(n,), of the estimate."""
     surplus: int = 0
     """Estimates that were left when every part had one."""
+    absent: int = 0
+    """Those of them whose object is not in the image at all."""
     distance_mm: float = float("nan")
     """Median distance from the camera."""
 
@@ -52,8 +59,26 @@ class Residuals:
 
     @cached_property
     def upright(self) -> NDArray[np.bool_]:
-        """Inliers that are not turned."""
+        """Inliers that are not turned: all whose shift is known. A part may look alike when turned about an axis beside
+        its origin, so that even the shift of one that is turned says nothing."""
         return self.inlier & (np.nan_to_num(self.angle_deg, nan=np.inf) < TURNED_DEG)
+
+    @cached_property
+    def round_objects(self) -> tuple[int, ...]:
+        """Objects that look alike turned by any angle about an axis, as far as estimates tell: fewer than half of the
+        inliers are upright, and turns are everywhere."""
+        found = list[int]()
+        for part in np.unique(self.where[self.inlier, 2]).tolist():
+            angle = self.angle_deg[self.inlier & (self.where[:, 2] == part)]
+            between = (angle >= TURNED_DEG) & (angle < _GAP_DEG)
+            if np.mean(angle < TURNED_DEG) < 0.5 and between.mean() > _IN_GAP:
+                found.append(part)
+        return tuple(found)
+
+    @cached_property
+    def turn_known(self) -> NDArray[np.bool_]:
+        """Upright ones of objects that are not round."""
+        return self.upright & ~np.isin(self.where[:, 2], self.round_objects)
 
     @cached_property
     def off_mm(self) -> Array:
@@ -100,9 +125,24 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
         shift_mm=shift,
         turn_deg=turned,
         trace_deg=trace,
+        score=np.where(found, estimates.score[partner], np.nan),
         surplus=asked - int(found.sum()),
+        absent=_absent(estimates.where, truth.where, scene),
         distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
     )
+
+
+def _absent(estimates: Any, truth: Any, scene: int | None) -> int:
+    """How many estimates are of objects that are not in their image; those of images without truth do not count."""
+    asked = estimates if scene is None else estimates[estimates[:, 0] == scene]
+    return int(np.sum(_among(asked[:, :2], truth[:, :2]) & ~_among(asked, truth)))
+
+
+def _among(rows: Any, known: Any) -> NDArray[np.bool_]:
+    """Whether each row stands among those that are known, (n,)."""
+    _, key = np.unique(np.concatenate([known, rows]), axis=0, return_inverse=True)
+    key = key.reshape(-1)
+    return np.isin(key[len(known) :], key[: len(known)])
 
 
 def _nearest(R: Array) -> Array:
