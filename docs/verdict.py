@@ -18,6 +18,7 @@ from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
+from tests import audited_rounds as rounds
 from tests import audited_states as audited
 from tests.end_states import reached, verdict
 from tests.judging import test_verdict as first
@@ -44,6 +45,10 @@ GROUPS = {
     "On the way": audited.ON_THE_WAY,
     "At the thresholds": audited.MARGINS,
     "Fixtures": audited.FIXTURES,
+    "Pegs that stand in holes": rounds.PEGS,
+    "Shafts that lie, and shafts through two parts": rounds.SHAFTS,
+    "Cones": rounds.CONES,
+    "Tilted faces": rounds.TILTED,
 }
 
 FLIPS = """
@@ -60,9 +65,9 @@ about its centres.
 AUDIT = """
 ## The audit
 
-{n} states more, of all examples of the paper, were written down with the verdict of a person who sees how they ended,
-before the judge was asked. In {same} the judge says the same. In the other {apart} the rule says otherwise; the rule
-stays, and these are the reasons:
+{n} states more, of all examples of the paper and of parts with round and tilted faces, were written down with the
+verdict of a person who sees how they ended, before the judge was asked. In {same} the judge says the same. In the other
+{apart} the rule says otherwise; the rule stays, and these are the reasons:
 
 | state | person | `success` | what in the rule |
 |---|---|---|---|
@@ -70,9 +75,9 @@ stays, and these are the reasons:
 
 
 def main() -> None:
-    states = {seen.what: seen for seen in audited.STATES}
+    states = {seen.what: seen for seen in (*audited.STATES, *rounds.STATES)}
     cases = [*first.RIGHT, *first.NEARLY, *first.WRONG]
-    apart = audited.DIFFERS
+    apart = {**audited.DIFFERS, **rounds.DIFFERS}
     lines = [BEGIN, FLIPS.format(n=len(cases), flipped=len(first.FLIPPED)).rstrip("\n")]
     lines += [f"| {what} | {reason} |" for what, reason in first.FLIPPED.items()]
     lines += [AUDIT.format(n=len(states), same=len(states) - len(apart), apart=len(apart)).rstrip("\n")]

@@ -65,9 +65,9 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     T_on_face = pose.inverse(T_on) @ T_face
     if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
         return NOTHING
-    frame = _plane_frame(on)
-    lower = _polygon(on, pose.inverse(frame))
-    upper = _polygon(face, pose.inverse(frame) @ T_on_face)
+    frame = plane_frame(on)
+    lower = face_shape(on, pose.inverse(frame))
+    upper = face_shape(face, pose.inverse(frame) @ T_on_face)
     common = upper.intersection(lower)
     pieces = [piece for piece in _pieces(common) if piece.area > SLIVER_M2]
     if not pieces:
@@ -79,11 +79,11 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
 
 def face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
-    return float(_polygon(face, pose.inverse(_plane_frame(face))).area)
+    return float(face_shape(face, pose.inverse(plane_frame(face))).area)
 
 
 @lru_cache(maxsize=4096)
-def _plane_frame(face: Face) -> Array:
+def plane_frame(face: Face) -> Array:
     """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
     edges = np.roll(face.outline, -1, axis=0) - face.outline
     longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]
@@ -94,8 +94,8 @@ def _plane_frame(face: Face) -> Array:
     return frame
 
 
-def _polygon(face: Face, T: Array) -> Any:
-    """The face in the plane z = 0 after `T`: heights are dropped, which is the projection along z."""
+def face_shape(face: Face, T: Array) -> Any:
+    """The face, as a shapely polygon, in the plane z = 0 after `T`: heights are dropped, a projection along z."""
     from shapely import Polygon
 
     return Polygon(pose.apply(T, face.outline)[:, :2], [pose.apply(T, hole)[:, :2] for hole in face.holes])

@@ -9,12 +9,21 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play
 from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry.mate import Mate, mate
 from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.records.thresholds import Thresholds
 
 Moment = Literal["made", "end"]
+_OFF: dict[ContactKind, str] = {
+    "plane on plane": "off by {:.2f} mm",
+    "shaft in hole": "{:.2f} mm off the axis",
+    "shaft on plane": "off by {:.2f} mm",
+    "cone in cone": "{:.2f} mm off its seat",
+    "cone on rim": "{:.2f} mm off its seat",
+}
 _Share = Callable[[Overlap, Overlap], float]
 """How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
 
@@ -28,11 +37,12 @@ class ContactVerdict(NamedTuple):
     moment: Moment
     """`made`: when its operation was over; `end`: at the end, if nothing moved the parts away from each other."""
     gap_mm: float | None
-    """Largest |e|: distance of a corner of the overlap to the plane of the other face; None without any overlap."""
+    """Largest |e|: distance of a corner of the overlap to the plane of the other face; of round faces that of the
+    axes, at the ends of their common length (`Mate.gap_m`); None without any overlap."""
     angle_deg: float
-    """Between the normals of the faces; 0 if they look straight at each other."""
+    """Between the normals of the faces, or between the axes; 0 if they look straight at each other."""
     overlap: float
-    """How much of the true overlap is covered."""
+    """How much of the true overlap, or of the true common length, is covered."""
     touching: bool
     """Strict in gap, loose in angle; faces that look at each other but do not overlap leave this open, as true."""
     covering: bool
@@ -40,6 +50,7 @@ class ContactVerdict(NamedTuple):
     loose: bool
     allowed_mm: float
     """The largest gap that counts as touching."""
+    kind: ContactKind = "plane on plane"
 
     @property
     def strict(self) -> bool:
@@ -62,8 +73,7 @@ class ContactJudge(NamedTuple):
             poses: Where the parts are, world frame, [m].
             true: The overlap of the two faces at the true goals.
         """
-        asked, fits = self.thresholds, self.assembly.is_fit(contact)
-        allowed = self.clearance_mm + asked.fit_margin_mm if fits else asked.support_mm
+        asked, allowed = self.thresholds, self._allowed_mm(contact)
         gap, angle, found = _measured(self.assembly, contact, poses)
         covered = share(found, true)
         covering = gap is not None and covered >= asked.overlap_fraction
@@ -71,8 +81,31 @@ class ContactJudge(NamedTuple):
         touching = near and (gap is None or gap <= allowed)
         loose = near and covering
         return ContactVerdict(
-            contact, operation, moment, gap, angle, covered, touching, covering, loose, allowed_mm=allowed
+            contact,
+            operation,
+            moment,
+            gap,
+            angle,
+            covered,
+            touching,
+            covering,
+            loose,
+            allowed_mm=allowed,
+            kind=self._kind(contact),
         )
+
+    def _allowed_mm(self, contact: Contact) -> float:
+        """The play of a fit and a margin, or the margin of faces that should touch."""
+        asked, fits = self.thresholds, self.assembly.is_fit(contact)
+        if self._kind(contact) == "shaft in hole":
+            play = 1e3 * geometric_play(*(self.assembly.face_of(of) for of in contact))
+            return play + self.clearance_mm * fits + asked.fit_margin_mm
+        return self.clearance_mm + asked.fit_margin_mm if fits else asked.support_mm
+
+    def _kind(self, contact: Contact) -> ContactKind:
+        kind = contact_kind(*(self.assembly.face_of(of) for of in contact))
+        assert kind is not None
+        return kind
 
 
 def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:
@@ -83,19 +116,20 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
         if worst.gap_mm is None or worst.angle_deg > thresholds.loose_angle_deg:
             how = f"turned by {worst.angle_deg:.1f} deg, where {thresholds.loose_angle_deg:g} deg are allowed"
         else:
-            how = f"off by {worst.gap_mm:.2f} mm, where {worst.allowed_mm:g} mm are allowed"
+            how = f"{_OFF[worst.kind].format(worst.gap_mm)}, where {worst.allowed_mm:g} mm are allowed"
         yield "gap", f"{worst.contact} is {how}{_when(worst)}"
     bare = [c for c in contacts if not c.covering]
     if bare:
         worst = min(bare, key=lambda c: c.overlap)
-        how = (
-            f"{100 * worst.overlap:.0f} % of the true overlap, where {100 * thresholds.overlap_fraction:g} % are asked"
-        )
+        true = "length" if worst.kind in ("shaft in hole", "cone in cone", "shaft on plane") else "overlap"
+        how = f"{100 * worst.overlap:.0f} % of the true {true}, where {100 * thresholds.overlap_fraction:g} % are asked"
         yield "overlap", f"{worst.contact} covers {how}{_when(worst)}"
 
 
 def face_overlap(assembly: Assembly, contact: Contact, poses: Poses) -> Overlap:
     """The overlap of the two faces of a contact; nothing, if they do not look at each other."""
+    if assembly.is_round(contact):
+        return _mate(assembly, contact, poses).common
     m, e = contact
     at = (np.ascontiguousarray(poses[end.part], dtype=np.float64).tobytes() for end in contact)
     return _overlap(assembly.face(m), assembly.face(e), *at)
@@ -108,12 +142,21 @@ def _overlap(m: Face, e: Face, at_m: bytes, at_e: bytes) -> Overlap:
     return overlap(m, T_m, e, T_e)
 
 
+def _mate(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
+    m, e = contact
+    return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+
+
 def _when(found: ContactVerdict) -> str:
     return f" after operation {found.operation + 1}" if found.moment == "made" else ""
 
 
 def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float | None, float, Overlap]:
-    """Largest |e| [mm], angle between the normals [degrees], and the overlap."""
+    """Largest |e| [mm], angle between the normals or axes [degrees], and the overlap."""
+    if assembly.is_round(contact):
+        between = _mate(assembly, contact, poses)
+        gap = 1e3 * between.gap_m if between.common else None
+        return gap, float(np.degrees(between.angle_rad)), between.common
     plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
     found = face_overlap(assembly, contact, poses)
     T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]

@@ -13,6 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.overlap import Overlap
+from apo_bench.geometry.revolution import revolution, turned_alike
 from apo_bench.geometry.solid import Solid
 from apo_bench.geometry.symmetry import nearest_symmetry, symmetries
 from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
@@ -86,6 +87,8 @@ def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Arra
     """The pose at which the part looks as it does, turned from the true one the least."""
     if part in assembly.fixed:
         return T
+    if revolution(assembly.solids[part]) is not None:
+        return turned_alike(assembly.solids[part], T, true)
     return np.asarray(T @ nearest_symmetry(symmetries(assembly.solids[part]), (pose.inverse(true) @ T)[None])[0])
 
 
@@ -101,12 +104,16 @@ def _last_moves(assembly: Assembly) -> dict[str, int]:
 def _displacements(
     assembly: Assembly, after: tuple[Snapshot | None, ...], final: Snapshot, away: frozenset[str]
 ) -> Iterator[tuple[str, float]]:
-    """How far a corner of each part lies at most from where it was after the part's last operation, [m]."""
+    """How far a corner of each part lies at most from where it was after the part's last operation, [m].
+
+    A part of revolution may have turned about its axis.
+    """
     for part, k in _last_moves(assembly).items():
         put = after[k]
         if put is not None and part not in away:
             corners = _corners(assembly.solids[part])
-            moved = pose.apply(final.poses[part], corners) - pose.apply(put.poses[part], corners)
+            T = turned_alike(assembly.solids[part], final.poses[part], put.poses[part])
+            moved = pose.apply(T, corners) - pose.apply(put.poses[part], corners)
             yield part, float(np.linalg.norm(moved, axis=1).max())
 
 

@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Layout, Poses
+from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.order import check_order
@@ -24,9 +26,15 @@ from apo_bench.scenario.starts import in_the_air
 _GAP_M = 1e-6
 """Faces that are said to touch are nearer than this."""
 _ANGLE_DEG = 0.01
-"""Normals of faces that are said to touch are opposite within this."""
+"""Normals of faces that are said to touch are opposite within this, and axes parallel."""
+_NO_PLAY_MM = 1e-6
+"""A shaft with less play is as thick as its hole."""
 _INTRUSION_M = 1e-6
 """Parts that only touch are less deep in each other."""
+
+
+_Pair = tuple[str, str, bytes]
+"""Two parts, and where the second one is to the first."""
 
 
 class Case(NamedTuple):
@@ -47,6 +55,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     Raises:
         InputError: The first thing found wrong.
     """
+    apart: set[_Pair] = set()
     for case in _cases(scenario):
         stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.goals))
         if not case.key:
@@ -54,7 +63,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         _check_starts(scenario, file, case)
         _check_turns(scenario, file, case, stages)
         _check_contacts(scenario, file, case, stages)
-        _check_intrusions(scenario, file, case, stages)
+        _check_intrusions(scenario, file, case, stages, apart)
 
 
 def _cases(scenario: Scenario) -> Iterator[Case]:
@@ -114,6 +123,10 @@ def _stays(scenario: Scenario, contact: Contact) -> bool:
 
 
 def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:
+    if scenario.assembly.is_round(contact):
+        _check_play(scenario, file, case, key, contact)
+        _check_round(scenario, file, case, key, contact, poses)
+        return
     face, on = scenario.assembly.face(contact.manipulated), scenario.assembly.face(contact.environment)
     T_face, T_on = poses[contact.manipulated.part], poses[contact.environment.part]
     n_face, n_on = T_face[:3, :3] @ face.normal, T_on[:3, :3] @ on.normal
@@ -134,24 +147,74 @@ def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact:
         raise _refuse(file, case, key, sentence, remedy)
 
 
-def _check_intrusions(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...]) -> None:
+def _check_play(scenario: Scenario, file: str, case: Case, key: str, contact: Contact) -> None:
+    """A shaft goes into a hole only if that is wider, by its size or by the clearance."""
+    a, b = (scenario.assembly.face_of(of) for of in contact)
+    if contact_kind(a, b) != "shaft in hole":
+        return
+    of_sizes = 1e3 * geometric_play(a, b)
+    clearance = scenario.clearance_mm if scenario.assembly.is_fit(contact) else 0.0
+    if of_sizes + clearance <= _NO_PLAY_MM:
+        why = f"{of_sizes:.4g} mm per side by their sizes"
+        why += f" and {clearance:g} mm of clearance" if scenario.assembly.is_fit(contact) else ", and neither is fit"
+        sentence = f"'{contact}': the shaft has no play in the hole, {why}"
+        raise _refuse(file, case, key, sentence, "make the hole wider, or mark it as fit and give a clearance")
+
+
+def _check_round(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:
+    (m, e), face_of = contact, scenario.assembly.face_of
+    kind, found = contact_kind(face_of(m), face_of(e)), mate(face_of(m), poses[m.part], face_of(e), poses[e.part])
+    angle = float(np.degrees(found.angle_rad))
+    if angle > _ANGLE_DEG and kind != "cone on rim":
+        what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"
+        raise _refuse(file, case, key, f"'{contact}': {what} by {angle:.4g} degrees", "0 are needed: turn the part")
+    if found.gap_m > _GAP_M:
+        remedy = "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet"
+        raise _refuse(file, case, key, f"'{contact}': {_apart(kind, 1e3 * found.gap_m)}", remedy)
+    if not found.common:
+        sentence = f"'{contact}': the faces have no length in common"
+        remedy = "vary by less" if "vary" in case.key else "move a goal until they do, or take the contact out"
+        raise _refuse(file, case, key, sentence, remedy)
+
+
+def _apart(kind: ContactKind | None, gap_mm: float) -> str:
+    if kind == "shaft on plane":
+        return f"the wall of the shaft is {gap_mm:.4g} mm from the plane"
+    if kind == "shaft in hole":
+        return f"the axes are {gap_mm:.4g} mm apart"
+    return f"the cone is {gap_mm:.4g} mm off its seat"
+
+
+def _check_intrusions(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> None:
     for a, b in combinations(scenario.assembly.solids, 2):
-        _check_pair(scenario, file, case, f"parts, {b}, start", "at the start", (a, b), stages[0])
+        _check_pair(scenario, file, case, f"parts, {b}, start", "at the start", (a, b), stages[0], apart)
     for k, operation in enumerate(scenario.assembly.operations):
         others = [part for part in scenario.assembly.solids if part not in operation.moves]
         for pair in product(operation.moves, others):
             place = f"after operation {k + 1}"
-            _check_pair(scenario, file, case, f"operation {k + 1}, goal", place, pair, stages[k + 1])
+            _check_pair(scenario, file, case, f"operation {k + 1}, goal", place, pair, stages[k + 1], apart)
 
 
 def _check_pair(
-    scenario: Scenario, file: str, case: Case, key: str, place: str, pair: tuple[str, str], poses: Poses
+    scenario: Scenario,
+    file: str,
+    case: Case,
+    key: str,
+    place: str,
+    pair: tuple[str, str],
+    poses: Poses,
+    apart: set[_Pair],
 ) -> None:
+    """Look at two parts, unless they were found apart before where they are to each other now."""
     a, b = pair
+    known = (a, b, (np.round(pose.inverse(poses[a]) @ poses[b], 9) + 0.0).tobytes())
+    if known in apart:
+        return
     depth = intrusion(scenario.assembly.solids[a], poses[a], scenario.assembly.solids[b], poses[b])
     if depth > _INTRUSION_M:
         sentence = f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other {place}"
         raise _refuse(file, case, key, sentence, "move one of them away")
+    apart.add(known)
 
 
 def _angle_deg(a: Array, b: Array) -> float:

@@ -1,6 +1,6 @@
 """The contacts of an operation in a scenario file: faces on faces, and how far apart they are asked to be.
 
-A contact is a pair, `["bottom", "table.top"]`, or a table that says more:
+A contact is a pair of faces, flat or round, `["bottom", "table.top"]`, or a table that says more:
 
     { faces = ["py", "castle1.spy"], kind = "clearance", gap_mm = [-0.2, 0.3] }
 
@@ -13,8 +13,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import get_args
 
+import numpy as np
+
+from apo_bench.assembly.kinds import CONTACT_KINDS, contact_kind, geometric_play
 from apo_bench.assembly.topology import Contact, Gap, Kind, PartFace
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face, Solid
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.scenario.keys import LARGEST_MM, read_span, refuse, refuse_name
 
@@ -22,6 +26,7 @@ Asked = Mapping[Contact, Gap]
 """What is asked of each contact, in the order of the file."""
 _KINDS: tuple[Kind, ...] = get_args(Kind)
 _EXAMPLE = '["bottom", "table.top"]'
+_POSSIBLE = f"possible are {', '.join(CONTACT_KINDS[:-1])} and {CONTACT_KINDS[-1]}, of which cones have the same angle"
 _TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
 
 
@@ -63,8 +68,27 @@ def _contact(node: JsonNode, main: str, solids: Mapping[str, Solid]) -> tuple[Co
         pair.fail(f"a pair is needed, such as {_EXAMPLE}, or a table, such as {_TABLE}")
     above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
     contact = Contact(_face(above, main, solids), _face(below, None, solids))
-    fits = any(solids[of.part].faces[of.face].fit for of in contact)
-    return contact, _gap(keys, node, contact, fits)
+    a, b = (_face_of(solids, of) for of in contact)
+    if contact_kind(a, b) is None:
+        refuse(node, f"'{contact}': {_described(a)} and {_described(b)} make no contact; {_POSSIBLE}")
+    return contact, _gap(keys, node, contact, a.fit or b.fit or geometric_play(a, b) > 0.0)
+
+
+def _face_of(solids: Mapping[str, Solid], of: PartFace) -> Face | RoundFace:
+    solid = solids[of.part]
+    return solid.rounds[of.face] if of.face in solid.rounds else solid.faces[of.face]
+
+
+def _described(face: Face | RoundFace) -> str:
+    """What kind of face it is, such as `a hole of 10 mm`."""
+    if isinstance(face, Face):
+        return "a flat face"
+    if face.kind == "cylinder":
+        return f"a {'hole' if face.hole else 'shaft'} of {2e3 * face.radius:g} mm"
+    if face.kind == "rim":
+        return f"the rim of a {'hole' if face.hole else 'shaft'} of {2e3 * face.radius:g} mm"
+    angle = np.degrees(2.0 * np.arctan(abs(face.slope)))
+    return f"a {'countersink' if face.hole else 'cone'} of {angle:.3g} degrees"
 
 
 def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: bool) -> Gap:
@@ -111,6 +135,7 @@ def _face(node: JsonNode, main: str | None, solids: Mapping[str, Solid]) -> Part
     part = name if dot or main is None else main
     if part not in solids:
         refuse_name(node, "part", part, solids)
-    if face not in solids[part].faces:
-        refuse_name(node, f"face of part '{part}'", face, solids[part].faces)
+    faces = {**solids[part].faces, **solids[part].rounds}
+    if face not in faces:
+        refuse_name(node, f"face of part '{part}'", face, faces)
     return PartFace(part, face)

@@ -57,7 +57,7 @@ def layout_at(
 def _at_rest(scenario: Scenario, part: str, T: Array, clearance_m: float) -> Array:
     """The start of the physical part: let down until its lowest point is where the nominal one was."""
     solid = scenario.assembly.solids[part]
-    if part in scenario.assembly.fixed or clearance_m == 0.0 or not any(face.fit for face in solid.faces.values()):
+    if part in scenario.assembly.fixed or clearance_m == 0.0 or not solid.fits:
         return T
     lowered = np.array(T)
     lowered[2, 3] -= extent(physical_pieces(solid, clearance_m), T[2, :3])[0] - extent(solid.pieces, T[2, :3])[0]

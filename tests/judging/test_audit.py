@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import pose
+from apo_bench.geometry.revolution import revolution
 from apo_bench.geometry.symmetry import symmetries
 from apo_bench.judging.finished import fixtures
-from tests import scenes
-from tests.audited_states import DIFFERS, LOOSE, STATES, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
-from tests.end_states import Edit, moved, verdict
+from tests import audited_rounds, rounds, scenes
+from tests.audited_states import DIFFERS as FLAT_DIFFERS
+from tests.audited_states import LOOSE, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
+from tests.audited_states import STATES as FLAT_STATES
+from tests.end_states import END, Edit, moved, shift, verdict
 from tests.judging.test_verdict import FLIPPED
+
+STATES = [*FLAT_STATES, *audited_rounds.STATES]
+DIFFERS = {**FLAT_DIFFERS, **audited_rounds.DIFFERS}
 
 
 @pytest.mark.parametrize("seen", STATES, ids=lambda seen: seen.what)
@@ -23,7 +29,7 @@ def test_a_person_says_the_same_unless_the_rule_says_otherwise(seen: Seen) -> No
 
 def test_every_difference_is_of_a_state() -> None:
     names = [seen.what for seen in STATES]
-    assert len(names) >= 60
+    assert min(len(FLAT_STATES), len(audited_rounds.STATES)) >= 60
     assert len(set(names)) == len(names)
     assert set(DIFFERS) <= set(names)
 
@@ -78,3 +84,62 @@ def test_a_turn_that_is_no_symmetry_is_seen(name: str) -> None:
     scene = scenes.ALL[name]()
     last = scene.assembly.operations[-1].main
     assert not verdict(scene, [turned(last, pose.at((0, 0, 0), (0, 20, 0)))]).success
+
+
+@pytest.mark.parametrize("name", rounds.ALL)
+def test_a_part_of_revolution_is_the_same_after_any_turn_about_its_axis(name: str) -> None:
+    """Turned anyhow when it was put, and again at the end; all of it elsewhere."""
+    rng, scene = np.random.default_rng(11), rounds.ALL[name]()
+    round_ones = [part for part, solid in scene.assembly.solids.items() if revolution(solid) is not None]
+    for _ in range(3):
+        edits = [turned(part, pose.at((0, 0, 0), (0, 0, rng.uniform(-180, 180)))) for part in round_ones]
+        edits += [shift(part, END, 0, 0, 0, (0, 0, rng.uniform(-180, 180))) for part in round_ones]
+        x, y, turn = rng.uniform([-100, -100, -40], [100, 100, 40])
+        found = verdict(scene, [*edits, moved(1, scenes.mm(x, y, 0, (0, 0, turn)))])
+        assert (found.success, found.finished.why) == (True, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "edits", "code", "words"),
+    [
+        (
+            "peg_in_plate",
+            [shift("peg", 2, 0.4, 0, 0)],
+            "gap",
+            "peg.wall on plate.bore is 0.40 mm off the axis, where 0.35 mm are allowed",
+        ),
+        (
+            "loose_peg",
+            [shift("peg", 2, 0.3, 0, 0)],
+            "gap",
+            "peg.wall on plate.bore is 0.30 mm off the axis, where 0.2 mm are allowed",
+        ),
+        (
+            "through",
+            [shift("peg", 3, 0, 0, 31)],
+            "overlap",
+            "peg.wall on b.bore covers 45 % of the true length, where 50 % are asked",
+        ),
+        (
+            "on_table",
+            [shift("peg", 1, -0.2, 0, 0)],
+            "gap",
+            "peg.wall on table.top is off by 0.20 mm, where 0.1 mm are allowed",
+        ),
+        (
+            "countersink",
+            [shift("plug", 2, 0, 0, 1)],
+            "gap",
+            "plug.cone on plate.sink is 0.71 mm off its seat, where 0.1 mm are allowed",
+        ),
+        (
+            "on_rim",
+            [shift("plug", 2, 0, 0, 0, (8, 0, 0))],
+            "gap",
+            "plug.cone on plate.rim is turned by 8.0 deg, where 5 deg are allowed",
+        ),
+    ],
+)
+def test_words_of_faults_of_round_contacts(name: str, edits: list[Edit], code: str, words: str) -> None:
+    found = verdict(rounds.ALL[name](), edits).finished
+    assert (found.code, found.why) == (code, words)

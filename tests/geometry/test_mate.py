@@ -1,0 +1,155 @@
+"""How round faces lie to each other: as formulas say, the same from both sides and in every world."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.mate import mate
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face
+from tests.rounds import Z, cone, cylinder, rim, square, up
+from tests.scenes import mm
+
+PEG, BORE = cylinder("wall", 5, (-25, 25)), cylinder("bore", 5, (0, 20), hole=True, fit=True)
+CONE, SINK, RIM = cone("cone", (3, 9), (0, 6)), cone("sink", (3, 9), (-6, 0), hole=True), rim("rim", 5, 0)
+EDGE, TABLE = rim("edge", 5, 0, hole=False, upwards=False), up("top", square(100, 0))
+HERE = np.eye(4)
+
+
+@pytest.mark.parametrize(
+    ("T", "gap_mm", "angle_deg", "length_mm"),
+    [
+        (mm(0, 0, 25), 0, 0, 20),
+        (mm(0.3, 0.4, 35), 0.5, 0, 10),
+        (mm(0, 0, 25, (180, 0, 0)), 0, 0, 20),
+        (mm(0, 0, 10, (1, 0, 0)), 10 * np.tan(np.radians(1)), 1, 20),
+        (mm(0.2, 0, 60), 0.2, 0, 0),
+    ],
+)
+def test_a_shaft_in_a_hole(T: np.ndarray, gap_mm: float, angle_deg: float, length_mm: float) -> None:
+    found = mate(PEG, T, BORE, HERE)
+    assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
+    assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
+    assert 1e3 * found.length_m == pytest.approx(length_mm, abs=1e-9)
+    assert bool(found.common) == (length_mm > 0)
+
+
+def test_the_offset_at_each_end_is_a_vector_from_the_axis_of_the_hole() -> None:
+    found = mate(PEG, mm(0.3, 0, 10, (0, 1, 0)), BORE, HERE)
+    assert found.points[:, 2] == pytest.approx([0.0, 0.02])
+    lean = 10 * np.tan(np.radians(1))
+    assert 1e3 * found.off == pytest.approx(np.array([[0.3 - lean, 0, 0], [0.3 + lean, 0, 0]]), abs=1e-9)
+
+
+def test_a_shaft_across_a_hole_has_no_length_in_it() -> None:
+    assert not mate(PEG, mm(0, 0, 10, (90, 0, 0)), BORE, HERE).common
+
+
+def test_the_place_along_the_hole_counts_not_only_the_length() -> None:
+    low, high = (mate(PEG, mm(0, 0, z), BORE, HERE).common for z in (-15, 35))
+    assert low.area == pytest.approx(high.area) == pytest.approx(2 * np.pi * 0.005 * 0.01)
+    assert (low.share(low), low.share(high)) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("T", "heights_mm", "angle_deg", "length_mm"),
+    [
+        (mm(0, 0, 5, (0, 90, 0)), (0, 0), 0, 50),
+        (mm(90, 0, 5.2, (0, 90, 0)), (0.2, 0.2), 0, 35),
+        (mm(0, 0, -5, (0, 90, 0)), (-10, -10), 0, 50),
+        (mm(0, 0, 5, (0, 89, 0)), (-25 * np.sin(np.radians(1)), 25 * np.sin(np.radians(1))), 1, 50),
+        (mm(0, 130, 5, (0, 90, 0)), (0, 0), 0, 0),
+        (mm(0, 0, 30), (0, 50), 90, 0),
+    ],
+)
+def test_a_shaft_on_a_plane(T: np.ndarray, heights_mm: tuple[float, float], angle_deg: float, length_mm: float) -> None:
+    for found in (mate(PEG, T, TABLE, HERE), mate(TABLE, HERE, PEG, T)):
+        assert 1e3 * found.off[:, 2] == pytest.approx(heights_mm, abs=1e-9)
+        assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
+        assert 1e3 * found.length_m == pytest.approx(length_mm, abs=1e-9)
+        assert bool(found.common) == (length_mm > 0)
+
+
+def test_a_line_of_contact_over_a_hole_is_two() -> None:
+    holed = up("top", square(20, 0), square(5, 0))
+    found = mate(PEG, mm(0, 0, 5, (0, 90, 0)), holed, HERE)
+    assert found.length_m == pytest.approx(0.03)
+    assert found.common.area == pytest.approx(0.03 * 0.01)
+
+
+def test_a_shaft_that_is_round_on_one_side_only_lies_on_that_one() -> None:
+    half = RoundFace("half", np.zeros(3), Z, (0, 0.02), (0.005, 0.005), False, False, np.pi, np.array([1.0, 0, 0]))
+    assert mate(half, mm(0, 0, 5, (0, 90, 0)), TABLE, HERE).common
+    assert not mate(half, mm(0, 0, 5, (0, -90, 0)), TABLE, HERE).common
+
+
+@pytest.mark.parametrize(
+    ("T", "gap_mm", "angle_deg"),
+    [
+        (mm(0, 0, -6), 0, 0),
+        (mm(0, 0, -5.9), 0.1 * np.sqrt(0.5), 0),
+        (mm(0, 0, -6.2), 0.2 * np.sqrt(0.5), 0),
+        (mm(0.3, 0, -6), 0.3, 0),
+        (mm(0, 0, 0, (180, 0, 0)), 0, 180),
+    ],
+)
+def test_a_cone_in_a_countersink(T: np.ndarray, gap_mm: float, angle_deg: float) -> None:
+    for found in (mate(CONE, T, SINK, HERE), mate(SINK, HERE, CONE, T)):
+        assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
+        assert np.degrees(found.angle_rad) == pytest.approx(angle_deg, abs=1e-9)
+
+
+@pytest.mark.parametrize(("x", "z", "gap_mm"), [(0, -2, 0), (0, -1.8, 0.2 * np.sqrt(0.5)), (0.3, -2, 0.3)])
+def test_a_cone_on_the_rim_of_a_hole_and_the_rim_of_a_shaft_in_a_countersink(x: float, z: float, gap_mm: float) -> None:
+    """Rims of 5 mm where the cones are 3 to 9 mm wide: 2 mm above the narrow end."""
+    for found in (mate(CONE, mm(x, 0, z), RIM, HERE), mate(RIM, HERE, CONE, mm(x, 0, z))):
+        assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
+        assert found.common
+    for found in (mate(EDGE, mm(x, 0, z - 2), SINK, HERE), mate(SINK, HERE, EDGE, mm(x, 0, z - 2))):
+        assert 1e3 * found.gap_m == pytest.approx(gap_mm, abs=1e-9)
+        assert found.common
+    assert np.degrees(mate(CONE, mm(0, 0, 0, (180, 0, 0)), RIM, HERE).angle_rad) == pytest.approx(180)
+
+
+def test_how_far_a_cone_is_from_its_seat_has_a_sign() -> None:
+    for a, T_a, b, T_b in ((CONE, mm(0, 0, -5.9), SINK, HERE), (SINK, HERE, CONE, mm(0, 0, -5.9))):
+        assert mate(a, T_a, b, T_b).rise_m == pytest.approx(1e-4)
+    assert mate(CONE, mm(0, 0, -6.1), SINK, HERE).rise_m == pytest.approx(-1e-4)
+
+
+PAIRS: list[tuple[Face | RoundFace, Face | RoundFace, float]] = [
+    (PEG, BORE, 10),
+    (PEG, TABLE, 5),
+    (CONE, SINK, -6),
+    (CONE, RIM, -2),
+    (EDGE, SINK, -4),
+]
+
+
+@given(st.integers(0, 10**6), st.sampled_from(PAIRS))
+@settings(max_examples=40, deadline=None)
+def test_the_world_does_not_matter(seed: int, pair: tuple[Face | RoundFace, Face | RoundFace, float]) -> None:
+    rng = np.random.default_rng(seed)
+    a, b, z = pair
+    lying = (0, 90, 0) if b is TABLE else (0, 0, 0)
+    T = mm(0, 0, z, lying) @ pose.exp(rng.standard_normal(6) * np.repeat([1e-3, 0.02], 3))
+    W = pose.exp(rng.standard_normal(6))
+    here, there = mate(a, T, b, HERE), mate(a, W @ T, b, W)
+    for name in ("gap_m", "angle_rad", "rise_m", "length_m"):
+        assert getattr(there, name) == pytest.approx(getattr(here, name), abs=1e-9)
+    assert there.off == pytest.approx(here.off @ W[:3, :3].T, abs=1e-9)
+    assert there.common.share(here.common) == pytest.approx(1.0, abs=1e-6)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_a_turn_about_the_axis_does_not_matter(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    T = mm(0, 0, 25) @ pose.exp(rng.standard_normal(6) * np.repeat([1e-3, 0.02], 3))
+    turned = T @ pose.at((0, 0, 0), (0, 0, rng.uniform(-180, 180)))
+    a, b = mate(PEG, T, BORE, HERE), mate(PEG, turned, BORE, HERE)
+    assert (b.gap_m, b.angle_rad, b.length_m) == pytest.approx((a.gap_m, a.angle_rad, a.length_m), abs=1e-12)
