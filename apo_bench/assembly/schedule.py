@@ -1,10 +1,13 @@
-"""Whether a schedule of do and undo steps makes sense."""
+"""Schedules of do and undo steps: whether one makes sense, and what is in force before work is taken apart."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from apo_bench.assembly.goals import Step
+import numpy as np
+
+from apo_bench.assembly.goals import Plan, Step
+from apo_bench.geometry.arrays import Array
 
 REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
 
@@ -29,3 +32,14 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
             return f"does operation {k + 1} before operation {done + 1}"
         done += -1 if undo else 1
     return f"leaves operation {done + 1} undone" if done < operations else ""
+
+
+def stages(plan: Plan) -> list[tuple[int, Array]]:
+    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
+    goals, done, found = np.array(plan.goals), 0, []
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+        if not step.undo:
+            goals[step.operation], done = target, step.operation + 1
+        if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
+            found.append((done, np.array(goals)))
+    return found

@@ -14,6 +14,7 @@ from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
+from apo_bench.scenario.scenario import Scenario
 
 _EXACT_M = 1e-9
 """Contacts that hold this well are a solution, at which a rank can be read off."""
@@ -133,9 +134,9 @@ def correct(
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
         raise typer.Exit(NO_RESULT)
     if out is not None:
-        _write(out, scenario, loaded.name, seen, correction)
-        if not as_json:
-            typer.echo(f"Wrote {out}")
+        said = _write(out, scenario, loaded, seen, correction)
+        if said or not as_json:
+            typer.echo(f"Wrote {out}{said and f': {said}'}", err=as_json)
 
 
 def _explained(observation: Observation, correction: Correction) -> Any:
@@ -166,18 +167,26 @@ def _corrector(method: str, doubt: str | None) -> Any:
     return method
 
 
-def _write(out: Path, scenario: str, name: str, observation: Observation, correction: Correction) -> None:
+def _write(out: Path, scenario: str, loaded: Scenario, observation: Observation, correction: Correction) -> str:
+    """Write the plan; what of it is not as corrected, so that it fits."""
     from apo_bench.files.csv_form import table
     from apo_bench.files.json_forms import plan_form, write_form
+    from apo_bench.prediction.failure import predict
 
-    plan = correction.plan(observation)
+    plan, said, name = correction.plan(observation), "", loaded.name
+    if predict(plan, loaded.clearance_mm, loaded.thresholds, loaded.attach).fails:
+        from apo_bench.trial.fitting_plan import fitting_plan
+
+        found = fitting_plan(correction, observation, loaded)
+        plan, said = found.plan, found.sentence
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
-        return
+        return said
     try:
         out.write_text(table(plan.assembly, plan.goals), encoding="utf-8")
     except OSError as error:
         raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+    return said
 
 
 def _stated(deviation_mm: float, deviation_deg: float) -> str:

@@ -73,13 +73,14 @@ def _planned(
     )
     if method == "oracle":
         raise InputError("--method oracle was given; it knows the truth, which an observation does not tell.")
-    found = apply_method(method, seen, None)
+    found = apply_method(method, seen, None, where=loaded)
     if found.plan is None:
         why = found.failure.sentence if found.failure is not None else "no plan was made"
         raise RuntimeError(f"{observation} gives no plan: {why.rstrip('.')}.")
     wrong = plan_warning(loaded, found.plan, found.correction)
     notes = [assumed_deviations(*deviations)] if assumed and found.correction is not None else []
-    return loaded, found.plan, [*notes, *([wrong] if wrong else [])]
+    moved = "" if found.fitting is None else found.fitting.sentence
+    return loaded, found.plan, [*notes, *filter(None, (moved, wrong))]
 
 
 def _by(method: str) -> str:

@@ -61,6 +61,7 @@ def show(
 def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> BeliefPanel:
     from apo_bench.correction.own_code.own import correct_named
     from apo_bench.show.believed_picture import belief_panel
+    from apo_bench.trial.fitting_plan import fitting_plan
     from apo_bench.trial.methods import with_simulated
     from apo_bench.trial.plan_warning import plan_warning
 
@@ -69,8 +70,10 @@ def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) 
         raise RuntimeError(
             f"{method} did not correct what was seen: {correction.sentence.rstrip('.')}; --seen draws what was seen."
         )
-    warning = plan_warning(scenario, correction.plan(looked), correction)
-    return belief_panel(f"corrected by {method}", looked, correction.goals, step, warning)
+    planned = fitting_plan(correction, looked, scenario)
+    warning = plan_warning(scenario, planned.plan, correction)
+    said = "; ".join(filter(None, (planned.sentence, warning)))
+    return belief_panel(f"corrected by {method}", looked, planned.plan.goals, step, said)
 
 
 def _check_seen(looked: Observation, step: int) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation, Plan, Poses, Step
 from apo_bench.assembly.reached import Outcome
 from apo_bench.assembly.topology import Assembly
@@ -28,6 +29,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.fitting_plan import fitting_plan
 from apo_bench.trial.stages import (
     Recording,
     demonstration_failure,
@@ -282,6 +284,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         plan = Plan(self.assembly, self.seen.start, goals, tuple(schedule))
         self._aim = plan if targets is None else replace(plan, targets=targets)
         self._refused = None
+
+    def planned(self, correction: Correction) -> Plan:
+        """What the robot is to do after a correction of what was seen, as in a trial; for wrappers.
+
+        Raises:
+            InputError: The correction did not converge.
+        """
+        return fitting_plan(correction, self.seen, self._scene).plan
 
     def refuse(self, code: str, why: str) -> None:
         """Do not replay at all: the next step fails at stage `correct`; for wrappers."""

@@ -15,7 +15,8 @@ from apo_bench.geometry.arrays import Array
 class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
     """Correct what was seen, at every reset: the with-correction arm of an experiment.
 
-    The observation then holds the corrected goals, zeros replay them, and an action composes on top. A correction
+    The observation then holds the corrected goals, with what contacts leave free chosen so that they fit, as in trials;
+    zeros replay them, and an action composes on top. A correction
     that does not converge is not executed: the step ends with reward 0 at stage `correct`. One that takes work apart
     again is executed with its schedule; the twist of an operation then acts on every target of that operation.
     """
@@ -50,11 +51,14 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
         """Watch another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
         made = self._correct(self._base.seen, self._corrector, self._base.look)
+        goals = made.goals
         if made.ok:
-            self._base.aim(made.goals, made.schedule, made.targets)
+            plan = self._base.planned(made)
+            goals = plan.goals
+            self._base.aim(goals, plan.schedule, plan.targets)
         else:
             self._base.refuse(made.status, made.sentence)
-        self._goals = packed(made.goals)
+        self._goals = packed(goals)
         return self._with_goals(seen), {**info, "correction": made.status}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:

@@ -1,16 +1,20 @@
 """Will a plan fail, where and why? Said before anything moves, from the plan and the sizes of the parts alone.
 
-Three things are looked at. A goal at which a part would not stand. Contacts that are planned further off than the
+Four things are looked at. A goal at which a part would not stand. Contacts that are planned further off than the
 judge allows: of faces that fit into one another those across the way in, since along it the robot goes on until it
 feels contact; of sides that are slid onto each other what stays open once one corner touches, since the slide does not
-turn the part; of supports none, since weight closes them however wrong the plan is. Parts that are planned into one
-another where no contact is meant; of those that touch in the same operation the contacts have told.
+turn the part; of supports none, since weight closes them however wrong the plan is. A part that stays where it does not
+stand on what lies below alone: it leans as far as clearances let it. Parts that are planned into one another where no
+contact is meant, at the goal or on the way in; of those that touch in the same operation the contacts have told, except
+where a level way in begins: there a part comes down beside all others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from types import MappingProxyType
 from typing import Literal, NamedTuple, final
 
 import numpy as np
@@ -18,26 +22,39 @@ import numpy as np
 from apo_bench.assembly.goals import Plan, Poses
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Attach
+from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
 from apo_bench.prediction.resting import is_support, residual, resting_poses
-from apo_bench.prediction.stability import first_unstable
+from apo_bench.prediction.stability import BALANCED, imbalance
 from apo_bench.records.thresholds import Thresholds
 
 _Code = Literal["ok", "residual", "interference", "unstable_goal"]
 _ACROSS = 0.5
 """A face whose normal makes a smaller cosine with the way in is a wall beside it."""
-_SPACING_M = 0.02
-"""The way in is looked at this densely, and at `_MOST` places at most."""
-_MOST = 8
-_WHY = {
-    "residual": "its contacts are planned {:.2f} mm off, {:g} mm are allowed",
-    "interference": "it would be {:.2f} mm deep in another part, {:g} mm are allowed",
-}
+_BESIDE_MM = 1e-3
+"""Parts that are less deep in each other only touch, whatever was rounded."""
+_CODES: Mapping[str, _Code] = MappingProxyType(
+    {
+        "falls": "unstable_goal",
+        "fit": "residual",
+        "side": "residual",
+        "leans": "residual",
+        "on_way": "interference",
+        "from_above": "interference",
+    }
+)
+_CONTACTS_OFF = "its contacts are planned {:.2f} mm off, {:g} mm are allowed"
+_WHY = MappingProxyType(
+    {
+        "falls": "the part would fall there",
+        "fit": _CONTACTS_OFF,
+        "side": _CONTACTS_OFF,
+        "leans": "the part would lean against what lies above it, as far as both clearances let it",
+        "on_way": "it would be {:.2f} mm deep in another part, {:g} mm are allowed",
+        "from_above": "its way in begins {:.2f} mm deep in another part",
+    }
+)
 
 
 @final
@@ -52,7 +69,9 @@ class Prediction:
     sentence: str
     size_mm: float | None
     """`residual`: the |e| that is too large; `interference`: the depth; `ok`: the largest |e| of a fit contact; None
-    for an unstable goal."""
+    for an unstable goal, and of what would lean."""
+    mendable: bool = False
+    """Whether it may fit if directions are changed that contacts leave free."""
 
 
 class _Doing(NamedTuple):
@@ -67,12 +86,30 @@ class _Doing(NamedTuple):
     """Every part where it will have come to rest."""
 
 
-class _Measure(NamedTuple):
+class Measure(NamedTuple):
     """How far something is off, and how far it may be."""
 
-    code: _Code
-    size_mm: float
-    allowed_mm: float
+    operation: int
+    """Counted from 0."""
+    kind: Literal["falls", "fit", "side", "leans", "on_way", "from_above"]
+    size: float
+    """[mm], of parts that are apart negative; of what falls or leans, how much of the weight and its moments over 10 mm
+    nothing balances."""
+    allowed: float
+
+    @property
+    def exceeded(self) -> bool:
+        return self.size > self.allowed
+
+    @property
+    def code(self) -> _Code:
+        """What is said of it if it is too much."""
+        return _CODES[self.kind]
+
+    @property
+    def why(self) -> str:
+        """`it would be 7.59 mm deep in another part, 1 mm are allowed`."""
+        return _WHY[self.kind].format(self.size, self.allowed)
 
 
 def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach] = ()) -> Prediction:
@@ -83,29 +120,55 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
     Args:
         clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, others
             by `support_mm`; parts that should not touch may be as deep in each other as the judge lets one be
-            pushed, `pushed_mm`.
+            pushed, `pushed_mm`, but only `fit_margin_mm` what carries others, which would shift on it, and not at all
+            what comes down to where a level way in begins, and would stand there on another part.
         attach: The way in of each operation; without it every fit contact counts, and nothing but the goals.
     """
-    doings = tuple(_doings(plan))
+    worst_mm = 0.0
+    for _, alike in groupby(measures(plan, clearance_mm, thresholds, attach), lambda one: (one.operation, one.kind)):
+        worst = max(alike, key=lambda one: one.size)
+        if worst.exceeded:
+            main = plan.assembly.operations[worst.operation].main
+            sentence = f"operation {worst.operation + 1} ({main}) will fail: {worst.why}"
+            size_mm = None if worst.kind in ("falls", "leans") else worst.size
+            return Prediction(True, worst.operation, worst.code, sentence, size_mm, worst.kind not in ("fit", "side"))
+        if worst.kind == "fit":
+            worst_mm = max(worst_mm, worst.size)
+    return Prediction(False, None, "ok", "every operation should fit", worst_mm)
+
+
+def measures(
+    plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach] = (), room_mm: float = 0.0
+) -> Iterator[Measure]:
+    """Everything that a plan is measured by, the most important first; always the same things of one schedule.
+
+    Args:
+        room_mm: Centres of mass are looked at this far aside, too.
+    """
+    doings, play_mm = tuple(_doings(plan)), clearance_mm + thresholds.fit_margin_mm
     for doing in doings:
-        if first_unstable(doing.alone, doing.before, _goal(doing)[None]) is not None:
-            return _fails(doing, "unstable_goal", None, "the part would fall there")
-    physical, worst = _physical(plan.assembly, clearance_mm), 0.0
+        size = imbalance(doing.alone, _operation(doing), doing.planned, 1e-3 * room_mm)
+        yield Measure(doing.operation, "falls", size, BALANCED)
+    physical = physical_solids(plan.assembly, clearance_mm)
     for doing in doings:
         how = attach[doing.operation] if attach else None
-        fit = _Measure("residual", _fit_mm(doing, how), clearance_mm + thresholds.fit_margin_mm)
-        side = _Measure("residual", _side_mm(doing), thresholds.support_mm)
-        depth = _Measure("interference", _depth_mm(doing, how, physical), thresholds.pushed_mm)
-        for code, size_mm, allowed_mm in (fit, side, depth):
-            if size_mm > allowed_mm:
-                return _fails(doing, code, size_mm, _WHY[code].format(size_mm, allowed_mm))
-        worst = max(worst, fit.size_mm)
-    return Prediction(False, None, "ok", "every operation should fit", worst)
+        k, operation = doing.operation, _operation(doing)
+        deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.pushed_mm
+        yield Measure(k, "fit", _fit_mm(doing, how), play_mm)
+        yield Measure(k, "side", _side_mm(doing), thresholds.support_mm)
+        if _stays(plan.assembly, k) and clearance_mm > thresholds.fit_margin_mm:
+            leans = imbalance(doing.alone, operation, doing.planned, 1e-3 * room_mm, ceilings=False)
+            yield Measure(k, "leans", leans, BALANCED)
+        for depth_m in depths_on_way(operation, doing.planned, how, physical):
+            yield Measure(k, "on_way", 1e3 * depth_m, deep_mm)
+        for depth_m in depths_from_above(operation, doing.planned, how, physical):
+            yield Measure(k, "from_above", 1e3 * depth_m, _BESIDE_MM)
 
 
-def _fails(doing: _Doing, code: _Code, size_mm: float | None, why: str) -> Prediction:
-    sentence = f"operation {doing.operation + 1} ({_operation(doing).main}) will fail: {why}"
-    return Prediction(True, doing.operation, code, sentence, size_mm)
+def _stays(assembly: Assembly, k: int) -> bool:
+    """Whether the part that an operation moves stays there to the end."""
+    main = assembly.operations[k].main
+    return not any(main in later.moves for later in assembly.operations[k + 1 :])
 
 
 def _doings(plan: Plan) -> Iterator[_Doing]:
@@ -148,52 +211,13 @@ def _side_mm(doing: _Doing) -> float:
     return max(found)
 
 
-def _depth_mm(doing: _Doing, how: Attach | None, physical: dict[str, Solid]) -> float:
-    """How deep a part that moves comes into one that rests and that it should not touch."""
-    moves, at, back = _operation(doing).moves, doing.planned, _way_back(doing, how)
-    touching = {frozenset((m.part, e.part)) for m, e in _operation(doing).contacts}
-    pairs = [(a, b) for a in moves for b in physical if b not in moves and frozenset((a, b)) not in touching]
-    return 1e3 * max((float(_along(physical[a], at[a], physical[b], at[b], back)) for a, b in pairs), default=0.0)
-
-
-def _along(a: Solid, T_a: Array, b: Solid, T_b: Array, back: Array) -> float:
-    """The deepest intrusion over all displacements (k, 3) of a; those with a ball around a off b are skipped."""
-    low, high = a.bounds
-    centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
-    seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, centre[None]) + back)
-    near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius
-    return max((intrusion(a, _shifted(T_a, d), b, T_b) for d in back[near]), default=0.0)
-
-
-def _shifted(T: Array, d: Array) -> Array:
-    out = np.array(T)
-    out[:3, 3] += d
-    return out
-
-
-def _way_back(doing: _Doing, how: Attach | None) -> Array:
-    """From the goal back along the way in, (k, 3), world, [m]."""
-    if how is None:
-        return np.zeros((1, 3))
-    k = min(_MOST, 1 + int(np.ceil(how.travel_m / _SPACING_M)))
-    return -np.outer(np.linspace(0.0, how.travel_m, k), _way(doing, how))
+def _goal(doing: _Doing) -> Array:
+    return doing.planned[_operation(doing).main]
 
 
 def _way(doing: _Doing, how: Attach) -> Array:
     return np.asarray(_goal(doing)[:3, :3] @ how.direction)
 
 
-def _goal(doing: _Doing) -> Array:
-    return doing.planned[_operation(doing).main]
-
-
 def _operation(doing: _Doing) -> Operation:
     return doing.alone.operations[0]
-
-
-def _physical(assembly: Assembly, clearance_mm: float) -> dict[str, Solid]:
-    """The parts as they are made, fit faces receded."""
-    return {
-        name: replace(solid, pieces=physical_pieces(solid, clearance_mm * 1e-3))
-        for name, solid in assembly.solids.items()
-    }

@@ -13,8 +13,10 @@ from apo_bench.geometry.overlap import overlap
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
-_BALANCED = 1e-7
+BALANCED = 1e-7
 """What is left of the weight, and of its moments over 10 mm, where forces balance it."""
+_ASIDE = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+_ASIDE.flags.writeable = False
 
 
 def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None:
@@ -31,27 +33,45 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
     Returns:
         The operation, or None if every part would stand.
     """
-    for k, (operation, poses) in enumerate(zip(assembly.operations, placements(assembly, start, goals), strict=True)):
-        forces = _forces(assembly, operation, poses)
-        if forces is not None and not _balanced(*forces, _centroid(assembly, operation, poses)):
-            return k
-    return None
+    every = zip(assembly.operations, placements(assembly, start, goals), strict=True)
+    return next(
+        (k for k, (operation, poses) in enumerate(every) if imbalance(assembly, operation, poses) > BALANCED), None
+    )
 
 
-def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Array, Array] | None:
+def imbalance(
+    assembly: Assembly, operation: Operation, poses: Poses, room_m: float = 0.0, ceilings: bool = True
+) -> float:
+    """How much of the weight of what moves, and of its moments over 10 mm, nothing balances, as in `first_unstable`.
+
+    Args:
+        poses: Every part after the operation, world frame, [m].
+        room_m: The centre of mass is also looked at this far off, level, in four directions; the largest counts.
+        ceilings: Whether what lies above may push down; if not, nothing is claimed of an operation without any.
+    """
+    points, signs, ups = _forces(assembly, operation, poses)
+    if not ups or not (ceilings or min(ups) < 0.0):
+        return 0.0
+    carrying = signs > (-np.inf if ceilings else 0.0)
+    centroid = _centroid(assembly, operation, poses)
+    offs = _ASIDE * room_m if room_m else _ASIDE[:1]
+    return max(_unbalanced(points[carrying], signs[carrying], centroid + off) for off in offs)
+
+
+def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:
     """Where vertical forces may act, (k, 3), world, [m], and whether each pushes up (1) or down (-1), (k,).
 
-    None if the operation makes no contact that could carry weight.
+    And the same of each contact that could carry weight, also of one that covers nothing.
     """
-    points, signs, level = [np.zeros((0, 3))], [np.zeros(0)], False
+    points, signs, ups = [np.zeros((0, 3))], [np.zeros(0)], list[float]()
     for m, e in operation.contacts:
         up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
         if abs(up) >= _LEVEL:
-            level = True
             corners = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
+            ups.append(float(np.sign(up)))
             points.append(corners)
-            signs.append(np.full(len(corners), np.sign(up)))
-    return (np.concatenate(points), np.concatenate(signs)) if level else None
+            signs.append(np.full(len(corners), ups[-1]))
+    return np.concatenate(points), np.concatenate(signs), ups
 
 
 def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
@@ -61,12 +81,12 @@ def _centroid(assembly: Assembly, operation: Operation, poses: Poses) -> Array:
     return np.asarray(volumes @ np.array(centroids) / volumes.sum())
 
 
-def _balanced(points: Array, signs: Array, centroid: Array) -> bool:
-    """Whether forces >= 0 at the points balance a unit weight at the centroid: three equations, least squares."""
+def _unbalanced(points: Array, signs: Array, centroid: Array) -> float:
+    """What forces >= 0 at the points leave of a unit weight at the centroid: three equations, least squares."""
     from scipy.optimize import nnls
 
     if not len(points):
-        return False
+        return 1.0
     arms = (points - centroid)[:, :2] / 0.01
     balance = np.vstack([signs, signs * arms[:, 0], signs * arms[:, 1]])
-    return bool(nnls(balance, np.array([1.0, 0.0, 0.0]))[1] < _BALANCED)
+    return float(nnls(balance, np.array([1.0, 0.0, 0.0]))[1])

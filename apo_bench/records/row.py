@@ -47,6 +47,14 @@ class FreedSet(TypedDict):
     gap_mm: _Number | None
 
 
+class FreeMoved(TypedDict):
+    """An operation, and how far its goal was moved, [mm] and [deg]."""
+
+    operation: _Operation
+    mm: _Size
+    deg: _Size
+
+
 class Predicted(TypedDict):
     """What a plan said about itself, and how far off it is then [mm]."""
 
@@ -137,6 +145,8 @@ class Row(TypedDict, total=False):
     """Which operations were freed at which step, and the gap that was left."""
     extra_operations: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] | None
     """Steps of the plan beyond doing every operation once."""
+    free_moved: list[FreeMoved] | None
+    """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
     predicted: Predicted | None
     """What the plan said about itself before it was carried out."""
     gap_before_mm: _Number | None

@@ -13,6 +13,9 @@ from apo_bench.assembly.look import Look
 from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.trial.fitting_plan import FittingPlan, fitting_plan
 from apo_bench.trial.methods import with_simulated
 from apo_bench.trial.stages import observation_failure
 
@@ -29,6 +32,8 @@ class MethodResult:
     """Of the plan; not a number where there is none."""
     correction: Correction | None = None
     """What the corrector returned; None where none was asked."""
+    fitting: FittingPlan | None = None
+    """What of the plan was chosen so that it fits; None where no corrector made one."""
 
 
 def apply_method(
@@ -37,6 +42,7 @@ def apply_method(
     truth: Array | None,
     corrector_input: Observation | None = None,
     look: Look | None = None,
+    where: Scene | Scenario | None = None,
 ) -> MethodResult:
     """What a method would have the robot do.
 
@@ -47,6 +53,8 @@ def apply_method(
         corrector_input: What a corrector gets in place of `observation`, where its relations are wrong. The plan has
             the right ones all the same: what is executed are goals.
         look: What a corrector that can ask sees operations again by.
+        where: What the plan of a corrector is to be carried out in: what contacts leave free is chosen so that it fits
+            there. None: it stays as the corrector left it.
     """
     if isinstance(method, str) and method == "oracle" and truth is not None:
         return _uncorrected(observation, truth, None)
@@ -54,13 +62,13 @@ def apply_method(
         return _uncorrected(observation, observation.goals, observation_failure(observation))
     given = observation if corrector_input is None else corrector_input
     correction = correct_named(given, with_simulated(method), look)
-    return MethodResult(
-        plan=correction.plan(observation) if correction.ok else None,
-        failure=None if correction.ok else Outcome("correct", correction.status, None, correction.sentence),
-        gap_before_m=correction.gap_before_m,
-        gap_after_m=correction.gap_after_m if correction.ok else math.nan,
-        correction=correction,
-    )
+    if not correction.ok:
+        failure = Outcome("correct", correction.status, None, correction.sentence)
+        return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)
+    plan = correction.plan(observation)
+    found = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where, given)
+    after_m = largest_gap(plan.assembly, plan.start, found.plan.goals) if found.moves else correction.gap_after_m
+    return MethodResult(found.plan, None, correction.gap_before_m, after_m, correction, found)
 
 
 def _uncorrected(observation: Observation, goals: Array, failure: Outcome | None) -> MethodResult:

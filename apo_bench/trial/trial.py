@@ -154,7 +154,7 @@ def _row(
         reference: (n, 4, 4) goals that are right for the judge.
         truth: (n, 4, 4) goals of the layout; None if they are not known.
     """
-    made = apply_method(method or parsed(settings.method).plan, observation, truth, given, look)
+    made = apply_method(method or parsed(settings.method).plan, observation, truth, given, look, scene)
     row = _outcome(settings, scene, made, reference, truth, watch, cache) | confidence(made, observation, given, truth)
     if made.correction is not None:
         row |= {"seen_again": look.seen_again if look else 0}
@@ -198,11 +198,13 @@ def _outcome(
 def _correction(made: MethodResult) -> Row:
     """What the method did, and what carrying it out would take beyond doing every operation once."""
     extra = None if made.plan is None else len(made.plan.schedule) - len(made.plan.assembly)
+    moved = None if made.fitting is None else made.fitting.moves
     freed, tried = ((), ()) if made.correction is None else (made.correction.freed, made.correction.tried)
     return {
         "freed": _numbers(freed),
         "tried": [{"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in tried],
         "extra_operations": extra,
+        "free_moved": None if moved is None else [{"operation": k + 1, "mm": mm, "deg": deg} for k, mm, deg in moved],
         "gap_before_mm": _mm(made.gap_before_m),
         "gap_after_mm": _mm(made.gap_after_m),
     }

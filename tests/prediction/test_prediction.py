@@ -208,3 +208,39 @@ def test_the_frame_of_the_world_does_not_matter_and_nothing_is_changed() -> None
     assert (found.operation, found.code) == (plain.operation, plain.code) == (5, "residual")
     assert found.size_mm == pytest.approx(plain.size_mm)
     np.testing.assert_array_equal(goals, kept)
+
+
+@pytest.mark.parametrize(("mm", "code"), [(5.0, "ok"), (19.9, "ok"), (20.1, "interference"), (26.0, "interference")])
+def test_a_level_way_in_begins_beside_everything(mm: float, code: str) -> None:
+    """The stick comes down 160 mm before its goal; planned 20 mm further in, it would come down on castle 2."""
+    scene = scenes.stick_in_tower()
+    attach = ways(scene)
+    attach[2] = Attach(np.array(ALONG), 0.16)
+    found = said(scene, off(scene, 3, scenes.mm(mm, 0, 0)), attach)
+    assert found.code == code
+    if found.fails:
+        assert found.size_mm == pytest.approx(mm - 20.0, abs=1e-6)
+        assert found.mendable
+
+
+@pytest.mark.parametrize(("mm", "leans"), [(29.0, False), (31.0, True)])
+def test_a_part_that_stays_does_not_lean_on_what_lies_above(mm: float, leans: bool) -> None:
+    """The stick in the tower, its middle beside castle 1: castle 2 keeps it from falling, clearances let it lean."""
+    scene = scenes.stick_in_tower()
+    found = said(scene, off(scene, 3, scenes.mm(mm, 0, 0)))
+    assert (found.fails, found.code) == (leans, "residual" if leans else "ok")
+    assert found.mendable == leans
+    assert (
+        predict(Plan(scene.assembly, scene.start, off(scene, 3, scenes.mm(mm, 0, 0))), 0.05, Thresholds()).code == "ok"
+    )
+
+
+def test_what_carries_others_meets_nothing() -> None:
+    """Example 5.2: the cube on its stick, planned 0.5 mm into castle 2, would shift on the stick."""
+    scene = scenes.subassembly_on_castles()
+    goals = scene.goals
+    room = next(mm for mm in np.arange(5.0, 40.0, 0.5) if said(scene, off(scene, 5, scenes.mm(mm, 0, 0))).fails)
+    found = said(scene, off(scene, 5, scenes.mm(room, 0, 0)))
+    assert (found.operation, found.code) == (4, "interference")
+    assert found.size_mm == pytest.approx(0.5, abs=0.01)
+    assert not said(scene, goals).fails

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses, Step
 from apo_bench.assembly.reached import Outcome, Reached, ReplayResult, Snapshot
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly.schedule import stages
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
@@ -79,7 +79,7 @@ def replay(
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    for upto, goals in _stages(plan):
+    for upto, goals in stages(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return _outcome(plan, "plan", "unstable_goal", k)
@@ -88,17 +88,6 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
         if code:
             return _outcome(plan, "plan", code, move.step.operation)
     return None
-
-
-def _stages(plan: Plan) -> list[tuple[int, Array]]:
-    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
-    goals, done, found = np.array(plan.goals), 0, []
-    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
-        if not step.undo:
-            goals[step.operation], done = target, step.operation + 1
-        if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
-            found.append((done, np.array(goals)))
-    return found
 
 
 def _carry_out(

@@ -90,6 +90,11 @@ def unreachable(scene: Scene, transfer: Transfer) -> str:
     return ""
 
 
+def in_reach(plan: Plan, scene: Scene) -> bool:
+    """Whether the arm reaches both ends of every transfer of a plan."""
+    return not any(unreachable(scene, move.transfer) for move in moves(plan, scene))
+
+
 def _tasks(plan: Plan, scene: Scene) -> list[_Task]:
     """The schedule with its targets: an undone part goes back to where it was, unless it is done again at once.
 

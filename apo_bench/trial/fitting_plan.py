@@ -1,0 +1,193 @@
+"""The plan of a correction, with its free directions chosen so that it fits: foretold to fit, stable, in reach.
+
+A plan that fits is left as it is. So is one whose contacts are off, which no free direction mends, and one for which
+no choice was found. What is believed of contacts is what the corrector was told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.assembly.schedule import stages
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.prediction.failure import Measure, measures, predict
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.execution.prepare import in_reach
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.free_directions import free_space, nearest_fitting
+
+ROOMS_MM = (2.0, 0.5)
+"""Parts that would have met are planned this far apart, and parts that would fall this far from the edge; the second
+where the first cannot be."""
+_SLACK = 0.01
+"""What had less room than that keeps it, but for so much [mm]."""
+_ROOMY, _STANDS = ("on_way", "from_above"), ("falls", "leans")
+"""Measures of the room between parts, and of how they stand."""
+_EXACT_M = 1e-9
+"""Contacts that hold this well hold as before."""
+_LEAST_MM, _LEAST_DEG = 0.01, 0.01
+"""Operations that move by less are not named."""
+
+
+class FreeMove(NamedTuple):
+    """How far the goal of an operation was moved along what contacts leave free."""
+
+    operation: int
+    """Counted from 0."""
+    shift_mm: float
+    turn_deg: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FittingPlan:
+    """A plan, and what of it was chosen so that it fits."""
+
+    plan: Plan
+    moves: tuple[FreeMove, ...] = ()
+    """The goals that are not as the corrector left them, in the order of operations."""
+    why: str = ""
+    """What would have failed without; empty if nothing was moved."""
+
+    @property
+    def sentence(self) -> str:
+        """`moved where contacts leave it free: operation 5 (cube) by 9.6 mm and 0.0 deg; without, ..`, or empty."""
+        if not self.moves:
+            return ""
+        mains = [operation.main for operation in self.plan.assembly.operations]
+        named = [
+            f"operation {k + 1} ({mains[k]}) by {shift_mm:.1f} mm and {turn_deg:.1f} deg"
+            for k, shift_mm, turn_deg in self.moves
+        ]
+        return f"moved where contacts leave it free: {', '.join(named)}; otherwise {self.why}"
+
+
+class _Surroundings(NamedTuple):
+    """What a plan is carried out in."""
+
+    scene: Scene
+
+    def measured(self, plan: Plan, room_mm: float = 0.0) -> Iterator[Measure]:
+        """Everything that a plan is measured by, as `predict` does it."""
+        scenario = self.scene.scenario
+        return measures(plan, self.scene.clearance_mm, scenario.thresholds, scenario.attach, room_mm)
+
+    def fault(self, plan: Plan) -> str | None:
+        """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
+        scenario = self.scene.scenario
+        found = predict(plan, self.scene.clearance_mm, scenario.thresholds, scenario.attach)
+        if found.fails:
+            return found.sentence if found.mendable else ""
+        return None if in_reach(plan, self.scene) else "the arm would not reach all of it"
+
+
+def fitting_plan(
+    correction: Correction, observation: Observation, where: Scene | Scenario, told: Observation | None = None
+) -> FittingPlan:
+    """What the robot is to do after a correction, with free directions chosen so that it fits.
+
+    Args:
+        where: The scene that the plan is to be carried out in. Of a scenario, which is compiled if need be, a plan that
+            is foretold to fit counts as in reach.
+        told: What the corrector was given in place of the observation, where its relations are wrong.
+
+    Raises:
+        InputError: The correction did not converge.
+    """
+    plan, told = correction.plan(observation), observation if told is None else told
+    asked = replace(plan, assembly=told.assembly)
+    if isinstance(where, Scenario):
+        if not predict(asked, where.clearance_mm, where.thresholds, where.attach).fails:
+            return FittingPlan(plan)
+        where = build_scene(where)
+    around = _Surroundings(where)
+    why = around.fault(asked)
+    goals = _goals_that_fit(asked, correction.believed or told, around) if why else None
+    if why is None or goals is None:
+        return FittingPlan(plan)
+    return FittingPlan(_moved(plan, goals), _moves(plan.goals, goals), why)
+
+
+def _goals_that_fit(plan: Plan, believed: Observation, around: _Surroundings) -> Array | None:
+    """Goals near those of a plan that does not fit at which it does, (n, 4, 4); None if none were found."""
+    try:
+        space = free_space(believed, plan.goals)
+    except InputError:
+        return None
+    if space is None:
+        return None
+    before, allowed = tuple(around.measured(plan)), _earlier_gaps(plan)
+
+    def fits(goals: Array) -> bool:
+        moved = _moved(plan, goals)
+        held = all(
+            (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
+        )
+        return held and around.fault(moved) is None
+
+    for room_mm in ROOMS_MM:
+        limits = _limits(before, tuple(around.measured(plan, room_mm)), room_mm)
+        found = nearest_fitting(space, fits, _Excess(plan, around, room_mm, limits))
+        if found is not None:
+            return found
+    return None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Excess:
+    """By how much each measure of a plan with other goals is too large."""
+
+    plan: Plan
+    around: _Surroundings
+    room_mm: float
+    limits: Array
+
+    def __call__(self, goals: Array) -> Array:
+        found = self.around.measured(_moved(self.plan, goals), self.room_mm)
+        return np.array([measure.size for measure in found]) - self.limits
+
+
+def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
+    """How large each measure may be: parts that would meet get room, all else has room or keeps what it had."""
+    limits = []
+    for plain, roomy in zip(before, with_room, strict=True):
+        wanted = -room_mm if plain.kind in _ROOMY else plain.allowed
+        had = (plain.kind == "falls" and not plain.exceeded) or (plain.kind in _ROOMY and plain.size <= 0.0)
+        limits.append(max(wanted, roomy.size + _SLACK) if had and roomy.size > wanted else wanted)
+    return np.array(limits)
+
+
+def _moved(plan: Plan, goals: Array) -> Plan:
+    """A plan with other goals, (n, 4, 4), and with them where the schedule brings parts to the old ones."""
+    done = [step.operation for step in plan.schedule]
+    final = (plan.targets == plan.goals[done]).all(axis=(1, 2))
+    return replace(plan, goals=goals, targets=np.where(final[:, None, None], goals[done], plan.targets))
+
+
+def _earlier_gaps(plan: Plan) -> list[Array]:
+    """The largest |e| of each contact each time before work is taken apart, [m]."""
+    assembly = plan.assembly
+    return [
+        equations(assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        for upto, goals in stages(plan)[:-1]
+    ]
+
+
+def _moves(before: Array, after: Array) -> tuple[FreeMove, ...]:
+    shifts = 1e3 * np.linalg.norm(after[:, :3, 3] - before[:, :3, 3], axis=1)
+    turns = np.degrees(np.linalg.norm(pose.log(pose.inverse(before) @ after)[:, 3:], axis=1))
+    return tuple(
+        FreeMove(k, float(shift), float(turn))
+        for k, (shift, turn) in enumerate(zip(shifts, turns, strict=True))
+        if shift > _LEAST_MM or turn > _LEAST_DEG
+    )

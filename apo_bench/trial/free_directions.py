@@ -1,0 +1,219 @@
+"""Free directions of a plan: what contacts do not fix is chosen so that the plan fits, as near as possible to before.
+
+Directions that contacts leave free are the null space of their equations at the goals, in standard deviations of what
+was seen, so a shorter vector is a likelier plan. What would fail is linearised there, and the shortest vector that
+mends it is taken, again until nothing fails (least distance problems: Lawson and Hanson, "Solving Least Squares
+Problems", 23). Where that leads nowhere, it is begun at points of an even spread. From what fits the way back is gone
+as far as it fits. After each move the goals are put back onto all contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.equations import Equations, equations
+from apo_bench.assembly.goals import Observation
+from apo_bench.correction.posterior import freedom
+from apo_bench.correction.robust.hypotheses import UNKNOWN
+from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
+from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
+from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.whitened import noise_factor, spread
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+TRIED, _BEGUN = 32, 4
+"""Places that are looked at where linearising leads nowhere, and how many of them are begun with."""
+_TURNS = 5
+"""So often what fails is linearised."""
+_STEP = 0.05
+"""Of a derivative, in standard deviations."""
+_BEYOND = 0.05
+"""What fails is mended by this more than asked for, since it bends."""
+_HALVINGS = 6
+_EXACT_M = 1e-9
+"""Contacts that hold this well hold as before."""
+_SHORTEST = 1e-9
+
+Excess = Callable[[Array], Array]
+"""Goals, (n, 4, 4) -> by how much each measure of a plan is too large, (k,)."""
+Fits = Callable[[Array], bool]
+"""Whether a plan with these goals, (n, 4, 4), fits."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FreeSpace:
+    """Goals that satisfy the contacts as well as some do, by coordinates s in free directions; there s is 0."""
+
+    goals: Array
+    """(n, 4, 4), world frame, [m]."""
+    twists: Array
+    """(n, 6, f): the body twists of one standard deviation along each free direction, [m, rad]."""
+    held: _Held
+
+    def __len__(self) -> int:
+        return self.twists.shape[2]
+
+    def tangent(self, s: Array) -> Array:
+        """Goals moved along free directions, (n, 4, 4); contacts hold to first order."""
+        return np.asarray(self.goals @ pose.exp(self.twists @ s))
+
+    def place(self, s: Array) -> Array | None:
+        """The same, put back onto the contacts; None if that cannot be."""
+        return self.held.put_back(self.tangent(s))
+
+
+class _Held(NamedTuple):
+    """The contacts that hold at goals, and what puts other goals back onto them."""
+
+    system: Equations
+    compact: CompactEquations
+    exact: NDArray[np.bool_]
+    inequalities: Inequalities
+    kept: NDArray[np.bool_]
+    limits: Array
+    """(c,): how far each contact may be off, [m]."""
+    L: Array
+
+    def put_back(self, goals: Array) -> Array | None:
+        """The nearest goals at which every contact holds as well as before; None if none were found."""
+        found = nearest_goals(self.compact.among(self.kept & self.exact), goals, self.L)
+        off = violations(self.system, self.exact, self.inequalities, found.goals)
+        return found.goals if found.finite and (off <= self.limits)[self.kept].all() else None
+
+
+def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
+    """What the contacts that hold at goals, (n, 4, 4), leave free; None if that is nothing, or too much.
+
+    Args:
+        observation: Contacts, and how uncertain each goal is; of what was not seen `UNKNOWN`.
+
+    Raises:
+        InputError: A covariance is not positive definite.
+    """
+    held = _held(observation, goals)
+    found = nearest_goals(held.compact.among(held.kept & held.exact), goals, held.L)
+    known = freedom(found.Jt)
+    if known is None or not known.free.shape[1]:
+        return None
+    return FreeSpace(goals, spread(found.B, known.free), held)
+
+
+def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:
+    """Goals that fit, (n, 4, 4), as near as could be found; None if none were found.
+
+    Args:
+        fits: The last word; only asked where nothing is in excess.
+        excess: As long as a number of it is above zero, that measure is too large.
+    """
+    search = _Search(space, fits, excess)
+    s = search.mended(np.zeros(len(space)))
+    if s is None:
+        s = search.elsewhere()
+    return None if s is None else space.place(search.nearer(s))
+
+
+def even_points(dimensions: int) -> Iterator[Array]:
+    """Points (f,) spread evenly as a normal distribution is, the nearest first (Roberts' sequence)."""
+    from scipy.stats import norm
+
+    root = 2.0
+    for _ in range(30):
+        root = (1.0 + root) ** (1.0 / (dimensions + 1))
+    steps = root ** -np.arange(1.0, dimensions + 1.0)
+    points = norm.ppf((0.5 + np.arange(1, TRIED + 1)[:, None] * steps) % 1.0)
+    yield from points[np.argsort((points * points).sum(axis=1), kind="stable")]
+
+
+class _Search(NamedTuple):
+    space: FreeSpace
+    fits: Fits
+    excess: Excess
+
+    def fits_at(self, s: Array) -> bool:
+        goals = self.space.place(s)
+        return goals is not None and bool((self.excess(goals) <= 0.0).all()) and self.fits(goals)
+
+    def mended(self, s: Array) -> Array | None:
+        """The nearest point at which what fails at s, linearised, does not; again from there until it fits."""
+        rows, least = np.zeros((0, len(s))), np.zeros(0)
+        for _ in range(_TURNS):
+            G, h = self._linearised(s)
+            rows, least = np.concatenate([rows, G]), np.concatenate([least, h])
+            found = shortest(rows, least) if len(G) else None
+            if found is None:
+                return None
+            s = found
+            if self.fits_at(s):
+                return s
+        return None
+
+    def elsewhere(self) -> Array | None:
+        """A point that fits, begun with at those of an even spread at which least is in excess."""
+        points = sorted(even_points(len(self.space)), key=self._much)
+        found = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
+        return next((s for s in found if s is not None), None)
+
+    def _much(self, s: Array) -> float:
+        return float(np.maximum(self.excess(self.space.tangent(s)), 0.0).sum())
+
+    def nearer(self, far: Array) -> Array:
+        """From a point that fits back towards zero as far as it fits, and from there to the nearest that is found."""
+        inside, outside = 1.0, 0.0
+        for _ in range(_HALVINGS):
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if self.fits_at(middle * far) else (inside, middle)
+        back = inside * far
+        mended = self.mended(outside * far)
+        return back if mended is None or mended @ mended > back @ back else mended
+
+    def _linearised(self, s: Array) -> tuple[Array, Array]:
+        """Of each measure that is in excess at s: G s' >= h mends it."""
+        now = self.excess(self.space.tangent(s))
+        over = now > 0.0
+        ends = [self.excess(self.space.tangent(s + _STEP * one))[over] for one in np.eye(len(s))]
+        G = -(np.array(ends).T - now[over][:, None]) / _STEP
+        return G, G @ s + now[over] + _BEYOND
+
+
+def shortest(G: Array, h: Array) -> Array | None:
+    """The shortest x with G x >= h, (f,); None if there is none (Lawson and Hanson, LDP)."""
+    from scipy.optimize import nnls
+
+    f = np.append(np.zeros(G.shape[1]), 1.0)
+    E = np.vstack([G.T, h])
+    residual = E @ nnls(E, f)[0] - f
+    return None if abs(residual[-1]) < _SHORTEST else np.asarray(-residual[:-1] / residual[-1])
+
+
+def _held(observation: Observation, goals: Array) -> _Held:
+    """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
+    assembly, tolerance = observation.assembly, observation.gap_m
+    plain = equations(assembly, observation.start, goals)
+    system, exact, inequalities = demanded(plain, assembly, observation.play_m)
+    off = violations(system, exact, inequalities, goals)
+    if (off > tolerance).any():
+        none = np.zeros(0)
+        system, exact = plain, np.ones_like(exact)
+        inequalities = Inequalities(plain.among(~exact), none, none)
+        off = violations(system, exact, inequalities, goals)
+    limits = np.maximum(off, _EXACT_M)
+    return _Held(
+        system, compact_assembly(assembly, system), exact, inequalities, off <= tolerance, limits, _factor(observation)
+    )
+
+
+def _factor(observation: Observation) -> Array:
+    """L of the observation, as if everything had been seen."""
+    if observation.seen.all():
+        return noise_factor(observation)
+    covariance = np.where(observation.seen[:, None, None], observation.covariance, UNKNOWN)
+    return noise_factor(
+        Observation(observation.assembly, observation.start, observation.goals, covariance, observation.seen)
+    )

@@ -1,0 +1,170 @@
+"""Plans that are foretold to fail: what contacts leave free is chosen so that they fit. Others are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.goals import Observation, Plan, Step
+from apo_bench.correction.contact import ContactCorrector
+from apo_bench.correction.correctors import correct
+from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.whitened import correction_to, noise_factor
+from apo_bench.geometry import pose
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.prediction.failure import Prediction, predict
+from apo_bench.records.settings import TrialSettings
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.prepare import in_reach
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.fitting_plan import FittingPlan, fitting_plan
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.trial import run_trial
+
+plain = ContactCorrector(solver=nearest_goals)
+SEVERAL_MM = 20.0
+"""A cube that would be less than 20 mm deep in a castle need not be moved further than so: it has 15 mm of room."""
+
+
+@cache
+def scene_named(name: str) -> Scene:
+    return build_scene(load_scenario(name))
+
+
+@cache
+def seen_at(name: str, seed: int, level: float = 8.0) -> Observation:
+    recording = record_demonstration(scene_named(name), 0.0, seed)
+    return observe_recording(recording, make_noise("isotropic", Level(level, level)), seed)
+
+
+def foretold(plan: Plan, scene: Scene) -> Prediction:
+    return predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
+
+
+def planned(name: str, seed: int, corrector: Any = plain) -> tuple[Correction, FittingPlan]:
+    correction = correct(seen_at(name, seed), corrector)
+    return correction, fitting_plan(correction, seen_at(name, seed), scene_named(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "why"),
+    [
+        ("carried_bridge", 0, "deep in another part"),
+        ("carried_bridge", 4, "would fall"),
+        ("carried_bridge", 96, "deep in another part"),
+        ("carried_bridge", 23, "its way in begins"),
+        ("stick_in_tower", 4, "would lean"),
+    ],
+)
+def test_a_plan_that_would_fail_is_moved_so_that_it_fits(name: str, seed: int, why: str) -> None:
+    scene, seen = scene_named(name), seen_at(name, seed)
+    correction, found = planned(name, seed)
+    assert foretold(correction.plan(seen), scene).fails
+    assert not foretold(found.plan, scene).fails
+    assert in_reach(found.plan, scene)
+    assert why in found.why
+    assert 0.0 < max(shift_mm for _, shift_mm, _ in found.moves) < SEVERAL_MM
+    assert all(f"operation {k + 1} (" in found.sentence for k, _, _ in found.moves)
+
+
+@pytest.mark.parametrize("seed", [0, 4, 96])
+def test_contacts_hold_as_they_did(seed: int) -> None:
+    seen = seen_at("carried_bridge", seed)
+    correction, found = planned("carried_bridge", seed)
+    before, after = (equations(seen.assembly, seen.start, T).gaps(T) for T in (correction.goals, found.plan.goals))
+    assert before.max() < 1e-9
+    assert after.max() < 1e-9
+    assert not np.array_equal(correction.goals, found.plan.goals)
+
+
+@pytest.mark.parametrize(("name", "seed"), [("carried_bridge", 1), ("carried_bridge", 98), ("stick_in_tower", 1)])
+def test_a_plan_that_fits_stays_as_it_is_bit_for_bit(name: str, seed: int) -> None:
+    correction, found = planned(name, seed)
+    np.testing.assert_array_equal(found.plan.goals, correction.goals)
+    np.testing.assert_array_equal(found.plan.targets, correction.plan(seen_at(name, seed)).targets)
+    assert (found.moves, found.why, found.sentence) == ((), "", "")
+
+
+def test_contacts_that_are_off_are_left_alone() -> None:
+    """No free direction mends them."""
+    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    torn = np.array(correct(seen, plain).goals)
+    torn[3] = torn[3] @ pose.at((0.0, 0.002, 0.0), (0.0, 0.0, 0.0))
+    correction = correct(seen, lambda _: torn)
+    assert foretold(correction.plan(seen), scene).code == "residual"
+    np.testing.assert_array_equal(fitting_plan(correction, seen, scene).plan.goals, torn)
+
+
+def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
+    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    correction, first = planned("carried_bridge", 96)
+    for where in (scene, scene.scenario):
+        again = fitting_plan(correction, seen, where)
+        np.testing.assert_array_equal(again.plan.goals, first.plan.goals)
+        assert again.sentence == first.sentence
+
+
+def test_nothing_nearer_on_the_way_back_fits_with_room() -> None:
+    """The cube that would strike a castle is moved no further than for 2 mm of room."""
+    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    correction, found = planned("carried_bridge", 96)
+    deep_mm = foretold(correction.plan(seen), scene).size_mm
+    assert deep_mm is not None
+    relative = [pose.inverse(T[k]) @ T[4] for T in (correction.goals, found.plan.goals) for k in (0, 1)]
+    moved_mm = max(1e3 * abs(relative[i][0, 3] - relative[i + 2][0, 3]) for i in (0, 1))
+    assert deep_mm + 2.0 == pytest.approx(moved_mm, abs=0.2)
+    L = noise_factor(seen)
+    lengths = [np.linalg.norm(correction_to(seen.goals, L, T)) for T in (correction.goals, found.plan.goals)]
+    assert lengths[0] < lengths[1] < lengths[0] + 1.0
+
+
+@pytest.mark.parametrize("method", ["paper", "paper-track", "contact-robust", "least-squares"])
+def test_it_is_the_same_for_every_corrector(method: str) -> None:
+    scene = scene_named("carried_bridge")
+    correction, found = planned("carried_bridge", 96, method)
+    assert foretold(correction.plan(seen_at("carried_bridge", 96)), scene).code == "interference"
+    assert found.moves
+    assert not foretold(found.plan, scene).fails
+
+
+@pytest.mark.parametrize("method", ["none", "oracle"])
+def test_what_was_not_corrected_is_not_moved(method: str) -> None:
+    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    truth = scene.scenario.goals
+    made = apply_method(method, seen, truth, where=scene)
+    assert made.plan is not None
+    assert made.fitting is None
+    np.testing.assert_array_equal(made.plan.goals, seen.goals if method == "none" else truth)
+
+
+def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
+    """Targets that are the final goals follow them; earlier ones stay, and their contacts hold as before."""
+    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    correction = correct(seen, plain)
+    schedule = (*map(Step, range(5)), Step(4, undo=True), Step(4))
+    targets = np.array([correction.goals[step.operation] for step in schedule])
+    targets[4] = targets[5] = targets[4] @ pose.at((0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
+    found = fitting_plan(replace(correction, schedule=schedule, targets=targets), seen, scene).plan
+    np.testing.assert_array_equal(found.targets[[0, 1, 2, 3, 6]], found.goals)
+    np.testing.assert_array_equal(found.targets[4:6], targets[4:6])
+
+
+def test_a_trial_says_what_was_moved_and_succeeds() -> None:
+    asked = TrialSettings("carried_bridge", 8.0, 8.0, careless=0.0, method="paper", seed=96, fidelity="contact")
+    row = run_trial(asked, scene_named("carried_bridge"))
+    assert row["success"]
+    assert row["predicted"] is not None
+    assert not row["predicted"]["fails"]
+    assert row["free_moved"]
+    assert {moved["operation"] for moved in row["free_moved"]} <= {1, 2, 3, 4, 5}
+    assert row["gap_after_mm"] is not None
+    assert row["gap_after_mm"] < 1e-6
+    untouched = run_trial(replace(asked, method="none"), scene_named("carried_bridge"))
+    assert untouched["free_moved"] is None
