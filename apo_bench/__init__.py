@@ -47,7 +47,7 @@ _EXPORTS = MappingProxyType(
         "demonstrate": "apo_bench.simulation.human.demonstration",
         "draw_layout": "apo_bench.scenario.layout",
         "explain": "apo_bench.correction.explanation",
-        "fitting_plan": "apo_bench.trial.fitting_plan",
+        "fitting_plan": "apo_bench.trial.fitting",
         "judge": "apo_bench.judging.verdict",
         "load_scenario": "apo_bench.scenario.file",
         "observe": "apo_bench.observation.observing",

@@ -32,7 +32,7 @@ from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
 from apo_bench.sweeps.grid import SweepSettings as SweepSettings
 from apo_bench.sweeps.sweep import run_sweep as run_sweep
-from apo_bench.trial.fitting_plan import fitting_plan as fitting_plan
+from apo_bench.trial.fitting import fitting_plan as fitting_plan
 from apo_bench.trial.trial import run_trial as run_trial
 
 __version__: str

@@ -9,7 +9,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.goals import Observation, Plan
 from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
@@ -90,7 +90,10 @@ def correct(
         Path | None,
         typer.Option(help="Take the noise of this file, of `noise learn` or `noise fit`, for what the camera states."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the corrected goals: a plan .json, or .csv.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write the corrected goals: a plan .json, or .csv, moved so that it fits."),
+    ] = None,
     as_json: _AsJson = False,
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
@@ -117,8 +120,10 @@ def correct(
     with redirect_output(as_json):
         correction = correct_named(seen, with_simulated(corrector))
     found = _explained(seen, correction)
+    plan, moved = _planned(loaded, seen, correction) if out is not None and correction.ok else (None, "")
     if as_json:
-        typer.echo(json.dumps(correction_form(loaded.name, method, seen, correction, found, assumed), allow_nan=False))
+        form = correction_form(loaded.name, method, seen, correction, found, assumed) | {"moved": moved or None}
+        typer.echo(json.dumps(form, allow_nan=False))
     else:
         typer.echo(f"{loaded.name} from {observation}, corrected by {method}\n")
         lines = correction_lines(seen, correction, found)
@@ -133,10 +138,10 @@ def correct(
         if out is not None:
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
         raise typer.Exit(NO_RESULT)
-    if out is not None:
-        said = _write(out, scenario, loaded, seen, correction)
-        if said or not as_json:
-            typer.echo(f"Wrote {out}{said and f': {said}'}", err=as_json)
+    if out is not None and plan is not None:
+        _write(out, scenario, loaded.name, plan)
+        if not as_json:
+            typer.echo(f"Wrote {out}{moved and f': {moved}'}")
 
 
 def _explained(observation: Observation, correction: Correction) -> Any:
@@ -167,26 +172,30 @@ def _corrector(method: str, doubt: str | None) -> Any:
     return method
 
 
-def _write(out: Path, scenario: str, loaded: Scenario, observation: Observation, correction: Correction) -> str:
-    """Write the plan; what of it is not as corrected, so that it fits."""
-    from apo_bench.files.csv_form import table
-    from apo_bench.files.json_forms import plan_form, write_form
+def _planned(scenario: Scenario, observation: Observation, correction: Correction) -> tuple[Plan, str]:
+    """The plan, and what of it is not as corrected, so that it fits; a simulator is asked only where it would not."""
     from apo_bench.prediction.failure import predict
 
-    plan, said, name = correction.plan(observation), "", loaded.name
-    if predict(plan, loaded.clearance_mm, loaded.thresholds, loaded.attach).fails:
-        from apo_bench.trial.fitting_plan import fitting_plan
+    plan = correction.plan(observation)
+    if not predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach).fails:
+        return plan, ""
+    from apo_bench.trial.fitting import fitting_plan
 
-        found = fitting_plan(correction, observation, loaded)
-        plan, said = found.plan, found.sentence
+    found = fitting_plan(correction, observation, scenario)
+    return found.plan, found.sentence
+
+
+def _write(out: Path, scenario: str, name: str, plan: Plan) -> None:
+    from apo_bench.files.csv_form import table
+    from apo_bench.files.json_forms import plan_form, write_form
+
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
-        return said
+        return
     try:
         out.write_text(table(plan.assembly, plan.goals), encoding="utf-8")
     except OSError as error:
         raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
-    return said
 
 
 def _stated(deviation_mm: float, deviation_deg: float) -> str:

@@ -61,7 +61,7 @@ def show(
 def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> BeliefPanel:
     from apo_bench.correction.own_code.own import correct_named
     from apo_bench.show.believed_picture import belief_panel
-    from apo_bench.trial.fitting_plan import fitting_plan
+    from apo_bench.trial.fitting import fitting_plan
     from apo_bench.trial.methods import with_simulated
     from apo_bench.trial.plan_warning import plan_warning
 

@@ -29,7 +29,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.fitting_plan import fitting_plan
+from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.stages import (
     Recording,
     demonstration_failure,

@@ -60,12 +60,12 @@ class FittingPlan:
 
     @property
     def sentence(self) -> str:
-        """`moved where contacts leave it free: operation 5 (cube) by 9.6 mm and 0.0 deg; without, ..`, or empty."""
+        """`moved where contacts leave it free: operation 5 (cube) by 9.6 mm; otherwise ..`, or empty."""
         if not self.moves:
             return ""
         mains = [operation.main for operation in self.plan.assembly.operations]
         named = [
-            f"operation {k + 1} ({mains[k]}) by {shift_mm:.1f} mm and {turn_deg:.1f} deg"
+            f"operation {k + 1} ({mains[k]}) by {shift_mm:.1f} mm" + f" and {turn_deg:.1f} deg" * (turn_deg >= 0.05)
             for k, shift_mm, turn_deg in self.moves
         ]
         return f"moved where contacts leave it free: {', '.join(named)}; otherwise {self.why}"

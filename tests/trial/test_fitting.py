@@ -23,7 +23,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.prepare import in_reach
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.fitting_plan import FittingPlan, fitting_plan
+from apo_bench.trial.fitting import FittingPlan, fitting_plan
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_recording, record_demonstration
 from apo_bench.trial.trial import run_trial
