@@ -9,16 +9,22 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from apo_bench.assembly.facing_round import measure_round, round_pairs
+from apo_bench.assembly.kinds import geometric_play
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import face_area, overlap
+from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """Two faces with opposite normals, one of which covers part of the other."""
+    """Two faces with opposite normals, one of which covers part of the other.
+
+    Of round faces axes take the place of normals: `apo_bench.assembly.facing_round` says what is measured then.
+    """
 
     a: str
     """The face of the first solid."""
@@ -34,8 +40,12 @@ class Facing:
     """(3,): the gap, [m], and the parts of the normal of a along two axes in the plane of b, [rad] while small."""
     slope: Array
     """(3, 6): its derivative by a twist (v, w) of the first solid in the world, about the origin, b at rest."""
-    half_m: tuple[float, float]
+    half_m: tuple[float, ...]
     """Half the extent of the overlap across the two axes, (2,), so that a tilt about them opens it by as much."""
+    lengths: int = 1
+    """How many of the residuals are lengths; the others are tilts."""
+    play_m: float = 0.0
+    """What the sizes of the two faces leave, [m]: of a shaft that is thinner than its hole."""
 
 
 def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
@@ -82,10 +92,29 @@ def facing(
         found = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
         if found is not None and abs(found.gap_m) <= gap_m:
             yield found
+    for one, other in round_pairs(a, b):
+        if (one.name, other.name) not in known:
+            m = measure_round(one, T_a, other, T_b)
+            if abs(m.gap_m) <= gap_m and m.angle_rad <= angle_rad and m.share >= share:
+                play_m = max(0.0, geometric_play(one, other))
+                yield Facing(
+                    one.name,
+                    other.name,
+                    m.gap_m,
+                    m.angle_rad,
+                    m.share,
+                    m.residual,
+                    m.slope,
+                    m.half_m,
+                    m.lengths,
+                    play_m,
+                )
 
 
-def face_gap(a: Face, T_a: Array, b: Face, T_b: Array) -> float:
+def face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
     """From the middle of the overlap, on b, to the plane of a, [m]; from the middle of b where nothing overlaps."""
+    if isinstance(a, RoundFace) or isinstance(b, RoundFace):
+        return measure_round(a, T_a, b, T_b).gap_m
     common = overlap(a, T_a, b, T_b)
     middle = (common.corners if len(common.corners) else pose.apply(T_b, b.outline)).mean(axis=0)
     return float((T_a[:3, :3] @ a.normal) @ (middle - pose.apply(T_a, a.outline[:1])[0]))

@@ -58,10 +58,10 @@ class Belief:
         return PartBeliefs(poses, reach)
 
     def given(self, e: Array, J: Array, noise: Array) -> Belief:
-        """The belief after learning that three quantities, now e (3,) with derivative J (3, 6 n), are zero up to noise.
+        """The belief after learning that some quantities, now e (r,) with derivative J (r, 6 n), are zero up to noise.
 
         Args:
-            noise: (3, 3), covariance of what the quantities really are.
+            noise: (r, r), covariance of what the quantities really are.
         """
         PJ = self.covariance @ J.T
         K = np.linalg.solve(J @ PJ + noise, PJ.T).T

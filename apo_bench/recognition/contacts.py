@@ -102,9 +102,9 @@ class _Candidate(NamedTuple):
     contact: Contact
     pair: Facing
     slope: Array
-    """(3, 6 n): derivative of its residual by body twists of all goals."""
+    """(r, 6 n): derivative of its residual by body twists of all goals; r is 3 of flat faces."""
     noise: Array
-    """(3, 3): see `reality`."""
+    """(r, r): see `reality`."""
     most: PairThresholds
     distance: float
     """Squared Mahalanobis length of its residual."""
@@ -136,7 +136,7 @@ class _Around:
         """The pairs within the thresholds that were not taken yet, the likeliest first."""
         now = belief.standing(self.k)
         found = [c for a, b, pair in self._pairs(now, taken) for c in self._judged(a, b, pair, now, belief)]
-        return tuple(sorted(found, key=lambda c: (c.distance, c.contact)))
+        return tuple(sorted(found, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
 
     def fixed(self, belief: Belief) -> _Found:
         """Every pair within fixed thresholds; nothing is concluded from one to the other."""
@@ -170,7 +170,7 @@ class _Around:
         taken, total = list[_Candidate](), 0.0
         while at_hand:
             chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
-            if chosen.distance > self.rules.most:
+            if chosen.distance > self.rules.most_of(len(chosen.pair.residual)):
                 break
             belief = belief.given(chosen.pair.residual, chosen.slope, chosen.noise)
             taken.append(chosen)
@@ -192,16 +192,16 @@ class _Around:
     def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[_Candidate]:
         """The pair as a candidate, if it is one."""
         slope = pair.slope @ (now.reach[a] - now.reach[b])
-        if slope.reshape(3, -1, 6)[:, ~self.seen.seen].any():
+        if slope.reshape(len(slope), -1, 6)[:, ~self.seen.seen].any():
             return
         contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
-        play_m = self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0
+        play_m = (self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0) + pair.play_m
         C, noise = slope @ belief.covariance @ slope.T, reality(pair, play_m)
-        most = pair_thresholds(self.rules, C, slack(pair, play_m))
+        most = pair_thresholds(self.rules, C, slack(pair, play_m), pair.lengths)
         if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:
             e = pair.residual
             distance = float(e @ np.linalg.solve(C + noise, e))
-            yield _Candidate(contact, pair, slope, noise, most, distance, _gain(C, noise, self.rules))
+            yield _Candidate(contact, pair, slope, noise, most, distance, _gain(C, noise, self.rules, pair.lengths))
 
     def _place(self, contact: Contact) -> tuple[int, ...]:
         """Where a contact stands in the order of parts and faces."""
@@ -210,23 +210,23 @@ class _Around:
         return tuple(
             i
             for parts, of in zip(order, contact, strict=True)
-            for i in (parts.index(of.part), list(solids[of.part].faces).index(of.face))
+            for i in (parts.index(of.part), [*solids[of.part].faces, *solids[of.part].rounds].index(of.face))
         )
 
     def _gap(self, contact: Contact, now: PartBeliefs) -> float:
         """The gap of a contact at given poses: at the middle of the environment face where nothing overlaps."""
         a, b = contact
-        face_a, face_b = self.seen.assembly.face(a), self.seen.assembly.face(b)
+        face_a, face_b = self.seen.assembly.face_of(a), self.seen.assembly.face_of(b)
         return face_gap(face_a, now.poses[a.part], face_b, now.poses[b.part])
 
 
-def _gain(C: Array, noise: Array, rules: Rules) -> float:
+def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:
     """What a pair that closes gains, before its squared length is taken off.
 
     Along every axis in which the goals leave it uncertain, (range)^2 / (2 pi variance), the range being that within
     the bounds. What earlier contacts imply anyway gains nothing: it is no coincidence.
     """
-    span = np.array([2 * rules.gap_m, 2 * rules.angle_rad, 2 * rules.angle_rad])
+    span = np.array([2 * rules.gap_m] * lengths + [2 * rules.angle_rad] * (len(C) - lengths))
     variance, V = np.linalg.eigh(C / np.outer(span, span))
     real = np.einsum("ij,ik,kj->j", V, noise / np.outer(span, span), V)
     new = variance > real

@@ -44,7 +44,11 @@ class Rules:
     @property
     def most(self) -> float:
         """Largest squared Mahalanobis length of three residuals that the noise explains: a chi-square quantile."""
-        return float(_quantile(self.miss))
+        return self.most_of(3)
+
+    def most_of(self, count: int) -> float:
+        """The same of so many residuals."""
+        return _quantile(self.miss, count)
 
 
 RULES_BY_NOISE = Rules()
@@ -60,22 +64,34 @@ class PairThresholds(NamedTuple):
     angle_rad: float
 
 
-def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds) -> PairThresholds:
+def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, lengths: int = 1) -> PairThresholds:
     """The largest gap and angle that noise and play explain, within the bounds.
 
     The gap is Gaussian and may lie on either side; the angle is the length of two Gaussian tilts, at most as long as
-    if both were as uncertain as the worse direction.
+    if both were as uncertain as the worse direction. Of round faces the gap may be such a length, too.
 
     Args:
-        covariance: (3, 3), of gap and tilts, from the noise of all goals, [m, rad].
+        covariance: (3, 3), of gap and tilts, from the noise of all goals, [m, rad]; (r, r) of round faces.
         slack: What play allows in addition.
+        lengths: How many rows are lengths, before those of tilts; without any of these the angle is free.
     """
     if rules.fixed:
         return PairThresholds(rules.gap_m, rules.angle_rad)
-    gap = _two_sided(rules.miss) * math.sqrt(covariance[0, 0] + _SOFT_M**2)
-    worst = float(np.linalg.eigvalsh(covariance[1:, 1:])[-1])
-    angle = math.sqrt(-2.0 * math.log(rules.miss) * (max(worst, 0.0) + _SOFT_RAD**2))
+    gap = _longest(rules.miss, covariance[:lengths, :lengths], _SOFT_M)
+    angle = _longest(rules.miss, covariance[lengths:, lengths:], _SOFT_RAD)
     return PairThresholds(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
+
+
+def _longest(miss: float, covariance: Array, soft: float) -> float:
+    """The length of Gaussian numbers, (r, r), that is exceeded so rarely, each as uncertain as the worst direction."""
+    if len(covariance) == 0:
+        return math.inf
+    if len(covariance) == 1:
+        return _two_sided(miss) * math.sqrt(covariance[0, 0] + soft**2)
+    worst = max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)
+    if len(covariance) == 2:
+        return math.sqrt(-2.0 * math.log(miss) * (worst + soft**2))
+    return math.sqrt(_quantile(miss, len(covariance)) * (worst + soft**2))
 
 
 def slack(pair: Facing, play_m: float) -> PairThresholds:
@@ -84,17 +100,21 @@ def slack(pair: Facing, play_m: float) -> PairThresholds:
 
 
 def reality(pair: Facing, play_m: float) -> Array:
-    """(3, 3), covariance of gap and tilts of a contact that is there: uniform within its play, and a little soft."""
+    """(3, 3), covariance of gap and tilts of a contact that is there: uniform within its play, and a little soft.
+
+    (r, r) of round faces.
+    """
     tilts = [play_m / max(half, play_m, 1e-9) for half in pair.half_m]
-    soft = (_SOFT_M, _SOFT_RAD, _SOFT_RAD)
-    return np.diag([x * x / 3.0 + y * y for x, y in zip((play_m, *tilts), soft, strict=True)])
+    plays = [play_m] * pair.lengths + tilts
+    soft = [_SOFT_M] * pair.lengths + [_SOFT_RAD] * len(tilts)
+    return np.diag([x * x / 3.0 + y * y for x, y in zip(plays, soft, strict=True)])
 
 
 @lru_cache
-def _quantile(miss: float) -> float:
+def _quantile(miss: float, count: int) -> float:
     from scipy.stats import chi2
 
-    return float(chi2.isf(miss, 3))
+    return float(chi2.isf(miss, count))
 
 
 @lru_cache
