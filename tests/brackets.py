@@ -43,7 +43,7 @@ def bracket() -> Solid:
     for name, x in (("a", -0.03), ("b", 0.03)):
         at = np.array([x, 0.0, 0.0])
         walls[name] = RoundFace(name, at, Z, (0.0, 0.01), (0.004, 0.004), True, fit=True)
-        pieces += [Hull(f"{name}{w.name}", w.corners + at) for w in rounds.bored(name, 4, 20, 10, wide=True)]
+        pieces += [Hull(f"{name}{w.name}", w.corners + at) for w in rounds.bored(4, 20, 10, wide=True)]
     pieces.append(Box("middle", np.array([0.0, 0.0, 0.005]), np.array([0.01, 0.02, 0.005])))
     bottom = _lifted({face.name: face for face in box_faces((50, 20, 10))}["nz"])
     return Solid("bracket", {"bottom": bottom}, tuple(pieces), 0.02 * Z, 1e-4, walls)

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play
+from apo_bench.assembly.kinds import contact_kind, geometric_play
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import face_shape, plane_frame
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
+from apo_bench.geometry.mate import mate
+from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 
 _TIGHTEST_M, _LOOSEST_M = -0.1e-3, 0.6e-3
 """A hole whose radius is less larger than that of a shaft, or more, is not the one that the shaft is for."""
-_RISING = 1e-9
+_SAME_M = 1e-9
 
 
 class RoundMeasure(NamedTuple):
@@ -51,126 +52,88 @@ def round_pairs(a: Solid, b: Solid) -> Iterator[tuple[Face | RoundFace, Face | R
 
 @lru_cache(maxsize=1024)
 def _fitting(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
-    found: list[tuple[Face | RoundFace, Face | RoundFace]] = []
-    for one in (*a.faces.values(), *a.rounds.values()):
-        for other in (*b.faces.values(), *b.rounds.values()):
-            kind = contact_kind(one, other)
-            if kind not in (None, "plane on plane") and _TIGHTEST_M <= geometric_play(one, other) <= _LOOSEST_M:
-                found.append((one, other))
-    return tuple(found)
+    every: list[list[Face | RoundFace]] = [[*solid.faces.values(), *solid.rounds.values()] for solid in (a, b)]
+    return tuple(
+        (one, other)
+        for one, other in product(*every)
+        if contact_kind(one, other) not in (None, "plane on plane")
+        and _TIGHTEST_M <= geometric_play(one, other) <= _LOOSEST_M
+    )
 
 
 def measure_round(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> RoundMeasure:
     """Measure two posed faces that can make a contact, of which at least one is round."""
-    if isinstance(a, Face):
-        assert isinstance(b, RoundFace)
-        return _plane_on_shaft(a, T_a, b, T_b)
-    if isinstance(b, Face):
+    if isinstance(a, Face) or isinstance(b, Face):
         return _shaft_on_plane(a, T_a, b, T_b)
-    return _coaxial(a, T_a, b, T_b, contact_kind(a, b))
+    return _in_hole(a, T_a, b, T_b) if contact_kind(a, b) == "shaft in hole" else _cone(a, T_a, b, T_b)
 
 
-def _shaft_on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array) -> RoundMeasure:
-    n, u = T_flat[:3, :3] @ flat.normal, T_shaft[:3, :3] @ shaft.axis
-    line = _Line.of(shaft, T_shaft, flat, T_flat, n)
-    height = float((line.middle - pose.apply(T_flat, flat.outline[:1])[0]) @ n - shaft.radius)
-    slope = np.array([[*n, *np.cross(line.middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
-    return line.measured(height, float(n @ u), slope)
+def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> RoundMeasure:
+    (shaft, T_shaft), (flat, T_flat) = ((b, T_b), (a, T_a)) if isinstance(a, Face) else ((a, T_a), (b, T_b))
+    assert isinstance(shaft, RoundFace)
+    assert isinstance(flat, Face)
+    n, u, found = T_flat[:3, :3] @ flat.normal, T_shaft[:3, :3] @ shaft.axis, mate(shaft, T_shaft, flat, T_flat)
+    middle, height = found.points.mean(axis=0), float(found.off.mean(axis=0) @ n)
+    slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
+    whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
+    return RoundMeasure(
+        residual=np.array([height, n @ u]),
+        slope=-slope if isinstance(a, Face) else slope,
+        lengths=1,
+        gap_m=height,
+        angle_rad=found.angle_rad,
+        share=found.length_m / whole if whole > 0.0 else 0.0,
+        half_m=(found.length_m / 2,),
+    )
 
 
-def _plane_on_shaft(flat: Face, T_flat: Array, shaft: RoundFace, T_shaft: Array) -> RoundMeasure:
-    n, u = T_flat[:3, :3] @ flat.normal, T_shaft[:3, :3] @ shaft.axis
-    line = _Line.of(shaft, T_shaft, flat, T_flat, n)
-    height = float((line.middle - pose.apply(T_flat, flat.outline[:1])[0]) @ n - shaft.radius)
-    slope = np.array([[*-n, *-np.cross(line.middle, n)], [0.0, 0.0, 0.0, *np.cross(n, u)]])
-    return line.measured(height, float(n @ u), slope)
+def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
+    """A cylinder in a cylinder."""
+    found, u, w = mate(a, T_a, b, T_b), T_a[:3, :3] @ a.axis, T_b[:3, :3] @ b.axis
+    u = u if u @ w > 0.0 else -u
+    across, p = (T_b[:3, :3] @ b.frame[:3, :2]).T, found.points.mean(axis=0)
+    off = across @ found.off.mean(axis=0)
+    half = found.length_m / 2
+    return RoundMeasure(
+        residual=np.array([*off, *(across @ u)]),
+        slope=np.array([*_offsets(across, p), *_tilts(across, u)]),
+        lengths=2,
+        gap_m=float(np.linalg.norm(off)),
+        angle_rad=found.angle_rad,
+        share=found.length_m / min(a.length, b.length),
+        half_m=(half, half),
+    )
 
 
-class _Line(NamedTuple):
-    """Where a shaft lies over a flat face."""
-
-    middle: Array
-    """The middle of that piece of its axis, of the whole axis if there is none, (3,), world, [m]."""
-    length_m: float
-    share: float
-
-    @classmethod
-    def of(cls, shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, n: Array) -> _Line:
-        from shapely import LineString
-
-        ends, axis = pose.apply(T_shaft, shaft.ends), T_shaft[:3, :3] @ shaft.axis
-        frame = plane_frame(flat)
-        on = pose.apply(pose.inverse(T_flat @ frame), ends)[:, :2]
-        if not _is_round_below(shaft, T_shaft, n) or np.linalg.norm(on[1] - on[0]) < 1e-3 * shaft.length:
-            return cls(ends.mean(axis=0), 0.0, 0.0)
-        common = LineString(on).intersection(face_shape(flat, pose.inverse(frame)))
-        if common.is_empty or not common.length:
-            return cls(ends.mean(axis=0), 0.0, 0.0)
-        at = np.array(common.centroid.coords[0]) - on[0]
-        way = on[1] - on[0]
-        middle = ends[0] + float(at @ way / (way @ way)) * (ends[1] - ends[0])
-        whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ axis))))
-        return cls(middle, float(common.length), float(common.length) / whole)
-
-    def measured(self, height_m: float, tilt: float, slope: Array) -> RoundMeasure:
-        residual, angle = np.array([height_m, tilt]), float(abs(np.arcsin(np.clip(tilt, -1.0, 1.0))))
-        return RoundMeasure(residual, slope, 1, height_m, angle, self.share, (self.length_m / 2,))
+def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
+    """A cone in a cone, or on a rim, compared where both have one radius."""
+    u, w, across = _wider(a, T_a), _wider(b, T_b), (T_b[:3, :3] @ b.frame[:3, :2]).T
+    slope = abs(a.slope if a.kind == "cone" else b.slope)
+    rows = np.array([*across, w * slope / np.hypot(1.0, slope)])
+    low, high = max(min(a.radii), min(b.radii)), min(max(a.radii), max(b.radii))
+    p, q = (pose.apply(T, _where(face, (low + high) / 2)[None])[0] for face, T in ((a, T_a), (b, T_b)))
+    tilts = np.zeros((0, 3)) if "rim" in (a.kind, b.kind) else across
+    spans = [abs(float(np.subtract(*face.radii))) for face in (a, b) if face.kind == "cone"]
+    common = (high - low) / min(spans) if len(spans) == 2 else float(high >= low - _SAME_M)
+    return RoundMeasure(
+        residual=np.array([*(rows @ (p - q)), *(tilts @ u)]),
+        slope=np.array([*_offsets(rows, p), *_tilts(tilts, u)]),
+        lengths=3,
+        gap_m=float(np.linalg.norm(rows @ (p - q))),
+        angle_rad=float(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w)),
+        share=max(0.0, common),
+        half_m=((low + high) / 2,) * len(tilts),
+    )
 
 
-def _is_round_below(shaft: RoundFace, T: Array, n: Array) -> bool:
-    """Whether a shaft is round where it would lie on a plane that looks along n."""
-    if shaft.toward is None or shaft.extent_rad >= WHOLE_TURN:
-        return True
-    axis, toward = T[:3, :3] @ shaft.axis, T[:3, :3] @ shaft.toward
-    below = -(n - (n @ axis) * axis)
-    return bool(below @ toward >= np.cos(shaft.extent_rad / 2) * np.linalg.norm(below) - 1e-9)
+def _offsets(rows: Array, p: Array) -> Array:
+    """Derivatives, (r, 6), of how far a point of the first solid is off along directions, (r, 3)."""
+    return np.hstack([rows, np.cross(p, rows)])
 
 
-def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array, kind: ContactKind | None) -> RoundMeasure:
-    """A shaft in a hole, in either order: cylinders, cones, or a cone on a rim."""
-    u, w, x, y = _wider(a, T_a), _wider(b, T_b), T_b[:3, :3] @ b.frame[:3, 0], T_b[:3, :3] @ b.frame[:3, 1]
-    if kind == "shaft in hole" and u @ w < 0.0:
-        u = -u
-    p, q, share, half = _seat(a, T_a, b, T_b, kind)
-    across, tilts = np.array([x, y]), np.array([x, y])
-    rows, residual = [[*e, *np.cross(p, e)] for e in across], list(across @ (p - q))
-    if kind != "shaft in hole":
-        cone = a if a.kind == "cone" else b
-        e = w * abs(cone.slope) / np.hypot(1.0, cone.slope)
-        rows.append([*e, *np.cross(p, e)])
-        residual.append(float(e @ (p - q)))
-    lengths = len(residual)
-    if kind != "cone on rim":
-        rows += [[0.0, 0.0, 0.0, *np.cross(u, e)] for e in tilts]
-        residual += list(tilts @ u)
-    angle = float(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w))
-    gap = float(np.linalg.norm(residual[:lengths]))
-    halves = (half,) * (len(residual) - lengths)
-    return RoundMeasure(np.array(residual), np.array(rows), lengths, gap, angle, share, halves)
-
-
-def _seat(
-    a: RoundFace, T_a: Array, b: RoundFace, T_b: Array, kind: ContactKind | None
-) -> tuple[Array, Array, float, float]:
-    """A point of the first axis and where it should be, (3,) each, world; the common share; half what holds a tilt."""
-    if kind == "shaft in hole":
-        ends, at, axis = pose.apply(T_a, a.ends), pose.apply(T_b, b.ends), T_b[:3, :3] @ b.axis
-        reach = [np.sort((points - at[0]) @ axis) for points in (ends, at)]
-        low, high = max(reach[0][0], reach[1][0]), min(reach[0][1], reach[1][1])
-        q = at[0] + (low + high) / 2 * axis
-        along = T_a[:3, :3] @ a.axis
-        p = ends[0] + (q - ends[0]) @ along * along
-        return p, q, max(0.0, high - low) / min(a.length, b.length), max(0.0, high - low) / 2
-    if kind == "cone on rim":
-        rim, cone = (a, b) if a.kind == "rim" else (b, a)
-        share = float(min(cone.radii) - _RISING <= rim.radius <= max(cone.radii) + _RISING)
-        radius = rim.radius
-    else:
-        low, high = max(min(a.radii), min(b.radii)), min(max(a.radii), max(b.radii))
-        share = max(0.0, high - low) / min(abs(np.subtract(*a.radii)), abs(np.subtract(*b.radii)))
-        radius = (low + high) / 2
-    p, q = (pose.apply(T, _where(face, radius)[None])[0] for face, T in ((a, T_a), (b, T_b)))
-    return p, q, float(share), radius
+def _tilts(rows: Array, u: Array) -> Array:
+    """Derivatives, (r, 6), of the parts of an axis of the first solid along directions, (r, 3)."""
+    return np.hstack([np.zeros((len(rows), 3)), np.cross(u, rows)])
 
 
 def _where(face: RoundFace, radius: float) -> Array:
