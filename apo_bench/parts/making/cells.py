@@ -10,6 +10,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.polygon import straightened
 
 _SAME_MM = 1e-6
+_ON_MM = 1e-9
 _SLIVER_MM2 = 1e-9
 _REACHES = (2.0, 1.6, 1.35, 1.2, 1.1, 1.05, 1.02)
 """How far the cell of a bore reaches, in radii; the first one that there is room for."""
@@ -48,7 +49,14 @@ def _cut(polygon: Any) -> list[Array]:
             for edge in zip(joined, [*joined[1:], joined[0]], strict=True):
                 owner[edge] = i
             del cells[k]
-    return [straightened(points[cell]) for cell in cells.values()]
+    return [straightened(points[cell]) for cell in cells.values() if _is_wide(points[cell])]
+
+
+def _is_wide(ring: Array) -> bool:
+    """Whether an area is more than a line: three corners of different rings may lie on one."""
+    x, y = (ring - ring[0]).T
+    around = float(np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1).sum())
+    return bool(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > _SAME_MM * around)
 
 
 def _length(points: Array, side: tuple[int, int]) -> float:
@@ -102,16 +110,19 @@ def _holds(cell: Array, at: Array, radius: float) -> bool:
 
 def clipped(ring: Array, n: Array, d: float) -> Array:
     """What of a convex area has n . x <= d; (0, 2) if nothing has."""
-    found: list[Array] = []
-    height = ring @ n - d
-    height[np.abs(height) < _SAME_MM * 1e-3] = 0.0
-    for i in range(len(ring)):
-        k = (i + 1) % len(ring)
-        if height[i] <= 0.0:
-            found.append(ring[i])
-        if height[i] * height[k] < 0.0:
-            found.append(ring[i] + height[i] / (height[i] - height[k]) * (ring[k] - ring[i]))
-    return np.array(found).reshape(-1, 2)
+    found: list[tuple[float, float]] = []
+    heights = (ring @ n - d).tolist()
+    corners = ring.tolist()
+    for i, (x, y) in enumerate(corners):
+        h, after = heights[i - 1], heights[i]
+        after = 0.0 if abs(after) < _ON_MM else after
+        if abs(h) > _ON_MM and h * after < 0.0:
+            u, v = corners[i - 1]
+            share = h / (h - after)
+            found.append((u + share * (x - u), v + share * (y - v)))
+        if after <= 0.0:
+            found.append((x, y))
+    return np.array(found, dtype=np.float64).reshape(-1, 2)
 
 
 def wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:

@@ -101,7 +101,7 @@ def slot(
     return [Edge(*each[:2], fit, each[2]) for each in zip(corners, names, middles, strict=True)]
 
 
-def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = None) -> Outline:
+def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = None, sides: int | None = None) -> Outline:
     """An outline of straight sides with corners, else all, rounded."""
     found: list[Edge] = []
     points = np.array([edge.start for edge in outline])
@@ -115,7 +115,7 @@ def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = Non
         back = radius * abs(np.tan(turn / 2.0))
         a, b = points[i] - back * into, points[i] + back * out
         center = a + np.sign(turn) * radius * np.array([-into[1], into[0]])
-        found.append(Edge(_pair(a), center=_pair(center), clockwise=turn < 0.0))
+        found.append(Edge(_pair(a), center=_pair(center), clockwise=turn < 0.0, sides=sides))
         found.append(replace(edge, start=_pair(b)))
     return found
 
