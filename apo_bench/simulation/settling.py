@@ -24,6 +24,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import Solid
 from apo_bench.records.outcomes import sentence
+from apo_bench.simulation.scene.geoms import MESH_INERTIA, geom_attributes, inertial_attributes, mesh_pieces
 from apo_bench.simulation.scene.physics import Physics, physics
 from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
 
@@ -107,15 +108,26 @@ def _xml(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float,
     plain = {"type": "box", "density": str(_DENSITY), "condim": str(s.condim)}
     default = ElementTree.SubElement(root, "default")
     ElementTree.SubElement(default, "geom", plain | {key: _spelled(value) for key, value in geom.items()})
+    assets = ElementTree.SubElement(root, "asset")
     room = ElementTree.SubElement(root, "worldbody")
     for part, solid in solids.items():
         body = ElementTree.SubElement(room, "body", {"name": f"{part}/"})
         if part in free:
             ElementTree.SubElement(body, "freejoint")
-        for box in physical_pieces(solid, clearance_m):
-            ElementTree.SubElement(body, "geom", {"pos": _spelled(box.center), "size": _spelled(box.half)})
+        pieces = physical_pieces(solid, clearance_m)
+        if inertial := inertial_attributes(solid, _DENSITY):
+            ElementTree.SubElement(body, "inertial", _spelled_all(inertial))
+        for hull in mesh_pieces(pieces):
+            mesh = {"name": f"{part}/{hull.name}", "inertia": MESH_INERTIA, "vertex": _spelled(hull.corners.ravel())}
+            ElementTree.SubElement(assets, "mesh", mesh)
+        for piece in pieces:
+            ElementTree.SubElement(body, "geom", _spelled_all(geom_attributes(piece, f"{part}/")))
     return ElementTree.tostring(root, encoding="unicode")
 
 
+def _spelled_all(said: Mapping[str, object]) -> dict[str, str]:
+    return {key: value if isinstance(value, str) else _spelled(value) for key, value in said.items()}
+
+
 def _spelled(numbers: object) -> str:
-    return " ".join(repr(float(x)) for x in np.asarray(numbers, dtype=np.float64))
+    return " ".join(repr(float(x)) for x in np.atleast_1d(np.asarray(numbers, dtype=np.float64)))

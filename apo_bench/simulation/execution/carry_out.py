@@ -56,7 +56,9 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.carried:
         robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
+    robot.steady(True)
     robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
+    robot.steady(False)
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
@@ -64,8 +66,10 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     before = shifted(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.begins)
     if t.into.level:
         before = shifted(before, UP, t.floats)
+    robot.steady(True)
     robot.go(at_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
     robot.follow(smooth(robot.T, before, _LOWER[bool(t.carried)]))
+    robot.steady(False)
     robot.stand()
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.load() < _LOST_LOAD * t.weight_n:

@@ -22,7 +22,7 @@ from apo_bench.simulation.robot.near import Moving, clear, near_spans
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
 from apo_bench.simulation.robot.reach import along, at_end
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
+from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, place, timestep, unfelt
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
@@ -32,6 +32,8 @@ _FINGERS_M_S, _LONGEST_GRIP_S = 0.28, 0.2
 """How fast the command of the fingers moves, and how long they may take to rest behind it."""
 _REST_RAD_S, _REST_M_S = 2e-3, 3e-3
 """Joints and fingers that move slower than this rest."""
+_CREEP_M = 5e-5
+"""What moves farther in the hand in a tick does not creep: it slips."""
 _SHIFT_M = 0.001
 """How far the tip is shifted in thought to see how the joints turn."""
 
@@ -65,6 +67,7 @@ class Robot:
         self.model, self.arm = scene.work.model, scene.arm
         self.stage = "plan"
         self._held: tuple[str, ...] = ()
+        self._kept: dict[str, Array] = {}
         self._handled: int | None = None
         self.peak_force_n = 0.0
         self._find_joints()
@@ -226,6 +229,29 @@ class Robot:
             self.model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *q, 1)
         self.data.eq_active[weld] = int(on)
 
+    def steady(self, on: bool) -> None:
+        """Keep all that is in the hand where it is in the hand, or no longer, where the scene asks for it.
+
+        The engine's friction holds speeds, not places, and does not see that contacts turn with the arm: in the air a
+        part creeps along the pads, by up to 0.4 mm, under a hundredth of the force that would make it slip. Once a tick
+        it is put back; what slips in earnest is left to slip.
+        """
+        tip = pose.inverse(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
+        kept = self._held if on and self.scene.steadies else ()
+        self._kept = {part: tip @ part_pose(self.scene.work, self.data, part) for part in kept}
+
+    def _put_back(self) -> None:
+        T_tip = self.scene.kinematics.forward(self.data.qpos[self._qpos])
+        for part, T in tuple(self._kept.items()):
+            wanted, now = T_tip @ T, part_pose(self.scene.work, self.data, part)
+            if np.linalg.norm((wanted - now)[:3, 3]) > _CREEP_M:
+                del self._kept[part]
+                continue
+            v = self.scene.work.dof[part]
+            speed = np.array(self.data.qvel[v : v + 6])
+            place(self.scene.work, self.data, part, wanted)
+            self.data.qvel[v : v + 6] = speed
+
     def _spans(self, line: Trajectory, s: Array) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: all of them, or those where something is near; at last the end."""
         n = len(s) - 1
@@ -298,6 +324,8 @@ class Robot:
         """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""
         if has_failed(self.data):
             raise Halt(self.stage, "unstable_simulation")
+        if self._kept:
+            self._put_back()
         self._feel()
         if self._on_arm_flat @ self._on_arm_flat > _COLLISION_N**2:
             struck, force = self._hardest_blow()

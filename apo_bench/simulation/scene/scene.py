@@ -12,6 +12,7 @@ import mujoco
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.solid import Piece
 from apo_bench.parts import read_part
 from apo_bench.records.settings import check
@@ -20,8 +21,10 @@ from apo_bench.resources import folder
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
+from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.graphics import import_mjcf
 from apo_bench.simulation.scene.physics import Physics, physics
+from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, world
 
 _Grasp = Literal["friction", "weld"]
@@ -51,6 +54,16 @@ class Scene:
     work: World
     """Parts and arm: where the robot replays."""
     kinematics: Kinematics
+
+    @property
+    def steadies(self) -> bool:
+        """Whether what is carried through the air does not creep in the hand (`Robot.steady`): with round parts.
+
+        A box has one direction across its slot, in which the fingers centre it; a shaft has two.
+        """
+        return self.grasp == "friction" and any(
+            not all_boxes(solid.pieces) for solid in self.scenario.assembly.solids.values()
+        )
 
     @property
     def criteria(self) -> Criteria:
@@ -160,9 +173,8 @@ def _add_part(
     model = mjcf.from_xml_string(file.xml)
     model.model = part
     _set_contact(model, settings)
-    for box in physical_pieces(solid, clearance_mm * 1e-3):
-        geom = model.find("geom", box.name)
-        geom.pos, geom.size = box.center, box.half
+    made = simulated_pieces(solid, physical_pieces(solid, clearance_mm * 1e-3), clearance_mm * 1e-3)
+    dress(model, solid, made, file.density)
     if part in scenario.colors:
         for geom in model.find_all("geom"):
             geom.rgba = (*scenario.colors[part], 1.0)

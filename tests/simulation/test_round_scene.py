@@ -1,0 +1,156 @@
+"""Scenes of convex pieces: their geoms are where the part has them, and what is round rests."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.geometry import pose
+from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.hull import SAGITTA_M, Hull
+from apo_bench.geometry.solid import Piece
+from apo_bench.parts.making import solid_of
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.human.demonstration import demonstrate
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.walls import simulated_pieces
+from apo_bench.simulation.scene.world import World, initial_state, part_pose, place
+from tests.round_scenes import PLATE, peg_in_hole
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return build_scene(peg_in_hole(tmp_path_factory.mktemp("parts")))
+
+
+def corners_in(world: World, data: mujoco.MjData, geom: str) -> np.ndarray:
+    """The corners of a mesh as it collides, (k, 3), world."""
+    found = world.model.geom(geom)
+    k = int(found.dataid[0])
+    first, count = int(world.model.mesh_vertadr[k]), int(world.model.mesh_vertnum[k])
+    R, p = data.geom_xmat[found.id].reshape(3, 3), data.geom_xpos[found.id]
+    return np.asarray(world.model.mesh_vert[first : first + count] @ R.T + p)
+
+
+def made_of(scene: Scene, part: str) -> list[Piece]:
+    c = 1e-3 * scene.clearance_mm
+    solid = scene.scenario.assembly.solids[part]
+    return [p for several in simulated_pieces(solid, physical_pieces(solid, c), c).values() for p in several]
+
+
+def test_meshes_collide_where_the_part_has_its_corners(scene: Scene):
+    T = pose.at((0.2, -0.1, 0.3), (20.0, -50.0, 130.0))
+    data = initial_state(scene.work, scene.scenario.start)
+    place(scene.work, data, "plate", T)
+    mujoco.mj_kinematics(scene.work.model, data)
+    for piece in made_of(scene, "plate"):
+        assert isinstance(piece, Hull)
+        apart = np.linalg.norm(
+            corners_in(scene.work, data, f"plate/{piece.name}")[:, None] - pose.apply(T, piece.corners)[None], axis=2
+        )
+        assert apart.min(axis=0).max() < 1e-8  # meshes are kept in single precision
+        assert apart.min(axis=1).max() < 1e-8
+
+
+def test_a_shaft_is_a_true_cylinder(scene: Scene):
+    geom = scene.work.model.geom("peg/p1")
+    assert int(geom.type[0]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+    assert geom.size[:2] == pytest.approx([0.005, 0.025])
+
+
+@pytest.mark.parametrize("part", ["peg", "plate"])
+def test_mass_and_inertia_are_those_of_the_exact_solid(scene: Scene, part: str):
+    model, solid = scene.work.model, scene.scenario.assembly.solids[part]
+    body = model.body(f"{part}/{part}")
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, body.iquat)
+    J = R.reshape(3, 3) @ np.diag(body.inertia) @ R.reshape(3, 3).T
+    assert solid.inertia is not None
+    assert float(body.mass[0]) == pytest.approx(1000.0 * solid.volume)
+    assert body.ipos == pytest.approx(solid.centroid, abs=1e-12)
+    assert pytest.approx(1000.0 * solid.inertia, rel=1e-6, abs=1e-15) == J
+
+
+def test_parts_of_boxes_are_simulated_as_their_file_says_them():
+    scenario = load_scenario("stick_in_tower")
+    scene = build_scene(scenario)
+    for part, pieces in scene.pieces.items():
+        for piece in pieces:
+            geom = scene.work.model.geom(f"{part}/{piece.name}")
+            assert int(geom.type[0]) == int(mujoco.mjtGeom.mjGEOM_BOX)
+            assert (geom.size == piece.half).all()
+            assert int(geom.condim[0]) == 3
+    assert "inertial" not in scene.shown.xml
+    assert not scene.steadies
+
+
+@pytest.mark.parametrize("clearance_m", [0.0, 0.00025])
+def test_walls_and_what_is_behind_them_are_the_same_part(clearance_m: float):
+    solid = solid_of("plate", PLATE)
+    whole = physical_pieces(solid, clearance_m)
+    cut = [p for several in simulated_pieces(solid, whole, clearance_m).values() for p in several]
+    corners = [
+        p.corners if isinstance(p, Hull) else p.center + p.half * np.array([[1, 1, 1], [-1, -1, -1]]) for p in cut
+    ]
+    volume = sum(ConvexHull(p.corners).volume for p in cut if isinstance(p, Hull))
+    wanted = sum(ConvexHull(p.corners).volume for p in whole if isinstance(p, Hull))
+    assert volume == pytest.approx(wanted, rel=1e-3)
+    assert volume < wanted
+    inner = min(float((p.planes[:, :3] @ [0.0, 0.0, 0.01] - p.planes[:, 3]).max()) for p in cut if isinstance(p, Hull))
+    assert inner == pytest.approx(0.005 + clearance_m, abs=1e-9)
+    tops = {round(1e6 * float(c[:, 2].max())) for c in corners}
+    assert tops == {20000, 20000 - round(1e6 * SAGITTA_M)}
+
+
+def test_a_bored_plate_stands_on_few_contacts(scene: Scene):
+    data = initial_state(scene.shown, scene.scenario.start)
+    mujoco.mj_step(scene.shown.model, data, 50)
+    touching = [{int(scene.shown.geom_part[g]) for g in pair} for pair in data.contact.geom]
+    plate, table = ((*scene.shown.free, *scene.shown.fixed).index(part) for part in ("plate", "table"))
+    assert 3 <= touching.count({plate, table}) <= 40
+
+
+def test_a_peg_stands_on_its_end_and_one_that_lies_stays(scene: Scene):
+    for turn in ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 30.0)):
+        data = initial_state(scene.shown, scene.scenario.start)
+        T = pose.at((0.1, 0.1, 0.025 if turn == (0.0, 0.0, 0.0) else 0.005), turn)
+        place(scene.shown, data, "peg", T)
+        mujoco.mj_step(scene.shown.model, data, 1500)
+        off = pose.inverse(T) @ part_pose(scene.shown, data, "peg")
+        assert np.abs(off[:3, 3]).max() < 2e-5  # without friction of rolling one that lies is centimetres away
+        assert np.abs(off[:3, :3] - np.eye(3)).max() < 2e-3
+        v = scene.shown.dof["peg"]
+        assert np.abs(data.qvel[v : v + 3]).max() < 1e-4
+
+
+def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, monkeypatch: pytest.MonkeyPatch):
+    rng = np.random.default_rng(0)
+    layout = draw_layout(scene.scenario, rng)
+    demonstration = demonstrate(scene, layout, 0.0, rng)
+    assert demonstration.why == ""
+    assert demonstration.goals == pytest.approx(layout.goals, abs=5e-5)
+    held: list[np.ndarray] = []
+    steady = Robot.steady
+
+    def look(robot: Robot, on: bool) -> None:
+        tip = scene.kinematics.forward(robot.data.qpos[robot._qpos])
+        held.append(pose.inverse(tip) @ part_pose(scene.work, robot.data, robot._held[0]))
+        steady(robot, on)
+
+    monkeypatch.setattr(Robot, "steady", look)
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene)
+    assert result.outcome.code == "ok"
+    final = result.reached.final
+    assert final is not None
+    inside = pose.inverse(final.poses["plate"]) @ final.poses["peg"]
+    assert np.hypot(*inside[:2, 3]) < 0.26e-3
+    assert inside[:3, 2] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
+    assert inside[2, 3] == pytest.approx(0.025, abs=1e-5)
+    lifted, brought = held[-2:]
+    assert np.linalg.norm((brought - lifted)[:3, 3]) < 2e-5  # without being put back it creeps by 0.3 mm
