@@ -135,6 +135,9 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         lines.append(("freed", _braced(row["freed"])))
     if row["extra_operations"]:
         lines.append(("schedule", f"{row['extra_operations']} operations beyond doing each once"))
+    if row["free_moved"]:
+        moved = ", ".join(f"operation {one['operation']} by {one['mm']:.1f} mm" for one in row["free_moved"])
+        lines.append(("free directions", f"{moved}, so that the plan fits"))
     if row["predicted"] is not None:
         lines.append(("predicted", _predicted(row["predicted"])))
     if row["worst_gap_mm"] is not None and not row["loose_success"]:
