@@ -19,6 +19,7 @@ from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.revolution import turned_alike
 from apo_bench.geometry.symmetry import nearest_symmetric_pose, symmetries
 
 _GONE = 0.5
@@ -90,9 +91,9 @@ def follow_demonstration(
         shares, found = _recognised(expected, shapes, group, which, appearance)
         if which is not None and found is not None:
             operation = assembly.operations[which]
-            T = nearest_symmetric_pose(
-                found.T, symmetries(assembly.solids[operation.main]), frame @ expected.turns[which]
-            )
+            solid, turn = assembly.solids[operation.main], frame @ expected.turns[which]
+            T = nearest_symmetric_pose(found.T, symmetries(solid), turn)
+            T = turned_alike(solid, T, turn)
             C = _turned(found, T)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T

@@ -9,12 +9,20 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
-from apo_bench.geometry.hull import FEWEST_SIDES, Hull
+from apo_bench.geometry.exact_turns import carries_faces, fills_the_same
+from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid
 
-_SAME_M = 1e-6
-"""Corners that are nearer to each other than this are one."""
+_SAME_M, _SAME = 1e-5, 1e-10
+"""Lines that are nearer are one line, [m]; cosines nearer to 1 are of one direction."""
+_FEWEST = 8
+"""Sides of a polygon that may stand for a circle; coarse walls, that no contact needs, have so many."""
+_COARSE = 1.0 / np.cos(np.pi / _FEWEST) - 1.0
+"""So much of its radius is then in doubt of a wall."""
+_TURNS = (0.41, 1.37, 2.71)
+"""Turns that carry no polygon of few sides onto itself, [rad]."""
+_EVEN = 1e-3
+"""Moments of inertia about axes across are the same within this part of their sum."""
 
 
 class Revolution(NamedTuple):
@@ -32,35 +40,45 @@ class Revolution(NamedTuple):
 def revolution(solid: Solid) -> Revolution | None:
     """The axis about which a part may be turned by anything; None if it has none.
 
-    Its round faces lie about the axis, and so do cylinders among its pieces; each corner of other pieces that is not on
-    the axis is one of at least 16 that lie evenly around it: so fine are the flat sides that stand for a round wall
-    (`sides_of`).
+    All round faces are whole and about this axis, flat ones lie across it and are round themselves, and what the pieces
+    fill, and the inertia if it is stated, stay as they are. Round walls are flat ones of pieces, so what these fill is
+    known within 8 % of the largest radius.
     """
-    axis = next((face.axis for face in solid.rounds.values()), None)
-    if axis is None or not all(_about(f.point, f.axis, solid.centroid, axis) for f in solid.rounds.values()):
+    rounds = list(solid.rounds.values())
+    if not rounds or not all(_about(one, solid.centroid, rounds[0].axis) for one in rounds):
         return None
-    corners = np.concatenate([piece_corners(piece) for piece in solid.pieces]) - solid.centroid
-    heights = corners @ axis
-    rings = np.column_stack([np.linalg.norm(corners - np.outer(heights, axis), axis=1), heights])
-    known = [isinstance(p, Hull) and _is_about(p, solid.centroid, axis) for p in solid.pieces]
-    asked = ~np.repeat(known, [len(piece_corners(piece)) for piece in solid.pieces])
-    if not _all_round(corners[asked], rings[asked], axis):
+    found = Revolution(solid.centroid, rounds[0].axis, reversible=False)
+    for face in solid.faces.values():
+        across = abs(face.normal @ found.axis) > 1.0 - _SAME
+        if not across or not all(_is_circle(found, loop) for loop in (face.outline, *face.holes)):
+            return None
+    turns = [turn_about(found.point, found.axis, angle) for angle in _TURNS]
+    J, R = solid.inertia, turns[0][:3, :3]
+    if J is not None and np.abs(R @ J @ R.T - J).max() > _EVEN * np.trace(J):
         return None
-    return Revolution(solid.centroid, axis, _same(rings, rings * (1.0, -1.0)) and _fits_alike(solid, axis))
+    coarse = _COARSE * max(max(one.radii) for one in rounds)
+    if not all(fills_the_same(solid, g, coarse) for g in turns):
+        return None
+    over = turn_about(found.point, across_axis(found.axis), np.pi)
+    return found._replace(reversible=carries_faces(solid, over))
+
+
+def turn_about(point: Array, axis: Array, angle_rad: float) -> Array:
+    """The displacement by a turn about an axis through a point, (4, 4)."""
+    spin = np.concatenate([np.zeros(3), axis * angle_rad])
+    return np.asarray(pose.at(point) @ pose.exp(spin) @ pose.at(-point))
 
 
 def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
     """The pose, (4, 4), at which a part of revolution looks as it does at T, turned the least from another pose.
 
-    Any other part stays as it is.
+    Of that one the rotation (3, 3) is enough. Any other part stays as it is.
     """
     found = revolution(solid)
     if found is None:
         return T
     M, a = true[:3, :3].T @ T[:3, :3], found.axis
-    across = np.eye(3)[int(np.abs(a).argmin())]
-    across = across - (across @ a) * a
-    across /= np.sqrt(across @ across)
+    across = across_axis(a)
     flips = [np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)] if found.reversible else [np.eye(3)]
     turns = [flip @ _least_turn(M @ flip, a) for flip in flips]
     best = max(turns, key=lambda g: float(np.trace(M @ g)))
@@ -77,54 +95,20 @@ def _least_turn(M: Array, axis: Array) -> Array:
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
-def _all_round(corners: Array, rings: Array, axis: Array) -> bool:
-    """Whether corners, about a point of the axis, lie in full rings around it."""
-    u = np.eye(3)[int(np.abs(axis).argmin())]
-    u = u - (u @ axis) * axis
-    x, y = corners @ u / np.sqrt(u @ u), corners @ np.cross(axis, u / np.sqrt(u @ u))
-    left = np.ones(len(corners), dtype=np.bool_)
-    while left.any():
-        i = int(left.argmax())
-        ring = left & (np.abs(rings - rings[i]) < _SAME_M).all(axis=1)
-        left &= ~ring
-        if rings[i, 0] > _SAME_M and not _even(np.arctan2(y[ring], x[ring]), rings[i, 0]):
-            return False
-    return True
+def across_axis(axis: Array) -> Array:
+    """A unit vector across an axis, (3,)."""
+    x = np.eye(3)[int(np.abs(axis).argmin())]
+    x = x - (x @ axis) * axis
+    return np.asarray(x / np.sqrt(x @ x))
 
 
-def _even(angles: Array, radius: float) -> bool:
-    """Whether at least 16 angles, some of which may be the same, divide a whole turn evenly."""
-    ordered = np.sort(angles)
-    steps = np.diff(np.append(ordered, ordered[0] + 2.0 * np.pi))
-    steps = steps[steps > _SAME_M / radius]
-    return len(steps) >= FEWEST_SIDES and bool(np.ptp(steps) < 2.0 * _SAME_M / radius)
+def _about(face: RoundFace, point: Array, axis: Array) -> bool:
+    """Whether a face goes all around an axis through a point."""
+    off = np.cross(face.point - point, axis)
+    return bool(face.toward is None and abs(face.axis @ axis) > 1.0 - _SAME and np.sqrt(off @ off) < _SAME_M)
 
 
-def _is_about(hull: Hull, point: Array, axis: Array) -> bool:
-    """Whether a piece is a cylinder about an axis through a point."""
-    return hull.cylinder is not None and _about(hull.cylinder.center, hull.cylinder.axis, point, axis)
-
-
-def _about(a: Array, along: Array, b: Array, axis: Array) -> bool:
-    """Whether two lines, each by a point and a unit vector, are one."""
-    off = b - a
-    return bool(abs(along @ axis) > 1.0 - 1e-9 and np.linalg.norm(off - (off @ axis) * axis) < _SAME_M)
-
-
-def _fits_alike(solid: Solid, axis: Array) -> bool:
-    """Whether every fit face lies on a fit face when the part is turned end for end."""
-    walls = [
-        (radius, float((end - solid.centroid) @ axis), float(face.hole))
-        for face in solid.rounds.values()
-        if face.fit
-        for radius, end in zip(face.radii, face.ends, strict=True)
-    ]
-    flats = [(-1.0, float((f.outline[0] - solid.centroid) @ axis), 0.0) for f in solid.faces.values() if f.fit]
-    found = np.array(walls + flats).reshape(-1, 3)
-    return _same(found, found * (1.0, -1.0, 1.0))
-
-
-def _same(a: Array, b: Array) -> bool:
-    """Whether two sets of rows, (n, k) each, are the same."""
-    far = np.abs(a[:, None] - b[None]).max(axis=-1) if len(a) else np.zeros((0, 0))
-    return bool(not len(a) or ((far.min(axis=0) < _SAME_M).all() and (far.min(axis=1) < _SAME_M).all()))
+def _is_circle(found: Revolution, loop: Array) -> bool:
+    """Whether corners, (k, 3), lie on a circle about the axis, and are as many as a coarse wall has at least."""
+    far = np.linalg.norm(np.cross(loop - found.point, found.axis), axis=1)
+    return len(loop) >= _FEWEST and float(np.ptp(far)) <= _SAME_M

@@ -8,8 +8,12 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import all_boxes
+from apo_bench.geometry.exact_turns import exact_turns
 from apo_bench.geometry.pose import apply
+from apo_bench.geometry.revolution import across_axis, revolution, turn_about, turned_alike
 from apo_bench.geometry.solid import Solid
 
 _SAME_M = 1e-6
@@ -39,7 +43,14 @@ def symmetries(solid: Solid) -> Array:
     A union of axis-aligned boxes has faces towards both ends of all three axes and no others, so a turn that leaves it
     as it is carries axes onto axes: the 24 quarter turns about the centre of volume are all that can. Names of faces
     do not count. Seen at `T g` it looks as it does at `T`.
+
+    A solid of other pieces or with round faces is turned by where its faces can go (`exact_turns`). Of a part of
+    revolution, which has any number of them, those are here that turn its axis: none but the identity, or one more.
     """
+    if solid.rounds or not all_boxes(solid.pieces):
+        kept = _of_any_pieces(solid)
+        kept.flags.writeable = False
+        return kept
     c = solid.centroid
     centred = [(box.center - c, box.half) for box in solid.pieces]
     turned = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
@@ -49,6 +60,24 @@ def symmetries(solid: Solid) -> Array:
     kept = g[[_keeps_fit(solid, T) for T in g]]
     kept.flags.writeable = False
     return kept
+
+
+def _of_any_pieces(solid: Solid) -> Array:
+    found = revolution(solid)
+    if found is None:
+        return exact_turns(solid)
+    over = turn_about(found.point, across_axis(found.axis), np.pi)
+    return np.array([np.eye(4), over] if found.reversible else [np.eye(4)])
+
+
+def nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:
+    """The pose, (4, 4), at which a solid looks as it does at T, turned least away from an expected pose (4, 4).
+
+    Any turn about an axis of revolution looks the same.
+    """
+    if revolution(solid) is not None:
+        return turned_alike(solid, T, expected)
+    return np.asarray(T @ nearest_symmetry(symmetries(solid), (pose.inverse(expected) @ T)[None])[0])
 
 
 def folds(symmetric: Array) -> Array:

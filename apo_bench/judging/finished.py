@@ -13,9 +13,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.overlap import Overlap
-from apo_bench.geometry.revolution import revolution, turned_alike
+from apo_bench.geometry.revolution import turned_alike
 from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import nearest_symmetry, symmetries
+from apo_bench.geometry.symmetry import nearest_alike
 from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
@@ -87,9 +87,7 @@ def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Arra
     """The pose at which the part looks as it does, turned from the true one the least."""
     if part in assembly.fixed:
         return T
-    if revolution(assembly.solids[part]) is not None:
-        return turned_alike(assembly.solids[part], T, true)
-    return np.asarray(T @ nearest_symmetry(symmetries(assembly.solids[part]), (pose.inverse(true) @ T)[None])[0])
+    return nearest_alike(assembly.solids[part], T, true)
 
 
 def _share_of_area(found: Overlap, true: Overlap) -> float:

@@ -11,6 +11,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.solvers.newton import LENGTH_M
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.revolution import turned_alike
 
 _RANK_CUT_OFF = 1e-7
 """At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
@@ -34,7 +35,8 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     """Root mean square per operation of the error of goals, in fixed and in free directions, [mm].
 
     The error of an operation is the body twist from the true goal to the other one, rotations as the way of a point
-    40 mm off the origin. The row space of the Jacobian of the contact equations at the truth is what the contacts
+    40 mm off the origin. How far a part of revolution is turned about its axis is no error, unless it carries others.
+    The row space of the Jacobian of the contact equations at the truth is what the contacts
     fix, its null space what they leave free.
 
     Args:
@@ -46,11 +48,19 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
         (fixed, free).
     """
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
+    goals = _turned_back(assembly, truth_goals, goals)
     error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
     _, J = equations(assembly, start, truth_goals).linearised(truth_goals)
     basis = _row_space(J / unit)
     fixed = basis.T @ (basis @ error)
     return _rms_mm(fixed, len(assembly)), _rms_mm(error - fixed, len(assembly))
+
+
+def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
+    """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
+    alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
+    pairs = zip(alone, goals, truth_goals, strict=True)
+    return np.array([T if one is None else turned_alike(one, T, true) for one, T, true in pairs]).reshape(-1, 4, 4)
 
 
 def _rms_mm(error: Array, operations: int) -> float:

@@ -11,8 +11,9 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.revolution import across_axis, revolution, turn_about
 from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import folds, nearest_symmetry, symmetries
+from apo_bench.geometry.symmetry import folds, nearest_alike, symmetries
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
@@ -51,6 +52,8 @@ class Symmetric:
         "with m equal places counts as 180 / m / sqrt(3) deg at most; exact while errors are small against 180 / m deg "
         "(up to level 4), above an upper bound",
         notes=(
+            "a part of revolution is the same after any turn about its axis: that turn is reported as it truly is, "
+            "and stated as if it had been seen",
             "`apo_bench.observation.models.symmetric:AnyTurn` reports any of the equal poses instead, each as likely, "
             "also at level 0: an estimator that knows nothing of faces. The same space is filled, but a contact that "
             "names a face is then asked of another side",
@@ -63,11 +66,12 @@ class Symmetric:
         groups = {part: symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
         for k, operation in enumerate(assembly.operations):
             solid, group = assembly.solids[operation.main], groups[operation.main]
-            about = pose.adjoint(pose.at(solid.centroid))
-            sigma, stated = self._deviations(folds(group))
+            frame, fold = _principal(solid, group)
+            about = pose.adjoint(frame)
+            sigma, stated = self._deviations(fold)
             if np.any(unit[k] * sigma):
-                off = pose.exp(about @ (unit[k] * sigma))[None]
-                xi[k] = pose.log(off @ nearest_symmetry(group, off))[0]
+                off = pose.exp(about @ (unit[k] * sigma))
+                xi[k] = pose.log(nearest_alike(solid, off, np.eye(4)))
             covariance[k] = about @ np.diag(stated**2) @ about.T
         return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 
@@ -75,7 +79,20 @@ class Symmetric:
         """The standard deviations drawn and those stated, (6,) each, about the centre of volume, [m, rad]."""
         turn = np.radians(self.level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
         place = np.full(3, self.level.mm * 1e-3)
-        return np.append(place, turn), np.append(place, np.minimum(turn, np.pi / fold / np.sqrt(3.0)))
+        apart = np.where(np.isinf(fold), np.inf, np.pi / fold / np.sqrt(3.0))
+        return np.append(place, turn), np.append(place, np.minimum(turn, apart))
+
+
+def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
+    """The centre of volume with the axes of a solid, or with an axis of revolution as z, (4, 4); and how often it looks
+    the same in a whole turn about each, (3,).
+    """
+    frame, found = pose.at(solid.centroid), revolution(solid)
+    if found is None:
+        return frame, folds(group)
+    x, frame = across_axis(found.axis), np.array(frame)
+    frame[:3, :3] = np.column_stack([x, np.cross(found.axis, x), found.axis])
+    return frame, np.array([len(group), len(group), np.inf])
 
 
 @final
@@ -97,5 +114,6 @@ class AnyTurn:
 
     @staticmethod
     def _one(solid: Solid, rng: np.random.Generator) -> Array:
-        group = symmetries(solid)
-        return np.asarray(group[rng.integers(len(group))])
+        group, found = symmetries(solid), revolution(solid)
+        one = np.asarray(group[rng.integers(len(group))])
+        return one if found is None else turn_about(found.point, found.axis, rng.uniform(-np.pi, np.pi)) @ one

@@ -1,0 +1,194 @@
+"""The turns that carry a solid of any pieces and faces onto itself: found by where its faces can go.
+
+The middles of faces, and their corners, are points that a symmetry carries onto points of faces that are alike. Two of
+them that do not lie on one line with the centre of volume say all of a turn, so every pair of points that they could
+be carried to gives one candidate; those that carry all faces onto faces alike, and pieces into pieces, are kept.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face, Piece, Solid
+
+_SAME_M = 1e-6
+"""Points that are nearer are the same."""
+_COARSE = 1.0 / np.cos(np.pi / 16) - 1.0
+"""Round walls are made of sixteen sides or more; corners so far off a wall, as a part of its radius, lie on it."""
+_APART = 1e-2
+"""Sine of the angle between two points, seen from the centre, that say all of a turn."""
+
+
+class _Marks(NamedTuple):
+    """Points that a symmetry carries onto points with the same tag, seen from the centre of volume."""
+
+    points: Array
+    """(k, 3), [m]."""
+    tags: NDArray[np.intp]
+    """(k,)."""
+
+
+def exact_turns(solid: Solid) -> Array:
+    """The displacements that leave a solid as it is, (m, 4, 4), the identity first; not of a part of revolution."""
+    marks, found = _marks(solid), [np.eye(3)]
+    for R in _candidates(marks):
+        new = all(np.abs(R - known).max() > 1e-6 for known in found)
+        if new and _carries(marks, R) and fills_the_same(solid, _about(solid, R), _doubt(solid)):
+            found.append(R)
+    return np.array([_about(solid, R) for R in found])
+
+
+def carries_faces(solid: Solid, g: Array) -> bool:
+    """Whether a displacement, (4, 4), carries faces onto faces that are alike, and pieces into pieces."""
+    about = _about(solid, g[:3, :3])
+    return bool(
+        np.abs(g - about).max() < _SAME_M
+        and _carries(_marks(solid), g[:3, :3])
+        and fills_the_same(solid, g, _doubt(solid))
+    )
+
+
+def fills_the_same(solid: Solid, g: Array, within_m: float) -> bool:
+    """Whether a displacement (4, 4) carries points of all pieces into the union of pieces, or as near as this.
+
+    Volumes are the same then, so nothing of the union is left bare.
+    """
+    points = pose.apply(g, np.concatenate([_points(piece) for piece in solid.pieces]))
+    deepest = np.full(len(points), -np.inf)
+    for piece in solid.pieces:
+        left = deepest < -within_m
+        if not left.any():
+            return True
+        deepest[left] = np.maximum(deepest[left], _depth(piece, points[left]))
+    return bool((deepest >= -within_m).all())
+
+
+def _points(piece: Piece) -> Array:
+    """Corners of a piece, its middle, and what lies between them, (k, 3)."""
+    corners = piece_corners(piece)
+    middle = corners.mean(axis=0)
+    return np.concatenate([corners, middle + 0.9 * (corners - middle), middle + 0.5 * (corners - middle), middle[None]])
+
+
+def _depth(piece: Piece, points: Array) -> Array:
+    """How deep points, (k, 3), are inside a piece, (k,), [m]; negative outside."""
+    if isinstance(piece, Hull):
+        planes = piece.planes
+        return np.asarray((planes[:, 3] - points @ planes[:, :3].T).min(axis=1))
+    return np.asarray((piece.half - np.abs(points - piece.center)).min(axis=1))
+
+
+def _doubt(solid: Solid) -> float:
+    """How far pieces may be from round walls, [m]."""
+    return _SAME_M + _COARSE * max((max(one.radii) for one in solid.rounds.values()), default=0.0)
+
+
+def _about(solid: Solid, R: Array) -> Array:
+    g = np.eye(4)
+    g[:3, :3], g[:3, 3] = R, solid.centroid - R @ solid.centroid
+    return g
+
+
+def _marks(solid: Solid) -> _Marks:
+    """The middles of flat faces and a point above each, both ends of round ones, and corners that are on no round wall.
+
+    Names do not count, nor do rims, which other faces end in; marks of fit, sizes and kinds do.
+    """
+    points, tags = list[Array](), list[tuple[object, ...]]()
+    rounds = [one for one in solid.rounds.values() if one.kind != "rim"]
+    for face in solid.faces.values():
+        corners = np.concatenate([face.outline, *face.holes])
+        corners = corners[~_on_walls(rounds, corners)]
+        middle = _middle(face)
+        for kind, own in (("middle", [middle]), ("above", [middle + 0.01 * face.normal]), ("corner", list(corners))):
+            points += own
+            tags += [("flat", kind, face.fit, len(corners))] * len(own)
+    for one in rounds:
+        for end, radius, other in zip(one.ends, one.radii, one.radii[::-1], strict=True):
+            points.append(end)
+            tags.append((one.kind, one.hole, one.fit, *map(_key, (radius, other, one.length, one.extent_rad))))
+        if one.toward is not None:
+            points.append(one.middle + one.radius * one.toward)
+            tags.append(("toward", one.kind, one.hole, _key(one.radius)))
+    known = {tag: i for i, tag in enumerate(dict.fromkeys(tags))}
+    at = np.array(points).reshape(-1, 3) - solid.centroid
+    return _Marks(at, np.array([known[tag] for tag in tags], dtype=np.intp))
+
+
+def _key(length: float) -> int:
+    """Micrometres; lengths in halves of one, which are common, are not rounded up here and down there."""
+    return round(length * 1e6 + 0.25)
+
+
+def _middle(face: Face) -> Array:
+    """The centre of area of a flat face, (3,), [m]."""
+    whole, moment, origin = 0.0, np.zeros(3), face.outline[0]
+    for loop in (face.outline, *face.holes):
+        a = loop - origin
+        b = np.concatenate([a[1:], a[:1]])
+        twice = np.cross(a, b) @ face.normal
+        whole, moment = whole + twice.sum(), moment + ((a + b) * twice[:, None]).sum(axis=0)
+    return np.asarray(origin + moment / (3.0 * whole))
+
+
+def _on_walls(rounds: list[RoundFace], corners: Array) -> NDArray[np.bool_]:
+    """Which corners, (k, 3), are those of a polygon that stands for a circle, (k,)."""
+    found = np.zeros(len(corners), dtype=np.bool_)
+    for one in rounds:
+        along = (corners - one.point) @ one.axis
+        radius = np.interp(along, one.span, one.radii)
+        far = np.linalg.norm(np.cross(corners - one.point, one.axis), axis=1)
+        within = (along > one.span[0] - _SAME_M) & (along < one.span[1] + _SAME_M)
+        found |= within & (np.abs(far - radius) <= _SAME_M + _COARSE * radius)
+    return found
+
+
+def _candidates(marks: _Marks) -> list[Array]:
+    """Turns, (3, 3), that carry two of the rarest marks onto marks alike."""
+    far = np.linalg.norm(marks.points, axis=1)
+    rare = np.bincount(marks.tags)[marks.tags]
+    order = [int(i) for i in np.lexsort((np.arange(len(far)), rare)) if far[i] > 1e3 * _SAME_M]
+    if not order:
+        return []
+    first = order[0]
+    p = marks.points[first]
+    second = next((i for i in order if _sine(p, marks.points[i]) > _APART), None)
+    if second is None:
+        return []
+    q, found = marks.points[second], list[Array]()
+    base = _frame(p, q)
+    for a in marks.points[_like(marks, far, first)]:
+        for b in marks.points[_like(marks, far, second)]:
+            if abs(a @ b - p @ q) < _SAME_M * (far[first] + far[second]):
+                found.append(_frame(a, b) @ base.T)
+    return found
+
+
+def _like(marks: _Marks, far: Array, i: int) -> NDArray[np.bool_]:
+    return np.asarray((marks.tags == marks.tags[i]) & (np.abs(far - far[i]) < _SAME_M))
+
+
+def _sine(p: Array, q: Array) -> float:
+    return float(np.linalg.norm(np.cross(p, q)) / (np.linalg.norm(p) * np.linalg.norm(q)))
+
+
+def _frame(p: Array, q: Array) -> Array:
+    """The rotation whose x axis is along p, with q in the plane of x and y."""
+    x, z = p / np.linalg.norm(p), np.cross(p, q)
+    z = z / np.linalg.norm(z)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _carries(marks: _Marks, R: Array) -> bool:
+    """Whether a turn carries every mark onto one that is alike."""
+    apart = np.linalg.norm((marks.points @ R.T)[:, None] - marks.points[None], axis=-1)
+    near = (apart < 10 * _SAME_M) & (marks.tags[:, None] == marks.tags[None])
+    return bool(near.any(axis=1).all() and near.any(axis=0).all())

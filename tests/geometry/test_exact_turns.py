@@ -1,0 +1,170 @@
+"""Parts of any pieces: after which turns they are the same, also after any turn about an axis."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.revolution import revolution, turn_about
+from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.geometry.symmetry import nearest_alike, nearest_symmetry, symmetries
+from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
+from apo_bench.trial.pose_error import goal_errors
+from tests import scenes
+from tests.correction.robust.test_robust import shown
+from tests.round_contacts import CONTACTS, MM, part, pin, plate, ring, scene, tube, wall
+
+
+def prism(corners: np.ndarray, height: float, at: np.ndarray | None = None, fit: tuple[str, ...] = ()) -> Solid:
+    """An upright prism over a convex polygon, (n, 2), as one piece with its faces, moved to a pose."""
+    n, T = len(corners), np.eye(4) if at is None else at
+    rings = [np.column_stack([corners, np.full(n, z)]) for z in (-height / 2, height / 2)]
+    loops = {"bottom": rings[0][::-1], "top": rings[1]}
+    for i in range(n):
+        j = (i + 1) % n
+        loops[f"side{i}"] = np.array([rings[0][i], rings[0][j], rings[1][j], rings[1][i]])
+    faces = {name: Face(name, pose.apply(T, loop), fit=name in fit) for name, loop in loops.items()}
+    solid = Hull("prism", pose.apply(T, np.concatenate(rings)))
+    return Solid("prism", faces, (solid,), pose.apply(T, np.zeros((1, 3)))[0], 1e-6)
+
+
+def regular(n: int, radius: float = 10 * MM) -> np.ndarray:
+    turns = 2 * np.pi * (np.arange(n) + 0.5) / n
+    return radius * np.column_stack([np.cos(turns), np.sin(turns)])
+
+
+def bush(*extra: Face, sides: int | None = None) -> Solid:
+    """A bush of 20 mm with round ends and walls, bored 8 mm."""
+    ends = (ring("bottom", 0.0, 10 * MM, up=False), ring("top", 20 * MM, 10 * MM, up=True))
+    walls = (wall("bore", 0.0, 20 * MM, 4 * MM, True), wall("outside", 0.0, 20 * MM, 10 * MM, False))
+    return part("bush", tube(10 * MM, 4 * MM, 0.0, 20 * MM, sides), (*ends, *extra), walls)
+
+
+@pytest.mark.parametrize(
+    ("corners", "height", "order"),
+    [
+        (regular(4), np.sqrt(2) * 10 * MM, 24), (regular(4), 10 * MM, 8), (regular(3), 10 * MM, 6),
+        (regular(6), 5 * MM, 12), (np.array([[-1, -2], [1, -2], [1, 2], [-1, 2]]) * MM, 6 * MM, 4),
+        (np.array([[-3, -2], [4, -2], [1, 3]]) * MM, 6 * MM, 1),
+    ],
+)  # fmt: skip
+def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
+    """However it lies in its own frame; a triangle of three different sides has none."""
+    rng = np.random.default_rng(len(corners))
+    for at in (np.eye(4), pose.exp(rng.standard_normal(6) * [0.02, 0.02, 0.02, 1, 1, 1])):
+        solid = prism(corners - corners.mean(axis=0), height, at)
+        found = symmetries(solid)
+        assert len(found) == order
+        spots = piece_corners(solid.pieces[0])
+        for g in found:
+            apart = np.linalg.norm(pose.apply(g, spots)[:, None] - spots[None], axis=-1)
+            assert apart.min(axis=1).max() < 1e-9
+
+
+def test_marks_of_fit_break_a_symmetry():
+    whole = prism(regular(4), 10 * MM)
+    assert len(symmetries(prism(regular(4), 10 * MM, fit=("side0",)))) == 2
+    assert len(symmetries(prism(regular(4), 10 * MM, fit=("top", "bottom")))) == len(symmetries(whole))
+
+
+def test_boxes_as_hulls_have_the_symmetries_of_boxes():
+    """A plate with a slot, of three boxes: the same turns as those of its grid of cells."""
+    block = scenes.block()
+    hulls = tuple(Hull(box.name, piece_corners(box)) for box in block.pieces)
+    found = symmetries(replace(block, pieces=hulls))
+    assert len(found) == len(symmetries(block))
+    for g in found:
+        assert min(np.abs(g - known).max() for known in symmetries(block)) < 1e-9
+
+
+def test_a_plate_with_a_bore_turns_by_quarters():
+    assert len(symmetries(plate())) == 4
+    assert revolution(plate()) is None
+
+
+@pytest.mark.parametrize("sides", [None, 16])
+def test_a_bush_is_the_same_after_any_turn_and_upside_down(sides):
+    found = revolution(bush(sides=sides))
+    assert found is not None
+    assert abs(found.axis[2]) == pytest.approx(1.0)
+    assert len(symmetries(bush(sides=sides))) == 2
+    assert revolution(pin()) is not None
+    assert len(symmetries(pin())) == 1
+
+
+def test_what_is_not_round_is_no_part_of_revolution():
+    """A flat that is stated, a block that no face states, a bore that is off the axis, an inertia that is not even."""
+    flat = Face("flat", np.array([[9, -4, 0], [9, 4, 0], [9, 4, 20], [9, -4, 20]]) * MM)
+    assert revolution(bush(flat)) is None
+    key = Box("key", np.array([12, 0, 10]) * MM, np.array([3, 2, 10]) * MM)
+    assert revolution(replace(bush(), pieces=(*bush().pieces, key))) is None
+    away = replace(bush().rounds["bore"], point=np.array([1 * MM, 0, 0]))
+    assert revolution(replace(bush(), rounds={**bush().rounds, "bore": away})) is None
+    assert revolution(replace(bush(), inertia=np.diag([1.0, 1.2, 2.0]))) is None
+    assert revolution(replace(bush(), inertia=np.diag([1.0, 1.0, 2.0]))) is not None
+    square = prism(regular(4), 20 * MM).pieces
+    assert revolution(replace(bush(), pieces=square, centroid=np.zeros(3), faces={})) is None
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
+    rng, solid = np.random.default_rng(seed), bush()
+    T, expected = (np.eye(4), np.eye(4))
+    T[:3, :3], expected[:3, :3] = (Rotation.random(random_state=rng).as_matrix() for _ in range(2))
+    axis = revolution(solid)
+    found = nearest_alike(solid, T, expected)
+    every = [
+        T @ g @ turn_about(axis.point, axis.axis, t) for g in symmetries(solid) for t in np.linspace(-np.pi, np.pi, 721)
+    ]
+    best = max(np.trace(expected[:3, :3].T @ one[:3, :3]) for one in every)
+    assert np.trace(expected[:3, :3].T @ found[:3, :3]) >= best - 1e-9
+    assert min(np.abs(found - one).max() for one in every) < 0.01
+
+
+def test_without_an_axis_it_is_the_nearest_of_the_symmetries():
+    solid, rng = scenes.block(), np.random.default_rng(1)
+    T = pose.exp(rng.standard_normal(6))
+    expected = pose.exp(rng.standard_normal(6))
+    known = T @ nearest_symmetry(symmetries(solid), (pose.inverse(expected) @ T)[None])[0]
+    assert nearest_alike(solid, T, expected).tobytes() == np.asarray(known).tobytes()
+
+
+def pinned():
+    given, at, _ = CONTACTS["shaft in hole"]
+    assembly, start, truth = scene(given, at=at)
+    demonstration = shown("block_on_block")[2]
+    careless = np.zeros((2, 6, 6))
+    return assembly, replace(demonstration, assembly=assembly, start=start, goals=truth, final=start, careless=careless)
+
+
+def test_noise_does_not_turn_a_part_of_revolution_about_its_axis():
+    assembly, demonstration = pinned()
+    turned, stated = [], []
+    for seed in range(200):
+        seen = Symmetric(Level(1.0, 1.0))(assembly, demonstration, np.random.default_rng(seed))
+        xi = pose.log(pose.inverse(seen.goals) @ demonstration.goals)
+        turned.append(xi[1, 3:])
+        stated.append(np.linalg.cholesky(seen.covariance[1]))
+    assert np.abs(np.array(turned)[:, 2]).max() < 1e-3
+    assert np.degrees(np.std(np.array(turned)[:, :2])) == pytest.approx(1.0, rel=0.15)
+    any_turn = AnyTurn(Level(1.0, 1.0))(assembly, demonstration, np.random.default_rng(0))
+    off = pose.inverse(any_turn.goals[1]) @ demonstration.goals[1]
+    assert abs(np.arctan2(off[1, 0], off[0, 0])) > 0.1
+
+
+def test_a_free_turn_of_a_part_of_revolution_is_no_error():
+    assembly, demonstration = pinned()
+    truth = demonstration.goals
+    found = revolution(assembly.solids["pin"])
+    goals = np.array(truth)
+    goals[1] = goals[1] @ turn_about(found.point, found.axis, 2.5)
+    assert goal_errors(assembly, demonstration.start, truth, goals) == pytest.approx((0.0, 0.0), abs=1e-9)
+    goals[1] = goals[1] @ pose.exp(np.array([0.0, 0.0, 3 * MM, 0, 0, 0]))
+    fixed, free = goal_errors(assembly, demonstration.start, truth, goals)
+    assert fixed == pytest.approx(0.0, abs=1e-9)
+    assert free == pytest.approx(3.0 / np.sqrt(2))
