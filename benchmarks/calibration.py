@@ -32,8 +32,12 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.observation.noise_file import read_noise
 from apo_bench.observation.presets import presets
+from apo_bench.observation.restated import restated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 
@@ -59,9 +63,11 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--draws", type=int, default=2000, help="of each model, over all scenarios")
     asked.add_argument("--only", nargs="*", help="these models; nothing is written then")
+    asked.add_argument("--stated", help="noise file that is stated in place of what a model states, with --only")
     given = asked.parse_args()
     names = given.only or [*sorted(NOISES), *(name for name in presets() if name.endswith("-inliers"))]
-    found = {name: summary(list(drawn(name, given.draws))) for name in names}
+    stated = read_noise(given.stated) if given.only and given.stated else None
+    found = {name: summary(list(drawn(name, given.draws, stated))) for name in names}
     print(table(found))
     if given.only:
         return
@@ -79,7 +85,7 @@ def main() -> None:
     PAGE.write_text(f"{head}{BEGIN}\n\n{table(found)}\n\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
-def drawn(name: str, draws: int) -> Iterator[Draw]:
+def drawn(name: str, draws: int, stated: tuple[MeasuredNoise, Camera] | None = None) -> Iterator[Draw]:
     """Observations of a model in which every operation was seen and none is an outlier."""
     scenarios = [load_scenario(one) for one in SCENARIOS]
     made = 0
@@ -94,7 +100,7 @@ def drawn(name: str, draws: int) -> Iterator[Draw]:
         truth = np.array(layout.goals)
         if seen.seen.all() and not any(outliers(name, seen, truth)):
             made += 1
-            yield measured(seen, truth)
+            yield measured(restated(seen, *stated) if stated else seen, truth)
 
 
 def outliers(name: str, seen: Observation, truth: Array) -> Iterator[bool]:

@@ -18,6 +18,7 @@ from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth
 from apo_bench.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit, outliers_by_score
 from apo_bench.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, round_split, split_of_quantiles
+from apo_bench.observation.models.empirical import residuals_text
 from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.models.tails import Split, Tail
@@ -111,6 +112,8 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     found = compared_files(*made_of.files(tmp_path, made._replace(R_seen=made.R_seen @ turned, t_seen=t)))
     assert found.round_objects == (3,)
     assert np.median(found.across_mm[(part == 2) & ~found.upright]) > 10.0
+    kinds = np.array([line.split(",")[3] for line in residuals_text(found).splitlines()[1:]])
+    assert set(kinds[part[:: -(-n // len(kinds))] == 3]) == {"turned"}
     measured = fit_noise(found, "")
     for mine, known in ((measured.shift_mm, plain.shift_mm), (measured.turn_deg, plain.turn_deg)):
         assert_allclose([*mine.across, *mine.along], [*known.across, *known.along], rtol=0.1)

@@ -59,8 +59,8 @@ class Empirical:
     """Noise whose every error is one that was measured of a pose estimator, its six numbers drawn together.
 
     It is taken as it is or with the opposite sign, both alike often, so that it is 0 in the mean: a bias of the
-    estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers that are
-    turned by more than 30 degrees are left out, as a part that looks alike when turned cannot be told from a wrong one.
+    estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers whose turn
+    is not known, as the part looks alike when turned, are left out.
     """
 
     sample: Sample
@@ -126,7 +126,7 @@ def _kind_of(residuals: Residuals, k: int) -> str:
         return _MISSED
     if not residuals.inlier[k]:
         return _OUTLIER
-    return _INLIER if residuals.upright[k] else _TURNED
+    return _INLIER if residuals.turn_known[k] else _TURNED
 
 
 def read_residuals(path: str | Path) -> Sample:
