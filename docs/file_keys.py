@@ -26,6 +26,7 @@ from apo_bench.observation.models.fitted import ConstantError, ViewNoise
 from apo_bench.observation.noise_file import noise_text, read_noise
 from apo_bench.observation.presets import presets
 from apo_bench.parts.allowed import ELEMENT_RULES
+from apo_bench.parts.stated import SCHEMA, read_stated
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import SETTINGS
 from apo_bench.scenario.file import load_scenario, scenario_names
@@ -36,6 +37,18 @@ from apo_bench.sweeps.sweep_file import read_sweep
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "guide" / "scenario.md", ROOT / "docs" / "guide" / "sweeps.md"
 POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; else `[0, 0, 0]`"}
+FIT = "`true`: it recedes by the clearance"
+AXIS = {
+    "at_mm": "a point of its axis",
+    "axis": "direction of its axis",
+    "span_mm": "from where to where along the axis, from that point",
+    "hole": "`true`: the wall of a hole; `false`: that of a shaft",
+}
+AROUND = {
+    "fit": FIT,
+    "extent_deg": "how far it reaches around the axis; else 360",
+    "toward": "from the axis to the middle of the face, of one that does not reach all around",
+}
 SHIFT = "axis of the part: `x`, `+y`, `-z`, ... or three numbers"
 
 
@@ -161,6 +174,39 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "quaternion_wxyz": "and its axes",
         },
     },
+    "Files beside parts": {
+        "": {
+            "schema": "`apo-bench/part/1`",
+            "source": "where the shape comes from",
+            "licence": "what may be done with it",
+            "density": "in kg/m^3, 1 to 25000; else 1000",
+            "friction": "sliding, or sliding, turning and rolling, as in MJCF; else MJCF's own",
+            "volume_mm3": "of the exact solid",
+            "centroid_mm": "of the exact solid",
+            "inertia_mm5": "xx, yy, zz, xy, xz, yz of the exact solid of density 1 about its centroid",
+            "faces": "one table per face: `[faces.NAME]`",
+        },
+        "faces.NAME, a plane": {
+            "kind": '`"plane"`',
+            "outline_mm": "corners, counter-clockwise as seen from outside",
+            "holes_mm": "a list of such lists, clockwise as seen from outside",
+            "fit": FIT,
+        },
+        "faces.NAME, a cylinder": {"kind": '`"cylinder"`', "radius_mm": "its radius", **AXIS, **AROUND},
+        "faces.NAME, a cone": {
+            "kind": '`"cone"`',
+            "radii_mm": "at the start and at the end of the span",
+            **AXIS,
+            **AROUND,
+        },
+        "faces.NAME, a rim": {
+            "kind": '`"rim"`',
+            "at_mm": "its middle",
+            "axis": "out of the part",
+            "radius_mm": "its radius",
+            "hole": "`true`: of a hole; `false`: of a shaft",
+        },
+    },
     "Sweep files": {
         "": {
             "scenarios": "names, or scenario files",
@@ -174,9 +220,9 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
 """File -> table -> key -> what it means."""
 HEAD = """# File keys
 
-Every key of every file that you may write. In scenario, noise and sweep files lengths are in mm and angles in degrees;
-in part files, as always in MJCF, lengths are in metres. A key that is not listed is refused, with the nearest one that
-is. *Needed*: the file is refused without it.
+Every key of every file that you may write. In TOML files lengths are in mm and angles in degrees; in part files, as
+always in MJCF, lengths are in metres. A key that is not listed is refused, with the nearest one that is. *Needed*: the
+file is refused without it.
 """
 Keys = dict[str, tuple[frozenset[str], frozenset[str]]]
 """Table -> keys that are needed, keys that are allowed."""
@@ -184,7 +230,12 @@ Keys = dict[str, tuple[frozenset[str], frozenset[str]]]
 
 def page() -> str:
     """The page, as Markdown."""
-    found = {"Scenario files": scenario_keys(), "Noise files": noise_keys(), "Sweep files": sweep_keys()}
+    found = {
+        "Scenario files": scenario_keys(),
+        "Noise files": noise_keys(),
+        "Files beside parts": face_keys(),
+        "Sweep files": sweep_keys(),
+    }
     lines = [HEAD]
     for file, tables in MEANINGS.items():
         said, known = {t: set(keys) for t, keys in tables.items()}, {t: set(k[1]) for t, k in found[file].items()}
@@ -218,6 +269,24 @@ def noise_keys() -> Keys:
             own.write_text(noise_text(replace(measured, view=ViewNoise(1.0, 1.0), constant=still)), encoding="utf-8")
             read_noise(own)
     return named(heard, lambda key: key)
+
+
+def face_keys() -> Keys:
+    """Of a file with a face of every kind."""
+    wall = "at_mm = [0, 0, 0]\naxis = [0, 0, 1]\nhole = true\n"
+    faces = {
+        "plane": "outline_mm = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n",
+        "cylinder": wall + "radius_mm = 1\nspan_mm = [0, 1]\n",
+        "cone": wall + "radii_mm = [1, 2]\nspan_mm = [0, 1]\n",
+        "rim": wall + "radius_mm = 1\n",
+    }
+    matter = "volume_mm3 = 1\ncentroid_mm = [0, 0, 0]\ninertia_mm5 = [1, 1, 1, 0, 0, 0]\n"
+    with listening() as heard, tempfile.TemporaryDirectory() as folder:
+        own = Path(folder) / "own.toml"
+        said = "".join(f'[faces.{kind}]\nkind = "{kind}"\n{keys}' for kind, keys in faces.items())
+        own.write_text(f'schema = "{SCHEMA}"\n{matter}{said}', encoding="utf-8")
+        read_stated(own)
+    return named(heard, lambda key: re.sub(r"^faces, (\w+)$", r"faces.NAME, a \1", key))
 
 
 def sweep_keys() -> Keys:
