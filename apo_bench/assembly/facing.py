@@ -10,7 +10,6 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.facing_round import measure_round, round_pairs
-from apo_bench.assembly.kinds import geometric_play
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import face_area, overlap
@@ -44,8 +43,6 @@ class Facing:
     """Half the extent of the overlap across the two axes, (2,), so that a tilt about them opens it by as much."""
     lengths: int = 1
     """How many of the residuals are lengths; the others are tilts."""
-    play_m: float = 0.0
-    """What the sizes of the two faces leave, [m]: of a shaft that is thinner than its hole."""
 
 
 def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
@@ -96,18 +93,8 @@ def facing(
         if (one.name, other.name) not in known:
             m = measure_round(one, T_a, other, T_b)
             if abs(m.gap_m) <= gap_m and m.angle_rad <= angle_rad and m.share >= share:
-                play_m = max(0.0, geometric_play(one, other))
                 yield Facing(
-                    one.name,
-                    other.name,
-                    m.gap_m,
-                    m.angle_rad,
-                    m.share,
-                    m.residual,
-                    m.slope,
-                    m.half_m,
-                    m.lengths,
-                    play_m,
+                    one.name, other.name, m.gap_m, m.angle_rad, m.share, m.residual, m.slope, m.half_m, m.lengths
                 )
 
 

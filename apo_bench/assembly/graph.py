@@ -55,6 +55,8 @@ class Arc:
     """The operation at which they disappeared, or None while they stand."""
     asked: tuple[Gap, ...] = ()
     """How far apart the faces of each contact are asked to be; empty stands for `centred` throughout."""
+    axial: bool = False
+    """Whether a round face is among them."""
 
     def __str__(self) -> str:
         return f"{self.name} {self.manipulated.part} -> {self.environment.part}"
@@ -154,7 +156,9 @@ def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]
         nodes = history[-1 if lost is None else made + 1]
         contacts = tuple(r.contact for r in relations)
         asked = tuple(assembly.gaps.get(contact, Gap()) for contact in contacts)
-        arcs.append(Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, asked))
+        arcs.append(
+            Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, asked, any(map(assembly.is_round, contacts)))
+        )
     return tuple(arcs)
 
 

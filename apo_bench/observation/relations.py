@@ -17,14 +17,17 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.facing import height, opposed
+from apo_bench.assembly.facing_round import measure_round, round_pairs
 from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.graph import relation_graph
+from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face, Solid
 from apo_bench.names import resolve
 from apo_bench.records.relations import GIVEN, SHIFT_MM, relations_name
 from apo_bench.records.short_names import RELATIONS
@@ -38,6 +41,8 @@ TOUCHING_M, NEAR_M = 0.5e-3, 15e-3
 """Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
 _COVERED_M2 = 25e-6
 """Faces that cover less of each other do not meet, (5 mm)^2."""
+_SHARED = 0.15
+"""Round faces that have less of their length in common do not meet."""
 
 
 def make_relations(given: Any) -> Relations | None:
@@ -93,8 +98,10 @@ def _complaint(right: Assembly, wrong: Any) -> str:
         return "changed parts or operations; change nothing but contacts and faces"
     for relation in wrong.relations():
         for part, face in relation.contact:
-            if part not in wrong.solids or face not in wrong.solids[part].faces:
+            if part not in wrong.solids or face not in {**wrong.solids[part].faces, **wrong.solids[part].rounds}:
                 return f"returned a contact of {part}.{face}, which is no face; name faces that the solids have"
+        if contact_kind(*(wrong.face_of(of) for of in relation.contact)) is None:
+            return f"returned the contact {relation.contact}, which faces of these kinds cannot make; name others"
     return ""
 
 
@@ -132,30 +139,32 @@ def false(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generat
 @final
 @dataclass(frozen=True)
 class Shifted:
-    """One contact, any, is told with its lower face off along the normal, outwards or inwards."""
+    """One contact, any, is told with its lower face off along the normal, outwards or inwards.
+
+    A round face is off across its axis, in any direction.
+    """
 
     size_m: float = SHIFT_MM * 1e-3
 
     def __call__(self, assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
         k, contact = _any(assembly, rng)
         part, old = contact.environment
-        by = assembly.face(contact.environment).normal * self.size_m * (1.0, -1.0)[int(rng.integers(2))]
-        solid = assembly.solids[part]
-        new = _moved(solid.faces[old], f"{old}_shifted", by)
+        sign, face = (1.0, -1.0)[int(rng.integers(2))], assembly.face_of(contact.environment)
+        new = _moved(face, f"{old}_shifted", _across(face, rng) * self.size_m * sign)
         instead = Contact(contact.manipulated, PartFace(part, new.name))
-        solids = {**assembly.solids, part: replace(solid, faces={**solid.faces, new.name: new})}
+        solids = {**assembly.solids, part: _with_face(assembly.solids[part], new)}
         contacts = tuple(instead if c == contact else c for c in assembly.operations[k].contacts)
         gaps = {**assembly.gaps, instead: assembly.gaps.get(contact, Gap())}
         return _with(replace(assembly, solids=solids, gaps=gaps), k, contacts)
 
 
 class _Pair(NamedTuple):
-    """Two faces that look at each other and do not touch."""
+    """Two faces that look at each other, or have nearly the same axis, and do not touch."""
 
     made: int
     contact: Contact
     apart_m: float
-    """Distance of their planes, in the middle."""
+    """Distance of their planes, in the middle; of their axes."""
     covered: bool
 
 
@@ -183,6 +192,12 @@ def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
                         if apart is not None and contact not in assembly.operations[k].contacts:
                             area = overlap(a, poses[part], b, poses[other]).area
                             yield _Pair(k, contact, apart, area > _COVERED_M2)
+                for one, another in round_pairs(assembly.solids[part], assembly.solids[other]):
+                    contact = Contact(PartFace(part, one.name), PartFace(other, another.name))
+                    found = measure_round(one, poses[part], another, poses[other])
+                    near = found.angle_rad < _OPPOSED_RAD and found.gap_m > TOUCHING_M
+                    if near and contact not in assembly.operations[k].contacts:
+                        yield _Pair(k, contact, found.gap_m, found.share > _SHARED)
 
 
 def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
@@ -193,8 +208,24 @@ def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
     return apart if apart > TOUCHING_M else None
 
 
-def _moved(face: Face, name: str, by: Array) -> Face:
+def _across(face: Face | RoundFace, rng: np.random.Generator) -> Array:
+    """The normal of a flat face; any direction across the axis of a round one, (3,)."""
+    if isinstance(face, Face):
+        return face.normal
+    turn = rng.uniform(0.0, 2.0 * math.pi)
+    return np.asarray(math.cos(turn) * face.frame[:3, 0] + math.sin(turn) * face.frame[:3, 1])
+
+
+def _moved(face: Face | RoundFace, name: str, by: Array) -> Face | RoundFace:
+    if isinstance(face, RoundFace):
+        return replace(face, name=name, point=face.point + by)
     return Face(name, face.outline + by, tuple(hole + by for hole in face.holes), face.fit)
+
+
+def _with_face(solid: Solid, face: Face | RoundFace) -> Solid:
+    if isinstance(face, RoundFace):
+        return replace(solid, rounds={**solid.rounds, face.name: face})
+    return replace(solid, faces={**solid.faces, face.name: face})
 
 
 def _with(assembly: Assembly, k: int, contacts: tuple[Contact, ...]) -> Assembly:

@@ -195,7 +195,7 @@ class _Around:
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.seen].any():
             return
         contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
-        play_m = (self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0) + pair.play_m
+        play_m = self.seen.assembly.play(contact, self.seen.play_m)
         C, noise = slope @ belief.covariance @ slope.T, reality(pair, play_m)
         most = pair_thresholds(self.rules, C, slack(pair, play_m), pair.lengths)
         if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:

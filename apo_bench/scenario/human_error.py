@@ -9,11 +9,14 @@ import numpy as np
 from apo_bench.assembly.goals import Layout, Poses
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly.touching import touched_contacts
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.scenario import Scenario
 
 NOTHING_M = 1e-9
 """A part that is displaced by less is where it should be."""
+_SWEEPS, _AGREED_M = 40, 1e-12
+"""Walls that are not at right angles to each other are followed in turn, so often, until all agree to within this."""
 
 _Displaced = dict[str, Array]
 """Part -> how far it lies from its true place, (3,), world, [m]."""
@@ -66,11 +69,13 @@ def careless_covariance(scenario: Scenario, careless: float) -> Array:
 def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
     """How far the faces of displaced parts lead a part astray, (3,), world, [m]."""
     led = np.zeros(3)
-    for contact in operation.contacts:
-        below = contact.environment
-        if below.part in displaced:
-            normal = poses[below.part][:3, :3] @ assembly.face(below).normal
-            led += normal * (normal @ (displaced[below.part] - led))
+    touched = touched_contacts(assembly, operation.contacts, operation.moves, poses)
+    guides = [each for each in touched if each.rests in displaced]
+    for _ in range(_SWEEPS):
+        for each in guides:
+            led += each.normal * (each.normal @ (displaced[each.rests] - led))
+        if all(abs(each.normal @ (displaced[each.rests] - led)) < _AGREED_M for each in guides):
+            break
     return led
 
 

@@ -14,9 +14,12 @@ from apo_bench.assembly.graph import arc_residuals, relation_graph
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import world_bounds
+from apo_bench.geometry.mate import mate
+from apo_bench.geometry.overlap import Overlap, overlap
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face, world_bounds
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.show.axes import axis_marks
 from apo_bench.show.save import save_figure
 from apo_bench.show.words import listed_words
 
@@ -57,8 +60,15 @@ def belief_panel(title: str, observation: Observation, goals: Array, step: int, 
 
 def _covered(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> bool:
     """Whether the faces of every contact lie over each other somewhere."""
-    ends = [((assembly.face(end), poses[end.part]) for end in contact) for contact in contacts]
-    return all(overlap(*a, *b).area > 0.0 for a, b in ends)
+    ends = [[(assembly.face_of(end), poses[end.part]) for end in contact] for contact in contacts]
+    return all(_common(*a, *b).area > 0.0 for a, b in ends)
+
+
+def _common(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Overlap:
+    """What two faces have in common; of a shaft and its hole the wall of the common length."""
+    if isinstance(a, Face) and isinstance(b, Face):
+        return overlap(a, T_a, b, T_b)
+    return mate(a, T_a, b, T_b).common
 
 
 def belief_lines(beliefs: Sequence[BeliefPanel]) -> list[str]:
@@ -79,6 +89,7 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
     """
     from matplotlib.figure import Figure
 
+    from apo_bench.simulation.scene.marks import Marks
     from apo_bench.simulation.scene.render import picture
     from apo_bench.simulation.scene.scene import build_scene
 
@@ -95,7 +106,8 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
                 f"{what}", ha="center", va="center", fontsize=12)  # fmt: skip
     for i, one in enumerate(beliefs):
         axes = figure.add_axes((i / len(beliefs), below / height, 1 / len(beliefs), _HEIGHT / height))
-        axes.imshow(picture(scene, one.poses, _WIDTH, _HEIGHT, camera))
+        marks = Marks(axis_marks(scenario.assembly, last.contacts, one.poses))
+        axes.imshow(picture(scene, one.poses, _WIDTH, _HEIGHT, camera, marks))
         axes.axis("off")
         figure.text((i + 0.5) / len(beliefs), 1 - 42 / height, one.title, ha="center", va="center", fontsize=11)
         for j, line in enumerate(_below(one)):

@@ -10,14 +10,17 @@ import numpy as np
 from apo_bench.assembly.goals import Layout
 from apo_bench.assembly.graph import Arc, Graph, relation_graph
 from apo_bench.assembly.placement import placements
+from apo_bench.assembly.touching import touched_contacts
 from apo_bench.geometry.arrays import Array
+from apo_bench.insertion.states import classify
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario
+from apo_bench.show.axes import holds_axis
 from apo_bench.show.words import listed_words
 
-_OPPOSITE = 0.99
-"""Normals whose cosine is below minus this look at each other; a face whose normal is as upright is level."""
+_LEVEL = 0.01
+"""A face is upright if its normal rises or falls by less."""
 
 
 def cards(scenarios: Sequence[Scenario], command: str, picture: str) -> str:
@@ -78,13 +81,15 @@ def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
 
 
 def _way(scenario: Scenario, arc: Arc) -> str:
-    """`into` between faces that look at each other, `against` upright ones, `onto` others."""
-    poses = placements(scenario.assembly, scenario.start, scenario.goals)[arc.made]
-    part = arc.manipulated.part
-    N = np.array([scenario.assembly.face(c.manipulated).normal for c in arc.contacts]) @ poses[part][:3, :3].T
-    if (N @ N.T).min() < -_OPPOSITE:
-        return "into"
-    return "against" if np.abs(N[:, 2]).max() < 1 - _OPPOSITE else "onto"
+    """`into` between walls, `over` what stands in its hole, `against` upright faces, `onto` others."""
+    assembly = scenario.assembly
+    poses = placements(assembly, scenario.start, scenario.goals)[arc.made]
+    touched = touched_contacts(assembly, arc.contacts, assembly.operations[arc.made].moves, poses)
+    N = np.array([each.normal for each in touched])
+    if classify(N).state.constraining:
+        rounds = [assembly.round_face(c.manipulated) for c in arc.contacts if holds_axis(assembly, c)]
+        return "over" if rounds and all(face.hole for face in rounds) else "into"
+    return "against" if np.abs(N[:, 2]).max() < _LEVEL else "onto"
 
 
 def _human(scenario: Scenario) -> Iterator[str]:
@@ -132,6 +137,12 @@ def _success(scenario: Scenario) -> Iterator[str]:
         f"another, no corner of a part more than {t.pushed_mm:g} mm from where it was put; all let go of and slower "
         f"than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
     )
+    if any(map(scenario.assembly.is_round, (relation.contact for relation in scenario.assembly.relations()))):
+        yield (
+            "Of round faces the axes count, at both ends of the length that they have in common, which is their "
+            "overlap; a hole that is wider than its shaft allows that much more. A part of revolution may end at any "
+            "turn about its axis."
+        )
     away = sorted(fixtures(scenario.assembly))
     if away:
         yield f"Where {listed_words(away)} ends is free: it is a fixture, used and put away."

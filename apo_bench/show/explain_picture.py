@@ -13,6 +13,7 @@ from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, extent, world_bounds
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
 from apo_bench.show.save import save_figure
 from apo_bench.show.words import listed_words, with_article
@@ -55,7 +56,9 @@ def draw_explanation(scenario: Scenario, observation: Observation, found: Explan
     camera = camera_view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
     marks = [mark for one in drawn for mark in _marks(one, -_looking(azimuth))]
     poses = {**observation.start, **{part.part: part.pose for part in found.parts}}
-    image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks(marks))
+    standing = [relation.contact for relation in scenario.assembly.relations() if relation.lost is None]
+    lines = axis_marks(scenario.assembly, standing, poses)
+    image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks([*marks, *lines]))
     fovy = float(scene.shown.model.vis.global_.fovy)
     names = [(mark, pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)) for mark in marks]
     figure = _captioned(image, scenario, found, drawn)

@@ -17,6 +17,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Contact
+from apo_bench.assembly.touching import outline_points
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.solid import world_bounds
@@ -30,6 +31,7 @@ from apo_bench.records.run.replay_command import Files
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import TrialSettings
 from apo_bench.report.failures import FailurePicture
+from apo_bench.show.axes import axis_marks
 
 _WIDTH, _HEIGHT, _QUALITY = 640, 480, 82
 _NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
@@ -156,12 +158,12 @@ def _mark(row: Row, scene: Any, poses: Poses) -> Any:
     contact, assembly = _failed_contact(row, scene), scene.scenario.assembly
     if contact is None:
         return None
-    part, face = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment
-    if part not in poses:
+    of = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment
+    if of.part not in poses:
         return None
-    corners = assembly.solids[part].faces[face].outline
-    middle = poses[part][:3, :3] @ corners.mean(axis=0) + poses[part][:3, 3]
-    return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW)])
+    middle = outline_points(assembly, of, poses).mean(axis=0)
+    lines = axis_marks(assembly, [contact], poses) if all(each.part in poses for each in contact) else []
+    return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW), *lines])
 
 
 def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:

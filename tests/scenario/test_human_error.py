@@ -16,6 +16,8 @@ from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Carelessness, Scenario
+from tests import rounds
+from tests.scenes import Scene
 
 SCENARIOS = {name: load_scenario(name) for name in scenario_names()}
 CARELESS = sorted(name for name, scenario in SCENARIOS.items() if scenario.careless)
@@ -98,3 +100,30 @@ def test_the_covariance_is_the_mean_square_of_every_operation_that_errs(name: st
             expected[k, :3, :3] = square
     assert covariance == pytest.approx(expected, abs=1e-18)
     assert not careless_covariance(scenario, 0.0).any()
+
+
+def led(scene: Scene, operation: int, offset: np.ndarray) -> np.ndarray:
+    """The errors of all operations of a scene, (n, 3), where one is off; its last operation is a free one more."""
+    last = replace(scene.assembly.operations[-1], contacts=())
+    assembly = replace(scene.assembly, operations=(*scene.assembly.operations, last))
+    goals = np.concatenate([scene.goals, scene.goals[-1:]])
+    careless = Carelessness(operation, np.array([1.0, 0.0, 0.0]), 0.0, 0.01)
+    scenario = replace(SCENARIOS["stick_in_tower"], assembly=assembly, goals=goals, careless=careless)
+    return spread_error(scenario, Layout(goals, scene.start), offset).offsets[:-1]
+
+
+def test_a_shaft_follows_its_bore_across_the_axis_and_not_along() -> None:
+    scene = rounds.peg_in_plate()
+    found = led(scene, 0, np.array([0.003, -0.002, 0.0]))
+    assert found[1] == pytest.approx([0.003, -0.002, 0.0], abs=1e-12)
+    scene = rounds.through()
+    world = scene.goals[0][:3, :3] @ np.array([0.001, 0.0, 0.004])
+    found = led(scene, 1, np.array([0.001, 0.0, 0.004]))
+    peg = scene.goals[2][:3, :3] @ found[2]
+    assert peg == pytest.approx([world[0], 0.0, world[2]], abs=1e-12)
+
+
+def test_walls_that_are_not_at_right_angles_lead_as_far_as_all_agree() -> None:
+    scene = rounds.dovetail()
+    found = led(scene, 0, np.array([0.004, 0.003, 0.0]))
+    assert found[1] == pytest.approx([0.0, 0.003, 0.0], abs=1e-9)

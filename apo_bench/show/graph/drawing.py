@@ -15,7 +15,7 @@ _PALE = 0.75
 """How much white is in the colour of a part."""
 _MARGIN, _HEAD, _FOOT = 0.15, 0.32, 0.3
 """Inches around the graph, and for the title above it and the words below it."""
-_DASHES = (0, (4, 2.5))
+_DASHES, _DASH_DOTS = (0, (4, 2.5)), (0, (9, 2, 1.5, 2))
 
 _Colors = Mapping[str, tuple[float, float, float]]
 
@@ -104,7 +104,7 @@ def _arrow(axes: Any, layout: GraphLayout, i: int, arc: Arc, text: str, alarming
             arrowstyle="-|>,head_length=5,head_width=2.2",
             color=color,
             linewidth=1.1,
-            linestyle="-" if arc.lost is None else _DASHES,
+            linestyle=_DASHES if arc.lost is not None else _DASH_DOTS if arc.axial else "-",
             joinstyle="round",
             zorder=1,
         )
@@ -131,6 +131,7 @@ def _formula(node: Node) -> str:
 def _words(graph: Graph, measured: bool, gap_m: float) -> str:
     """What dashes and colours mean, if there are any."""
     said = ["dashed: disappeared"] if any(arc.lost is not None for arc in graph.arcs) else []
+    said += ["dash-dot: about an axis"] if any(arc.axial and arc.lost is None for arc in graph.arcs) else []
     said += [f"red: above {gap_m * 1e3:g} mm"] if measured else []
     return "; ".join(said)
 

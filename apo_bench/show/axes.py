@@ -1,0 +1,77 @@
+"""The axes of contacts of round faces, to be drawn as dash-dot lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.round_face import RoundFace
+
+_BEYOND_M = 0.012
+"""How far a line goes on beyond the faces."""
+_ONE_M, _ONE_COSINE = 1e-3, 1.0 - 1e-4
+"""Axes that are nearer to each other are drawn as one line."""
+_INK = (0.15, 0.15, 0.15)
+
+
+class AxisEnds(NamedTuple):
+    """A piece of an axis, (3,) each, world, [m]."""
+
+    begin: Array
+    end: Array
+
+
+def holds_axis(assembly: Assembly, contact: Contact) -> bool:
+    """Whether both faces of a contact are round, so that one axis lies on the other."""
+    return all(of.face in assembly.solids[of.part].rounds for of in contact)
+
+
+def axes_of(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> list[AxisEnds]:
+    """The axes of round faces that make contacts, each once, as long as its faces and a little longer."""
+    found: list[list[Array]] = []
+    for contact in contacts:
+        for of in contact:
+            face, T = assembly.face_of(of), poses[of.part]
+            if isinstance(face, RoundFace):
+                _add(found, pose.apply(T, face.ends), T[:3, :3] @ face.axis)
+    return [_whole(points) for points in found]
+
+
+def axis_marks(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> list[Any]:
+    """The same as marks in a picture."""
+    from apo_bench.simulation.scene.marks import AxisLine
+
+    return [AxisLine(begin, end, _INK) for begin, end in axes_of(assembly, contacts, poses)]
+
+
+def _add(found: list[list[Array]], ends: Array, axis: Array) -> None:
+    """Put the ends of a face, (2, 3), to those about the same axis."""
+    for points in found:
+        line = _direction(points, axis)
+        off = ends - points[0]
+        across = np.linalg.norm(off - np.outer(off @ line, line), axis=1)
+        if abs(line @ axis) > _ONE_COSINE and across.max() < _ONE_M:
+            points.extend(ends)
+            return
+    found.append(list(ends))
+
+
+def _direction(points: list[Array], axis: Array) -> Array:
+    """Along points of one line, (3,); the axis if they are one point, as of a rim."""
+    way = points[1] - points[0]
+    size = float(np.linalg.norm(way))
+    return way / size if size > _ONE_M else axis
+
+
+def _whole(points: list[Array]) -> AxisEnds:
+    far = max(points, key=lambda p: float(np.linalg.norm(p - points[0])))
+    line = far - points[0]
+    line = line / max(float(np.linalg.norm(line)), 1e-12)
+    at = [float((p - points[0]) @ line) for p in points]
+    return AxisEnds(points[0] + (min(at) - _BEYOND_M) * line, points[0] + (max(at) + _BEYOND_M) * line)
