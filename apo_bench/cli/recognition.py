@@ -27,7 +27,8 @@ def recognise(
     deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
     deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
     relations: Annotated[
-        str, typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), or recognised-twice.")
+        str,
+        typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), recognised-twice or recognised-jointly."),
     ] = "recognised",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
     **asked: Any,
@@ -35,7 +36,7 @@ def recognise(
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
     from apo_bench.records.relations import RECOGNISED
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.recognised_text import difference_lines, evidence_table, recognition_form
+    from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
     from apo_bench.sweeps.one import looked_at
     from apo_bench.trial.recognised_contacts import recognise_by
 
@@ -52,7 +53,7 @@ def recognise(
     _print(evidence_table(found, seen.assembly))
     if assumed:
         typer.echo("\n" + assumed_deviations(deviation_mm, deviation_deg))
-    typer.echo("\n" + "\n".join(difference_lines(seen, found)))
+    typer.echo("\n" + "\n".join([*confidence_line(found), *difference_lines(seen, found)]))
     if not seen.seen.all():
         missing = ", ".join(str(k + 1) for k, was in enumerate(seen.seen) if not was)
         typer.echo(f"not seen, so nothing is recognised there: operation {missing}")

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.convex import all_boxes, piece_corners, separating_axes, shadow
 from apo_bench.geometry.solid import Piece, Solid
 
 _TOUCHING_M = 1e-6
 """Balls around solids are apart if this far from each other, whatever was rounded."""
+
+
+class WaysOut(NamedTuple):
+    """The directions in which one piece may leave another one."""
+
+    directions: Array
+    """(k, 3), of the first piece, world, unit length."""
+    lengths: Array
+    """(k,), how far, [m]."""
+    at: Array
+    """(3,): the middle of the smaller piece, world, [m]."""
 
 
 def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
@@ -45,6 +60,33 @@ def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece
     between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
     apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
     return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
+
+
+def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[WaysOut]:
+    """Of each pair of pieces of two posed solids that are deeper in each other, how they may be taken apart."""
+    R_a, R_b = T_a[:3, :3], T_b[:3, :3]
+    if _all_boxes(a.pieces) and _all_boxes(b.pieces):
+        axes = _axes(R_a, R_b)
+        (centers_a, halves_a), (centers_b, halves_b) = _boxes(a.pieces), _boxes(b.pieces)
+        reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ R_b).T)[None]
+        between = pose.apply(T_a, centers_a)[:, None] - pose.apply(T_b, centers_b)[None]
+        along = between @ axes.T
+        depths = reach - np.abs(along)
+        for i, j in np.argwhere(depths.min(axis=-1) > deep_m):
+            yield _ways(a.pieces[i], T_a, b.pieces[j], T_b, axes, along[i, j], depths[i, j])
+        return
+    for own, other in product(a.pieces, b.pieces):
+        axes = separating_axes(own, R_a, other, R_b)
+        (middle_a, half_a), (middle_b, half_b) = shadow(own, R_a, axes), shadow(other, R_b, axes)
+        along = axes @ (T_a[:3, 3] - T_b[:3, 3]) + middle_a - middle_b
+        depths = half_a + half_b - np.abs(along)
+        if depths.min() > deep_m:
+            yield _ways(own, T_a, other, T_b, axes, along, depths)
+
+
+def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array, depths: Array) -> WaysOut:
+    piece, T = (a, T_a) if a.half.max() < b.half.max() else (b, T_b)
+    return WaysOut(axes * np.where(along < 0.0, -1.0, 1.0)[:, None], depths, pose.apply(T, piece.center[None])[0])
 
 
 def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:

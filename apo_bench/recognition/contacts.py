@@ -47,6 +47,13 @@ class Evidence:
     """The gap at the goals as they were seen."""
 
 
+class Rival(NamedTuple):
+    """The next best set of contacts, where several were compared."""
+
+    assembly: Assembly
+    probability: float
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Recognised:
@@ -55,6 +62,9 @@ class Recognised:
     assembly: Assembly
     evidence: tuple[Evidence, ...]
     """One for each contact, in the order of `assembly.relations()`."""
+    probability: float | None = None
+    """Of the set among those that were compared to the end; None where sets are not compared."""
+    rival: Rival | None = None
 
 
 def recognise(

@@ -3,7 +3,7 @@
 `given`             the right ones
 `missed`, `false`   one too few, one too many
 `shifted:3`         one face is not where the model of its part says, by 3 mm
-`recognised`        found in what was seen; `recognised-fixed` and `recognised-twice` in other ways
+`recognised`        found in what was seen; `recognised-fixed`, `recognised-twice`, `recognised-jointly` in other ways
 `module:name`       a function of somebody's own
 """
 
@@ -17,7 +17,7 @@ from apo_bench.records.short_names import RELATIONS
 GIVEN = "given"
 """The contacts come with the demonstration, and are right."""
 WRONG = tuple(RELATIONS)
-RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice")
+RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice", "recognised-jointly")
 _KINDS = (GIVEN, *WRONG, *RECOGNISED)
 SHIFT_MM, _LARGEST_SHIFT_MM = 2.0, 50.0
 

@@ -148,14 +148,14 @@ class TrialSettings:
         default="given",
         metadata=about(
             "What correctors are told of the contacts: given (right), recognised, recognised-fixed (thresholds), "
-            "recognised-twice, missed, false, shifted:3 (mm)",
+            "recognised-twice, recognised-jointly, missed, false, shifted:3 (mm)",
             spelled=checked_relations,
             key=True,
             axis="relations",
         ),
     )
-    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`, or wrong
-    ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
+    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`,
+    `recognised-jointly`, or wrong ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
     method: Name = field(
         default=METHOD,
         metadata=about(

@@ -10,7 +10,9 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.recognition.contacts import Evidence, Recognised
 from apo_bench.trial.recognised_contacts import count_contacts
 
-_SCHEMA = "apo-bench/recognised/1"
+_SCHEMA = "apo-bench/recognised/2"
+_SURE = 0.9
+"""Sets that are less likely are called not certain."""
 
 
 def evidence_table(found: Recognised, right: Assembly) -> Any:
@@ -52,6 +54,26 @@ def difference_lines(observation: Observation, found: Recognised) -> list[str]:
     return [f"{line}, and {count['contacts_false']} that it does not have", *missed]
 
 
+def confidence_line(found: Recognised) -> list[str]:
+    """How likely the set of contacts is, and what the next best one would change; nothing where none were compared."""
+    if found.probability is None:
+        return []
+    said = f"this set of contacts is right with probability {found.probability:.2f}, of those that were compared"
+    if found.probability < _SURE:
+        said = f"not certain: {said}"
+    if found.rival is None:
+        return [said]
+    added, gone = _changes(found.assembly, found.rival.assembly)
+    change = [f"{word} {', '.join(names)}" for word, names in (("with", added), ("without", gone)) if names]
+    return [f"{said}; the next ({found.rival.probability:.2f}) is {' and '.join(change)}"]
+
+
+def _changes(best: Assembly, other: Assembly) -> tuple[list[str], list[str]]:
+    """What another set has more, and what it lacks: `5: cube.px on castle2.nx`."""
+    mine, others = ({f"{r.made + 1}: {r.contact}" for r in of.relations()} for of in (best, other))
+    return sorted(others - mine), sorted(mine - others)
+
+
 def recognition_form(
     name: str, kind: str, observation: Observation, found: Recognised, assumed: bool
 ) -> dict[str, Any]:
@@ -68,7 +90,17 @@ def recognition_form(
             for made, contact in _missed(observation.assembly, found)
         ],
         **count_contacts(observation.assembly, found.assembly),
+        "probability": found.probability,
+        "next": _rival_form(found),
     }
+
+
+def _rival_form(found: Recognised) -> dict[str, Any] | None:
+    """The next best set: how likely it is, and in what it differs."""
+    if found.rival is None:
+        return None
+    added, gone = _changes(found.assembly, found.rival.assembly)
+    return {"probability": found.rival.probability, "with": added, "without": gone}
 
 
 def _evidence_form(e: Evidence) -> dict[str, Any]:

@@ -1,9 +1,10 @@
 """Relations that were recognised instead of given, and how many of them are right.
 
-`recognised`        from the seen poses and their stated noise
-`recognised-fixed`  with the paper's fixed thresholds
-`recognised-twice`  recognised, corrected by `contact`, and recognised again where the correction puts the parts, with
-                    what it leaves uncertain as the noise
+`recognised`          from the seen poses and their stated noise
+`recognised-fixed`    with the paper's fixed thresholds
+`recognised-twice`    recognised, corrected by `contact`, and recognised again where the correction puts the parts, with
+                      what it leaves uncertain as the noise
+`recognised-jointly`  contacts and poses decided together: the set of contacts that explains best what was seen
 
 The truth, the robot and the judge keep the relations of the scenario.
 """
@@ -17,6 +18,7 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.contacts import Recognised, recognise
+from apo_bench.recognition.jointly import recognise_jointly
 from apo_bench.recognition.thresholds import FIXED_RULES
 
 
@@ -24,6 +26,8 @@ def recognise_by(observation: Observation, kind: str = "recognised") -> Recognis
     """The contacts of an observation, found in one of the ways of `RECOGNISED`; its own are not looked at."""
     if kind == "recognised-fixed":
         return recognise(observation, FIXED_RULES)
+    if kind == "recognised-jointly":
+        return recognise_jointly(observation)
     first = recognise(observation)
     return first if kind == "recognised" else _again(observation, first)
 

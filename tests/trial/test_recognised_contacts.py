@@ -137,7 +137,7 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
     path.write_text("\n".join([header, ",".join(cells), *rest]) + "\n", encoding="utf-8")
     assert cli.main(["recognise", "stick_in_tower", "--observation", str(path), "--json"]) == 0
     form = json.loads(capsys.readouterr().out)
-    assert form["schema"] == "apo-bench/recognised/1"
+    assert form["schema"] == "apo-bench/recognised/2"
     assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} in form["missed"]
     assert form["contacts_missed"] == len(form["missed"])
     assert form["contacts_right"] == sum(contact["in_scenario"] for contact in form["contacts"])

@@ -42,6 +42,7 @@ RECOGNITION_STYLES = {
     "recognised": Style("#009e73", "o", _SOLID),
     "recognised-fixed": Style("#d55e00", "s", _DASHED),
     "recognised-twice": Style("#0072b2", "^", _DOTTED),
+    "recognised-jointly": Style("#cc79a7", "D", _SOLID),
 }
 SEEN = Style(SOFT, "o", _SOLID)
 """What was observed, before any method."""

@@ -1,0 +1,104 @@
+"""Goals and contacts together: where the goals are if a set of contacts holds, and how likely the set is.
+
+Given a set, the observation is Gaussian about the contact manifold. Without it, parts lie anywhere in a room that is
+much wider than the noise. What contacts leave at the observation, r = J xi - e, has the covariance J C J^t + S in the
+first case and J (C + R) J^t + S in the second, with C the noise, R the room and S what play and soft contacts add. The
+set explains the observation better than chance by
+
+    log |J (C + R) J^t + S| - log |J C J^t + S| - r^t (J C J^t + S)^-1 r,
+
+twice the logarithm of a Bayes factor (of Savage and Dickey, with a room so wide that only its size counts). An equation
+that others imply adds as much to one determinant as to the other, so it gains nothing, as it should.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.equations import equations, pattern
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.shared_error import joint_covariance
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import right_jacobian
+
+SOFT_M = 0.1e-3
+"""Standard deviation of a contact that is there, [m]: parts sink in a little."""
+_ROOM = np.repeat([40e-3, radians(23.0)], 3)
+"""(6,): standard deviation of where a part may lie by chance, near others that it does not touch, [m, rad]."""
+_CARRIED = 3.0
+"""So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
+_TURNS, _SMALL = 6, 1e-5
+"""Steps of Gauss and Newton at most; they end when no goal moves by more, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The likeliest goals of the first operations if some contacts hold."""
+
+    assembly: Assembly
+    """The first n operations, with these contacts."""
+    goals: Array
+    """(n, 4, 4), world frame, [m]."""
+    covariance: Array
+    """(6 n, 6 n), of the body twists by which they are wrong, [m, rad]."""
+    room: Array
+    """(6 n, 6 n), the same if nothing had been seen but the contacts."""
+    badness: float
+    """-2 log of the Bayes factor of the contacts against none."""
+
+
+def estimate(seen: Observation, assembly: Assembly, begin: Array) -> Estimate:
+    """Solve for goals and contacts together.
+
+    Args:
+        seen: What was seen; its contacts do not matter.
+        assembly: Its first n operations, with the contacts that are supposed.
+        begin: (n, 4, 4), goals to begin with.
+    """
+    n = len(begin)
+    C = joint_covariance(seen.goals, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
+    room = C + np.diag(np.tile(_ROOM**2, n))
+    back, goals = pose.inverse(seen.goals[:n]), begin
+    system, S = equations(assembly, seen.start, begin), _softness(assembly, seen.play_m)
+    xi = pose.log(back @ goals)
+    for _ in range(_TURNS):
+        e, J = system.linearised(goals)
+        Jr = right_jacobian(xi)
+        J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
+        CJ, r = C @ J.T, J @ xi.ravel() - e
+        A = J @ CJ + S
+        new = (CJ @ np.linalg.solve(A, r)).reshape(n, 6)
+        step, xi = np.abs(new - xi).max(initial=0.0), new
+        goals = seen.goals[:n] @ pose.exp(xi)
+        if step < _SMALL:
+            break
+    B = J @ room @ J.T + S
+    gain = np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]
+    badness = float(r @ np.linalg.solve(A, r) - gain)
+    return Estimate(assembly, goals, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
+
+
+def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
+    """What is uncertain of goals once equations hold, as body twists at these goals."""
+    n, JC = len(Jr), J @ C
+    left = C - JC.T @ np.linalg.solve(A, JC)
+    turned = np.einsum("kab,kblc,ldc->kald", Jr, left.reshape(n, 6, n, 6), Jr).reshape(6 * n, 6 * n)
+    return np.asarray((turned + turned.T) / 2)
+
+
+def _softness(assembly: Assembly, play_m: float) -> Array:
+    """(m, m): covariance of all equations of contacts that are there, [m^2]; their vertices together are off as one."""
+    each = []
+    for operation in assembly.operations:
+        for contact in operation.contacts:
+            plays = float(assembly.is_fit(contact)) + (_CARRIED - 1.0) * bool(operation.carries)
+            each.append(SOFT_M**2 + plays * play_m**2 / 3.0)
+    count = np.diff(pattern(assembly).begin)
+    return np.diag(np.repeat(np.array(each).reshape(-1) * count, count))

@@ -1,0 +1,233 @@
+"""Contacts and poses decided together: of many sets of contacts the one that explains best what was seen.
+
+Operation by operation, pairs of faces that may touch are taken or refused, the surest first; each set is scored with
+the goals that it asks for (`estimate`), by how much better it explains what was seen than chance does, less what it
+takes for granted: relations beyond the first, and what physics forbids. The best few sets go on to the next operation,
+which may turn the order round: a stick that fits through two castles says how these were stacked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from heapq import heappop, heappush
+from math import exp, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.facing import face_gap
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.placement import placements
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.errors import InputError, kind
+from apo_bench.geometry.arrays import Array
+from apo_bench.recognition.contacts import Evidence, Recognised, Rival
+from apo_bench.recognition.estimate import estimate
+from apo_bench.recognition.physics import IMPOSSIBLE, inside, refusal, surprise
+from apo_bench.recognition.situation import Candidate, Situation
+from apo_bench.recognition.thresholds import Rules
+
+GENEROUS_RULES = Rules(gap_m=50e-3, angle_rad=radians(45.0))
+"""What is looked at; what is a contact the score says."""
+_RELATION = 2.4
+"""-2 log of how often faces that may touch do, beyond the relation by which a part rests: three in ten."""
+_KEPT, _ENDINGS, _SITUATIONS = 3, 6, 50
+"""Sets that go on to the next operation; sets of one operation that are followed to the end, and steps of that."""
+_HOPELESS, _LOST = 12.0, 16.0
+"""A set is given up that is worse than the best by so much, in twice the logarithm; and one that throws so much
+evidence away, beyond what physics says against the best."""
+
+
+def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -> Recognised:
+    """Find the face contacts of every operation together; those that the observation came with are not looked at.
+
+    Returns:
+        The best set, with how likely it is among those that were compared to the end, and the next best one.
+
+    Raises:
+        InputError: Something else was given.
+    """
+    for given, wanted in ((observation, Observation), (rules, Rules)):
+        if not isinstance(given, wanted):
+            raise InputError(
+                f"{kind(given)} was given to recognise_jointly; an Observation is allowed (read_observation reads one "
+                "from a file), and as rules Rules(...) of apo_bench.recognition.thresholds."
+            )
+    bare = tuple(replace(operation, contacts=()) for operation in observation.assembly.operations)
+    seen = replace(observation, assembly=replace(observation.assembly, operations=bare, gaps={}))
+    kept, known = [_History()], set(seen.assembly.fixed)
+    for k, operation in enumerate(bare):
+        others = tuple(p for p in seen.assembly.solids if p in known - set(operation.moves))
+        ended: dict[tuple[frozenset[Contact], ...], _History] = {}
+        for history in kept:
+            for one in _Search(seen, rules, k, others, history).endings():
+                now = history.followed(one)
+                if now.badness < ended.get(now.key, _History(badness=np.inf)).badness:
+                    ended[now.key] = now
+        ranked = sorted(ended.values(), key=lambda one: one.badness)
+        kept = [one for one in ranked[:_KEPT] if one.badness <= ranked[0].badness + _HOPELESS]
+        known |= set(operation.moves)
+    return _recognised(seen, kept)
+
+
+@dataclass(frozen=True, eq=False)
+class _History:
+    """The contacts of the operations so far, and what comes of them."""
+
+    taken: tuple[tuple[Candidate, ...], ...] = ()
+    goals: Array | None = None
+    surprise: float = 0.0
+    badness: float = 0.0
+
+    @cached_property
+    def key(self) -> tuple[frozenset[Contact], ...]:
+        """What makes it another one."""
+        return tuple(frozenset(c.contact for c in some) for some in self.taken)
+
+    def followed(self, one: _Partial) -> _History:
+        """With one operation more."""
+        return _History((*self.taken, one.taken), one.at.estimate.goals, one.surprise, one.badness)
+
+
+class _Partial(NamedTuple):
+    """Some pairs of faces of one operation taken, some refused."""
+
+    at: Situation
+    taken: tuple[Candidate, ...]
+    refused: frozenset[Contact]
+    near: tuple[Candidate, ...]
+    """Those that were not taken, where the taken ones put the parts."""
+    surprise: float
+    """What all contacts so far take for granted."""
+
+    @property
+    def badness(self) -> float:
+        """-2 log of how likely the contacts are, but for a constant."""
+        return self.at.estimate.badness + self.surprise
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The sets of one operation after a history."""
+
+    seen: Observation
+    rules: Rules
+    k: int
+    others: tuple[str, ...]
+    history: _History
+
+    def endings(self) -> Iterator[_Partial]:
+        """Sets to which nothing can be added, first where least evidence is thrown away; none at the worst."""
+        beginning = self._with((), np.concatenate([*self._before(), self.seen.goals[self.k : self.k + 1]]))
+        waiting: list[tuple[float, int, _Partial]] = [(0.0, 0, beginning)]
+        ended, steps, offence = 0, 0, IMPOSSIBLE
+        while waiting and ended < _ENDINGS and steps < _SITUATIONS:
+            lost, _, partial = heappop(waiting)
+            if lost > _LOST + offence:
+                break
+            while (best := self._likeliest(partial)) is not None:
+                steps += 1
+                if best.implied:
+                    partial = self._taking(partial, tuple(c for c in self._open(partial) if c.implied))
+                    continue
+                taking = self._taking(partial, (best,))
+                refusing = partial._replace(refused=partial.refused | {best.contact})
+                if inside(taking.at, self.rules, taking.taken, *best.parts) >= IMPOSSIBLE:
+                    partial = refusing
+                    continue
+                net = best.distance - best.gain + self._rare(partial, best) - refusal(best, partial.near)
+                other, less = (taking, net) if net > 0.0 else (refusing, max(0.0, self._rival(partial, taking) - net))
+                heappush(waiting, (lost + less, steps, other))
+                partial = refusing if net > 0.0 else taking
+            if not any(c.implied and c.distance <= self.rules.most for c in partial.near):
+                ended += 1
+                offended = surprise(partial.at, self.rules, partial.taken, partial.near)
+                offence = min(offence, offended)
+                yield partial._replace(surprise=partial.surprise + offended)
+        if not ended:
+            yield beginning._replace(surprise=beginning.surprise + IMPOSSIBLE)
+
+    def _open(self, partial: _Partial) -> list[Candidate]:
+        return [c for c in partial.near if c.contact not in partial.refused and c.distance <= self.rules.most]
+
+    def _likeliest(self, partial: _Partial) -> Candidate | None:
+        """The pair that is surest to touch, of those that are neither taken nor refused."""
+        return min(self._open(partial), key=lambda c: (c.distance - c.gain, c.contact), default=None)
+
+    def _rival(self, partial: _Partial, taking: _Partial) -> float:
+        """What the best of the pairs promises that one more contact puts out of the question, at most 0."""
+        left = {c.contact for c in (*self._open(taking), *taking.taken)}
+        return min([0.0, *(c.distance - c.gain for c in self._open(partial) if c.contact not in left)])
+
+    def _rare(self, partial: _Partial, c: Candidate) -> float:
+        """What it takes for granted that this pair touches, beside those that were taken."""
+        related = {one.parts for one in partial.taken}
+        return _RELATION if related and c.parts not in related else 0.0
+
+    def _taking(self, partial: _Partial, some: tuple[Candidate, ...]) -> _Partial:
+        rare = sum(self._rare(partial, c) for c in some if not c.implied)
+        return self._with((*partial.taken, *some), partial.at.estimate.goals, partial.refused, partial.surprise + rare)
+
+    def _with(
+        self,
+        taken: tuple[Candidate, ...],
+        begin: Array,
+        refused: frozenset[Contact] = frozenset(),
+        surprise: float | None = None,
+    ) -> _Partial:
+        """The set with the goals that it asks for, and what is near there."""
+        sets = (*self.history.taken, taken)
+        at = Situation(self.seen, self.others, estimate(self.seen, _first(self.seen.assembly, sets), begin))
+        near = at.candidates(self.rules, [c.contact for c in taken])
+        return _Partial(at, taken, refused, near, self.history.surprise if surprise is None else surprise)
+
+    def _before(self) -> list[Array]:
+        """The goals of the operations before, none of the first one."""
+        return [] if self.history.goals is None else [self.history.goals]
+
+
+def _first(assembly: Assembly, sets: tuple[tuple[Candidate, ...], ...]) -> Assembly:
+    """The first operations, with these contacts."""
+    operations = tuple(
+        replace(operation, contacts=tuple(c.contact for c in taken))
+        for operation, taken in zip(assembly.operations, sets, strict=False)
+    )
+    return replace(assembly, operations=operations)
+
+
+def _recognised(seen: Observation, kept: list[_History]) -> Recognised:
+    """The best of the histories, with how likely it is, and the next best one."""
+    weights = [exp(-0.5 * (one.badness - kept[0].badness)) for one in kept]
+    likely = [weight / sum(weights) for weight in weights]
+    ordered = [tuple(_in_order(seen, k, taken) for k, taken in enumerate(one.taken)) for one in kept[:2]]
+    rival = Rival(_first(seen.assembly, ordered[1]), likely[1]) if len(kept) > 1 else None
+    return Recognised(_first(seen.assembly, ordered[0]), _evidence(seen, ordered[0]), likely[0], rival)
+
+
+def _in_order(seen: Observation, k: int, taken: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """In the order of parts and faces."""
+    solids = seen.assembly.solids
+    parts = (seen.assembly.operations[k].moves, tuple(solids))
+    return tuple(
+        sorted(
+            taken,
+            key=lambda c: [
+                i
+                for of, among in zip(c.contact, parts, strict=True)
+                for i in (among.index(of.part), list(solids[of.part].faces).index(of.face))
+            ],
+        )
+    )
+
+
+def _evidence(seen: Observation, sets: tuple[tuple[Candidate, ...], ...]) -> tuple[Evidence, ...]:
+    """What speaks for each contact."""
+    found = list[Evidence]()
+    for k, (taken, as_seen) in enumerate(zip(sets, placements(seen.assembly, seen.start, seen.goals), strict=True)):
+        for c in taken:
+            (a, b), pair = c.contact, c.pair
+            seen_gap_m = face_gap(seen.assembly.face(a), as_seen[a.part], seen.assembly.face(b), as_seen[b.part])
+            found.append(Evidence(c.contact, k, pair.gap_m, pair.angle_rad, pair.share, c.most, seen_gap_m))
+    return tuple(found)

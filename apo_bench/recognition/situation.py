@@ -1,0 +1,149 @@
+"""Where one operation put things if some contacts hold: which faces may touch, how sure that is, what stands around."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import hypot, radians, sqrt
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.facing import Facing, facing
+from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.topology import Contact, PartFace
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid
+from apo_bench.recognition.belief import Belief, PartBeliefs
+from apo_bench.recognition.estimate import Estimate
+from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
+
+_IMPLIED = 1.0
+"""A contact that gains less by closing, in twice the logarithm, closes anyway if those before do."""
+_FLAT = np.diag([0.2e-3, radians(0.3), radians(0.3)]) ** 2
+"""(3, 3): gap and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
+
+
+class Candidate(NamedTuple):
+    """A pair of faces that may touch."""
+
+    contact: Contact
+    pair: Facing
+    most: PairThresholds
+    distance: float
+    """Squared Mahalanobis length of its residual."""
+    gain: float
+    """Twice the logarithm of how much likelier a closed pair is than one anywhere in the room that is left."""
+    deviation_m: float
+    """Of its gap."""
+    normal: Array
+    """Of the environment face, (3,), world."""
+
+    @property
+    def implied(self) -> bool:
+        """Whether it is no choice: where the contacts hold that were taken before, these faces touch."""
+        return self.gain < _IMPLIED
+
+    @property
+    def parts(self) -> tuple[str, str]:
+        """Manipulated, environment."""
+        return self.contact.manipulated.part, self.contact.environment.part
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """The parts after operation k, the last of those that were estimated."""
+
+    seen: Observation
+    others: tuple[str, ...]
+    """The parts that stand there, and are not moved by the operation."""
+    estimate: Estimate
+
+    @property
+    def k(self) -> int:
+        """The operation, counted from 0."""
+        return len(self.estimate.goals) - 1
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """The parts that it moved."""
+        return self.seen.assembly.operations[self.k].moves
+
+    @cached_property
+    def now(self) -> PartBeliefs:
+        """Where every part is, and what errors of the goals do to it."""
+        known = self.estimate
+        return Belief(known.assembly, self.seen.start, known.goals, known.covariance).standing(self.k)
+
+    def pairs(self) -> Iterator[tuple[str, str]]:
+        """A part that was moved and one that stands there, both where something was seen."""
+        for a in self.moves:
+            for b in self.others:
+                if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.seen[: self.k + 1]].any():
+                    yield a, b
+
+    def variances(self, a: str, b: str, directions: Array, at: Array) -> Array:
+        """How uncertain it is where a point of part a, at (3,), is beside part b along directions, (k, 3), [m^2]."""
+        J = np.concatenate([directions, np.cross(at, directions)], axis=1) @ self._reach(a, b)
+        return np.maximum(np.einsum("ki,ij,kj->k", J, self.estimate.covariance, J), 0.0)
+
+    def middle(self, part: str) -> Array:
+        """The middle of the box around a part, (3,), world, [m]."""
+        return pose.apply(self.now.poses[part], self.seen.assembly.solids[part].bounds.mean(axis=0)[None])[0]
+
+    def candidates(self, rules: Rules, taken: Collection[Contact]) -> tuple[Candidate, ...]:
+        """The pairs of faces within the thresholds that were not taken yet."""
+        found = list[Candidate]()
+        for a, b in self.pairs():
+            known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
+            of_a, of_b = self.seen.assembly.solids[a], self.seen.assembly.solids[b]
+            most = self._bounds(rules, a, b)
+            bounds = {"gap_m": most.gap_m, "angle_rad": most.angle_rad, "share": rules.share}
+            for pair in facing(of_a, self.now.poses[a], of_b, self.now.poses[b], **bounds, known=known):
+                found += self._judged(rules, a, b, pair)
+        return tuple(found)
+
+    def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
+        """The pair as a candidate, if it is one."""
+        contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
+        play_m = self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0
+        J, noise, e = pair.slope @ self._reach(a, b), reality(pair, play_m), pair.residual
+        C, room = J @ self.estimate.covariance @ J.T, J @ self.estimate.room @ J.T
+        most = pair_thresholds(rules, C, slack(pair, play_m))
+        distance = float(e @ np.linalg.solve(C + noise, e))
+        if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
+            return
+        soft = noise + _FLAT
+        gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
+        normal = self.now.poses[b][:3, :3] @ self.seen.assembly.solids[b].faces[pair.b].normal
+        yield Candidate(contact, pair, most, distance, gain, sqrt(C[0, 0] + noise[0, 0]), normal)
+
+    def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:
+        """No pair of faces of two parts has wider thresholds: those of the worst point in the worst direction."""
+        at, reach = self.middle(a), self._reach(a, b)
+        shifted = np.concatenate([reach[:3] + np.cross(reach[3:].T, at).T, reach[3:]])
+        C = shifted @ self.estimate.covariance @ shifted.T
+        shift, turn = (max(float(np.linalg.eigvalsh(block)[-1]), 0.0) for block in (C[:3, :3], C[3:, 3:]))
+        sizes = [_radius(self.seen.assembly.solids[part]) for part in (a, b)]
+        worst = np.diag([shift + turn * min(sizes) ** 2, turn, turn])
+        play_m = self.seen.play_m
+        loose = PairThresholds(_LOOSE.gap_m + play_m, _LOOSE.angle_rad + 2.0 * hypot(play_m, play_m) / _NARROW_M)
+        return pair_thresholds(rules, worst, loose)
+
+    def _reach(self, a: str, b: str) -> Array:
+        """(6, 6 n): the world twist of part a beside part b that body twists of the goals make."""
+        return self.now.reach[a] - self.now.reach[b]
+
+
+_LOOSE = PairThresholds(2e-3, radians(2.0))
+"""Added to the bounds of two parts, since overlaps lie off their middles."""
+_NARROW_M = 10e-3
+"""Overlaps that parts with play may tilt in are about as narrow."""
+
+
+def _radius(solid: Solid) -> float:
+    """Half the diagonal of the box around a solid, [m]."""
+    return float(np.linalg.norm(np.ptp(solid.bounds, axis=0))) / 2
