@@ -39,9 +39,10 @@ def main(draws: int = 24) -> None:
     rows = list[dict[str, Any]]()
     for level in LEVELS:
         for scenario in scenario_names():
-            rows += [row(seen(scenario, seed, level), kind, scenario, level) for seed in range(draws) for kind in KINDS]
+            rows += [row(scenario, seed, level, kind) for seed in range(draws) for kind in KINDS]
         print("\n".join(table(rows)), flush=True)
-    KEPT.write_text(json.dumps({"draws": draws, "rows": rows}, indent=None) + "\n", encoding="utf-8")
+    wrong = [r for r in rows if not right(r)]
+    KEPT.write_text(json.dumps({"draws": draws, "wrong": wrong}, indent=1) + "\n", encoding="utf-8")
     before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
     middle = "\n".join([*table(rows), "", *by_scenario(rows), "", *by_probability(rows)])
     PAGE.write_text(f"{before}{BEGIN}\n\n{middle}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
@@ -58,13 +59,15 @@ def seen(scenario: str, seed: int, level: float) -> Observation:
     return Observation(known.assembly, noisy.start, noisy.goals, noisy.covariance, noisy.seen, play_m=play_m)
 
 
-def row(observation: Observation, kind: str, scenario: str, level: float) -> dict[str, Any]:
+def row(scenario: str, seed: int, level: float, kind: str) -> dict[str, Any]:
+    observation = seen(scenario, seed, level)
     begun = time.process_time()
     found = recognise_by(observation, kind)
     took = time.process_time() - begun
     counts = count_contacts(observation.assembly, found.assembly)
     return {
         "scenario": scenario,
+        "seed": seed,
         "level": level,
         "relations": kind,
         "seconds": round(took, 4),
