@@ -43,3 +43,14 @@ def geometric_play(a: Face | RoundFace, b: Face | RoundFace) -> float:
     assert isinstance(a, RoundFace)
     assert isinstance(b, RoundFace)
     return a.radius - b.radius if a.hole else b.radius - a.radius
+
+
+def play_mm(a: Face | RoundFace, b: Face | RoundFace, clearance_mm: float) -> float | None:
+    """How far faces that go into one another may be off, [mm]: the clearance if one is fit, and what radii leave.
+
+    None of faces that only touch.
+    """
+    fits = a.fit or b.fit
+    if not fits and contact_kind(a, b) != "shaft in hole":
+        return None
+    return clearance_mm * fits + 1e3 * geometric_play(a, b)

@@ -36,12 +36,24 @@ def shadow(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
 
 def separating_axes(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     """The directions, (k, 3), along which two pieces may be apart: across sides, and across an edge of each."""
-    (normals_a, edges_a), (normals_b, edges_b) = _sides(a), _sides(b)
-    edges_a, edges_b = edges_a @ R_a.T, edges_b @ R_b.T
-    crossed = np.cross(edges_a[:, None], edges_b[None]).reshape(-1, 3)
+    return np.concatenate([across_sides(a, R_a, b, R_b), across_edges(a, R_a, b, R_b)])
+
+
+def across_sides(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
+    """Those that are normals of a side, (k, 3)."""
+    return np.concatenate([_sides(a)[0] @ R_a.T, _sides(b)[0] @ R_b.T])
+
+
+def across_edges(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
+    """Those across an edge of each, (k, 3)."""
+    u, v = (_sides(a)[1] @ R_a.T)[:, None], (_sides(b)[1] @ R_b.T)[None]
+    pairs = np.empty((len(u), v.shape[1], 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        pairs[..., i] = u[..., j] * v[..., k] - u[..., k] * v[..., j]
+    crossed = pairs.reshape(-1, 3)
     length = np.sqrt((crossed * crossed).sum(axis=1))
     kept = length > _PARALLEL
-    return np.concatenate([normals_a @ R_a.T, normals_b @ R_b.T, crossed[kept] / length[kept, None]])
+    return np.asarray(crossed[kept] / length[kept, None])
 
 
 def piece_corners(piece: Piece) -> Array:

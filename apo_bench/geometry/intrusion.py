@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.convex import all_boxes, piece_corners, separating_axes, shadow
+from apo_bench.geometry.convex import across_edges, across_sides, all_boxes, piece_corners, shadow
 from apo_bench.geometry.solid import Piece, Solid
 
 _TOUCHING_M = 1e-6
@@ -90,7 +90,10 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
 
 
 def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
-    """`intrusion_depths` where sides look anywhere: pairs whose balls meet nowhere count by how far these are apart."""
+    """`intrusion_depths` where sides look anywhere: pairs whose balls meet nowhere count by how far these are apart.
+
+    A pair that is less deep across its sides alone than another one need not be looked at across its edges.
+    """
     deepest = np.full(len(at), -np.inf)
     (balls_a, radii_a), (balls_b, radii_b) = _balls(a), _balls(b)
     places_a, places_b = balls_a @ R_a.T, balls_b @ T_b[:3, :3].T + T_b[:3, 3]
@@ -101,17 +104,22 @@ def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece,
             room = rooms[:, j]
             near = (room <= 0.0) & (-room > deepest)
             deepest = np.where(room > 0.0, np.maximum(deepest, -room), deepest)
+            if not near.any():
+                continue
+            R_b, found = T_b[:3, :3], np.full(len(at), -np.inf)
+            found[near] = _depths(own, R_a, at[near], b[j], T_b, across_sides(own, R_a, b[j], R_b))
+            near &= found > deepest
             if near.any():
-                deepest[near] = np.maximum(deepest[near], _pair_depths(own, R_a, at[near], b[j], T_b))
+                edges = _depths(own, R_a, at[near], b[j], T_b, across_edges(own, R_a, b[j], R_b))
+                deepest[near] = np.maximum(deepest[near], np.minimum(found[near], edges))
     return deepest
 
 
-def _pair_depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array) -> Array:
-    """How deep one piece is in another one, at k places, (k,), [m]."""
-    axes = separating_axes(a, R_a, b, T_b[:3, :3])
+def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:
+    """How deep one piece is in another one along some axes, at k places, (k,), [m]; infinite along none."""
     (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, T_b[:3, :3], axes)
     apart = np.abs((at - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
-    return np.asarray((half_a + half_b - apart).min(axis=-1))
+    return np.asarray((half_a + half_b - apart).min(axis=-1, initial=np.inf))
 
 
 @lru_cache(maxsize=1024)

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play
+from apo_bench.assembly.kinds import ContactKind, contact_kind, play_mm
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.mate import Mate, mate
 from apo_bench.geometry.overlap import Overlap, overlap
@@ -96,14 +96,12 @@ class ContactJudge(NamedTuple):
 
     def _allowed_mm(self, contact: Contact) -> float:
         """The play of a fit and a margin, or the margin of faces that should touch."""
-        asked, fits = self.thresholds, self.assembly.is_fit(contact)
-        if self._kind(contact) == "shaft in hole":
-            play = 1e3 * geometric_play(*(self.assembly.face_of(of) for of in contact))
-            return play + self.clearance_mm * fits + asked.fit_margin_mm
-        return self.clearance_mm + asked.fit_margin_mm if fits else asked.support_mm
+        a, b = map(self.assembly.face_of, contact)
+        play = play_mm(a, b, self.clearance_mm)
+        return self.thresholds.support_mm if play is None else play + self.thresholds.fit_margin_mm
 
     def _kind(self, contact: Contact) -> ContactKind:
-        kind = contact_kind(*(self.assembly.face_of(of) for of in contact))
+        kind = contact_kind(*map(self.assembly.face_of, contact))
         assert kind is not None
         return kind
 

@@ -1,12 +1,12 @@
 """Will a plan fail, where and why? Said before anything moves, from the plan and the sizes of the parts alone.
 
 Four things are looked at. A goal at which a part would not stand. Contacts that are planned further off than the
-judge allows: of faces that fit into one another those across the way in, since along it the robot goes on until it
-feels contact; of sides that are slid onto each other what stays open once one corner touches, since the slide does not
-turn the part; of supports none, since weight closes them however wrong the plan is. A part that stays where it does not
-stand on what lies below alone: it leans as far as clearances let it. Parts that are planned into one another where no
-contact is meant, at the goal or on the way in; of those that touch in the same operation the contacts have told, except
-where a level way in begins: there a part comes down beside all others.
+judge allows: of faces that fit into one another, and of axes, those across the way in, since along it the robot goes on
+until it feels contact; of sides that are slid onto each other what stays open once one corner touches, since the slide
+does not turn the part; of supports none, since weight closes them however wrong the plan is. A part that stays where it
+does not stand on what lies below alone: it leans as far as clearances let it. Parts that are planned into one another
+where no contact is meant, at the goal or on the way in; of those that touch in the same operation the contacts have
+told, except where a level way in begins: there a part comes down beside all others.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
+from apo_bench.assembly.kinds import contact_kind, play_mm
 from apo_bench.assembly.placement import placements
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly.topology import Assembly, Contact, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
-from apo_bench.prediction.resting import is_support, residual, resting_poses
+from apo_bench.prediction.resting import between, enters, is_support, residual, resting_poses
 from apo_bench.prediction.stability import BALANCED, imbalance
 from apo_bench.records.thresholds import Thresholds
 
@@ -68,8 +69,8 @@ class Prediction:
     code: _Code
     sentence: str
     size_mm: float | None
-    """`residual`: the |e| that is too large; `interference`: the depth; `ok`: the largest |e| of a fit contact; None
-    for an unstable goal, and of what would lean."""
+    """`residual`: the |e| that is too large; `interference`: the depth; `ok`: the largest |e| of a contact that
+    enters; None for an unstable goal, and of what would lean."""
     mendable: bool = False
     """Whether it may fit if directions are changed that contacts leave free."""
 
@@ -118,10 +119,11 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
     An unstable goal comes before everything else, since a plan with one is not begun.
 
     Args:
-        clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, others
-            by `support_mm`; parts that should not touch may be as deep in each other as the judge lets one be
-            pushed, `pushed_mm`, but only `fit_margin_mm` what carries others, which would shift on it, and not at all
-            what comes down to where a level way in begins, and would stand there on another part.
+        clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, a
+            shaft in its hole by what the radii leave, too, others by `support_mm`; parts that should not touch may be
+            as deep in each other as the judge lets one be pushed, `pushed_mm`, but only `fit_margin_mm` what carries
+            others, which would shift on it, and not at all what comes down to where a level way in begins, and would
+            stand there on another part.
         attach: The way in of each operation; without it every fit contact counts, and nothing but the goals.
     """
     worst_mm = 0.0
@@ -145,7 +147,7 @@ def measures(
     Args:
         room_mm: Centres of mass are looked at this far aside, too.
     """
-    doings, play_mm = tuple(_doings(plan)), clearance_mm + thresholds.fit_margin_mm
+    doings = tuple(_doings(plan))
     for doing in doings:
         size = imbalance(doing.alone, _operation(doing), doing.planned, 1e-3 * room_mm)
         yield Measure(doing.operation, "falls", size, BALANCED)
@@ -154,7 +156,7 @@ def measures(
         how = attach[doing.operation] if attach else None
         k, operation = doing.operation, _operation(doing)
         deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.pushed_mm
-        yield Measure(k, "fit", _fit_mm(doing, how), play_mm)
+        yield _fit(doing, how, clearance_mm, thresholds)
         yield Measure(k, "side", _side_mm(doing), thresholds.support_mm)
         if _stays(plan.assembly, k) and clearance_mm > thresholds.fit_margin_mm:
             leans = imbalance(doing.alone, operation, doing.planned, 1e-3 * room_mm, ceilings=False)
@@ -192,21 +194,38 @@ def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Po
         yield k, alone, before, now
 
 
-def _fit_mm(doing: _Doing, how: Attach | None) -> float:
-    """Largest |e| of the fit contacts that the operation makes across its way in, nominal faces as planned."""
-    found = [0.0]
-    for contact in filter(doing.alone.is_fit, _operation(doing).contacts):
-        e, n = residual(doing.alone, contact, doing.planned)
-        if how is None or abs(n @ _way(doing, how)) < _ACROSS:
-            found.append(1e3 * float(np.abs(e).max()))
-    return max(found)
+def _fit(doing: _Doing, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> Measure:
+    """The |e| across the way in, nominal faces as planned, of the contact that enters and exceeds its play the most."""
+    k, found = doing.operation, [(0.0, clearance_mm + thresholds.fit_margin_mm)]
+    for contact in _operation(doing).contacts:
+        if enters(doing.alone, contact):
+            a, b = map(doing.alone.face_of, contact)
+            play = play_mm(a, b, clearance_mm)
+            allowed = thresholds.support_mm if play is None else play + thresholds.fit_margin_mm
+            way = None if how is None else _way(doing, how)
+            found.append((1e3 * _misfit_m(doing, contact, way), allowed))
+    size, allowed = max(found, key=lambda each: each[0] - each[1])
+    return Measure(k, "fit", size, allowed)
+
+
+def _misfit_m(doing: _Doing, contact: Contact, way: Array | None) -> float:
+    """The largest |e| of a contact across a way; of round faces how far the axes are apart, across it."""
+    a, b = map(doing.alone.face_of, contact)
+    if contact_kind(a, b) not in ("plane on plane", "shaft on plane"):
+        lie = between(doing.alone, contact, doing.planned)
+        if way is None:
+            return lie.gap_m
+        beside = float(np.linalg.norm(lie.off - np.outer(lie.off @ way, way), axis=1).max())
+        return beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
+    e, n = residual(doing.alone, contact, doing.planned)
+    return float(np.abs(e).max()) if way is None or abs(n @ way) < _ACROSS else 0.0
 
 
 def _side_mm(doing: _Doing) -> float:
     """Largest |e| of the sides that the operation slides onto others, once its part rests."""
     found = [0.0]
     for contact in _operation(doing).contacts:
-        if not doing.alone.is_fit(contact) and not is_support(doing.alone, contact, doing.rests):
+        if not enters(doing.alone, contact) and not is_support(doing.alone, contact, doing.rests):
             found.append(1e3 * float(np.abs(residual(doing.alone, contact, doing.rests)[0]).max()))
     return max(found)
 

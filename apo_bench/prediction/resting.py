@@ -1,7 +1,7 @@
 """Where a part comes to rest that is put down a little wrongly: what is found by touch ends in touch.
 
 Weight lays a part flat on what carries it. A part that is slid against another one stops at the first corner that
-touches and keeps its turn. Faces that fit into one another are left as they are planned.
+touches and keeps its turn. Faces that fit into one another are left as they are planned, shafts in holes and cones too.
 """
 
 from __future__ import annotations
@@ -14,10 +14,15 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.mate import Mate, mate
 from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face
 
 _LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""
+_ROUNDS = 10
+"""A shaft between two sides of a groove comes to rest on both, each time a little nearer."""
 
 
 def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Poses:
@@ -27,9 +32,9 @@ def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Pos
         poses: Every part, what the operation moves where it is brought to, world frame, [m].
     """
     now = dict(poses)
-    touched = [contact for contact in operation.contacts if not assembly.is_fit(contact)]
+    touched = [contact for contact in operation.contacts if not enters(assembly, contact)]
     supports = [contact for contact in touched if is_support(assembly, contact, poses)]
-    for contact in supports:
+    for contact in supports * (_ROUNDS if any(map(assembly.is_round, supports)) else 1):
         _displace(now, operation, _flat(assembly, contact, now))
     for contact in (contact for contact in touched if contact not in supports):
         e, n = residual(assembly, contact, now)
@@ -37,13 +42,32 @@ def resting_poses(assembly: Assembly, operation: Operation, poses: Poses) -> Pos
     return MappingProxyType(now)
 
 
+def enters(assembly: Assembly, contact: Contact) -> bool:
+    """Whether a face goes into another one, so that play decides and nothing is found by touch."""
+    on_plane = any(isinstance(assembly.face_of(of), Face) for of in contact)
+    return assembly.is_fit(contact) or not on_plane
+
+
+def between(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
+    """How the faces of a contact of round ones lie to each other."""
+    m, e = contact
+    return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+
+
 def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array, Array]:
     """e at the corners of the overlap, (k,), [m], positive where the faces are apart, and the normal, (3,), world.
 
-    Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count.
+    Of faces that miss each other, or meet in less than an area, the corners of the whole environment face count; of a
+    shaft on a plane the ends of the line of contact.
     """
     m, e = contact
-    T_m, T_e, plane = poses[m.part], poses[e.part], assembly.face(m).plane
+    T_m, T_e = poses[m.part], poses[e.part]
+    if assembly.is_round(contact):
+        up = _up(assembly, contact, poses)
+        return between(assembly, contact, poses).off @ up, up * (
+            -1.0 if m.face in assembly.solids[m.part].rounds else 1.0
+        )
+    plane = assembly.face(m).plane
     found = overlap(assembly.face(m), T_m, assembly.face(e), T_e)
     corners = found.corners if found and len(found.corners) else pose.apply(T_e, assembly.face(e).outline)
     n = T_m[:3, :3] @ plane[:3]
@@ -52,8 +76,13 @@ def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array,
 
 def is_support(assembly: Assembly, contact: Contact, poses: Poses) -> bool:
     """Whether weight closes the contact."""
-    e = contact.environment
-    return bool(abs((poses[e.part][:3, :3] @ assembly.face(e).normal)[2]) > _LEVEL)
+    return bool(not enters(assembly, contact) and abs(_up(assembly, contact, poses)[2]) > _LEVEL)
+
+
+def _up(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
+    """The normal of the flat face of a contact, that of the second part if both are, (3,), world."""
+    flat = next(of for of in reversed(contact) if isinstance(assembly.face_of(of), Face))
+    return np.asarray(poses[flat.part][:3, :3] @ assembly.face(flat).normal)
 
 
 def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
@@ -62,14 +91,39 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     The least turn, about the middle of the face, and then straight down or up.
     """
     m, e = contact
+    if assembly.is_round(contact):
+        return _laid(assembly, contact, poses)
     middle = pose.apply(poses[m.part], assembly.face(m).outline).mean(axis=0)
     up = poses[e.part][:3, :3] @ assembly.face(e).normal
-    axis = np.cross(poses[m.part][:3, :3] @ assembly.face(m).normal, -up)
+    height = (middle - pose.apply(poses[e.part], assembly.face(e).outline[:1])[0]) @ up
+    turned = _turn(poses[m.part][:3, :3] @ assembly.face(m).normal, -up)
+    return np.asarray(_shift(middle - height * up) @ turned @ _shift(-middle))
+
+
+def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
+    """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
+    found, up = between(assembly, contact, poses), _up(assembly, contact, poses)
+    middle, off = found.points.mean(axis=0), found.off.mean(axis=0)
+    if isinstance(assembly.face_of(contact.manipulated), RoundFace):
+        turned = _turn(found.axis, _across(found.axis, up))
+        return np.asarray(_shift(middle - off) @ turned @ _shift(-middle))
+    turned = _turn(up, _across(up, found.axis))
+    return np.asarray(_shift(middle + off) @ turned @ _shift(-middle))
+
+
+def _across(a: Array, b: Array) -> Array:
+    """The direction across b that is nearest to a; a itself where it lies along b."""
+    across = a - (a @ b) * b
+    size = float(np.linalg.norm(across))
+    return np.asarray(across / size) if size > 0.0 else a
+
+
+def _turn(a: Array, b: Array) -> Array:
+    """The least turn that takes a direction to another one, about the origin, (4, 4)."""
+    axis = np.cross(a, b)
     sine = float(np.linalg.norm(axis))
     turn = axis * (np.arcsin(min(1.0, sine)) / sine if sine > 0.0 else 0.0)
-    height = (middle - pose.apply(poses[e.part], assembly.face(e).outline[:1])[0]) @ up
-    turned = pose.exp(np.concatenate([np.zeros(3), turn]))
-    return np.asarray(_shift(middle - height * up) @ turned @ _shift(-middle))
+    return pose.exp(np.concatenate([np.zeros(3), turn]))
 
 
 def _shift(d: Array) -> Array:

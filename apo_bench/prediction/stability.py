@@ -1,4 +1,9 @@
-"""Would a part stay where a plan puts it? Balance of weight by what lies below and above it."""
+"""Would a part stay where a plan puts it? Balance of weight by what lies below and above it.
+
+On parts that are boxes vertical forces act, at level faces. Where a part is of other pieces, forces act along the
+normals of its contacts (`prediction/pushes.py`), with friction where they carry weight: a wedge is held by a slope and
+a wall, a shaft by both sides of a groove, a plug by its seat.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +14,19 @@ from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.overlap import overlap
+from apo_bench.prediction.pushes import pushes, with_friction
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""
 BALANCED = 1e-7
 """What is left of the weight, and of its moments over 10 mm, where forces balance it."""
+_UP = np.array([0.0, 0.0, 1.0])
+_LEFT = float(np.sin(np.radians(30.0)))
+"""Normals carry weight if forces along them leave no more than this of it: those of a floor tilted by 30 degrees do."""
+_ARM_M = 0.01
+"""Moments are compared with forces on this arm."""
 _ASIDE = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 _ASIDE.flags.writeable = False
 
@@ -24,7 +36,8 @@ def first_unstable(assembly: Assembly, start: Poses, goals: Array) -> int | None
 
     Vertical forces act at the corners of the overlaps of its contacts: floors push up, ceilings push down, walls
     carry nothing (there is no friction to count on). If no such forces balance the weight and its moments, the part
-    falls. Of an operation without a contact on a floor or a ceiling nothing is claimed.
+    falls. Of an operation without a contact on a floor or a ceiling nothing is claimed; where pieces are no boxes, of
+    one whose contacts could not carry the weight by their normals.
 
     Args:
         start: Poses before the first operation, world frame, [m].
@@ -49,13 +62,32 @@ def imbalance(
         room_m: The centre of mass is also looked at this far off, level, in four directions; the largest counts.
         ceilings: Whether what lies above may push down; if not, nothing is claimed of an operation without any.
     """
+    centroid = _centroid(assembly, operation, poses)
+    offs = _ASIDE * room_m if room_m else _ASIDE[:1]
+    if not all(all_boxes(assembly.solids[of.part].pieces) for contact in operation.contacts for of in contact):
+        return _of_normals(assembly, operation, poses, centroid + offs, ceilings)
     points, signs, ups = _forces(assembly, operation, poses)
     if not ups or not (ceilings or min(ups) < 0.0):
         return 0.0
     carrying = signs > (-np.inf if ceilings else 0.0)
-    centroid = _centroid(assembly, operation, poses)
-    offs = _ASIDE * room_m if room_m else _ASIDE[:1]
     return max(_unbalanced(points[carrying], signs[carrying], centroid + off) for off in offs)
+
+
+def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Array, ceilings: bool) -> float:
+    """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
+    from scipy.optimize import nnls
+
+    found = [pushes(assembly, contact, poses) for contact in operation.contacts]
+    normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in found)])
+    if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
+        return 0.0
+    points, forces = with_friction(found)
+    carrying = forces[:, 2] > (-np.inf if ceilings else -_LEFT)
+    if not carrying.any():
+        return 1.0
+    points, forces = points[carrying], forces[carrying]
+    wrenches = [np.concatenate([forces, np.cross((points - c) / _ARM_M, forces)], axis=1).T for c in at]
+    return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in wrenches)
 
 
 def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Array, Array, list[float]]:

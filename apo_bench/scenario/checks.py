@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Layout, Poses
-from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play
+from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
@@ -152,11 +152,11 @@ def _check_play(scenario: Scenario, file: str, case: Case, key: str, contact: Co
     a, b = (scenario.assembly.face_of(of) for of in contact)
     if contact_kind(a, b) != "shaft in hole":
         return
-    of_sizes = 1e3 * geometric_play(a, b)
-    clearance = scenario.clearance_mm if scenario.assembly.is_fit(contact) else 0.0
-    if of_sizes + clearance <= _NO_PLAY_MM:
-        why = f"{of_sizes:.4g} mm per side by their sizes"
-        why += f" and {clearance:g} mm of clearance" if scenario.assembly.is_fit(contact) else ", and neither is fit"
+    play = play_mm(a, b, scenario.clearance_mm)
+    if play is not None and play <= _NO_PLAY_MM:
+        why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
+        fits = scenario.assembly.is_fit(contact)
+        why += f" and {scenario.clearance_mm:g} mm of clearance" if fits else ", and neither is fit"
         sentence = f"'{contact}': the shaft has no play in the hole, {why}"
         raise _refuse(file, case, key, sentence, "make the hole wider, or mark it as fit and give a clearance")
 

@@ -11,14 +11,15 @@ from hypothesis import strategies as st
 
 from apo_bench.assembly.goals import Plan, Step
 from apo_bench.assembly.placement import placements
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.prediction.resting import is_support, residual, resting_poses
 from apo_bench.records.thresholds import Thresholds
-from tests import scenes
+from tests import rounds, scenes
+from tests.scenes import touch
 
 pytestmark = pytest.mark.numeric
 
@@ -244,3 +245,85 @@ def test_what_carries_others_meets_nothing() -> None:
     assert (found.operation, found.code) == (4, "interference")
     assert found.size_mm == pytest.approx(0.5, abs=0.01)
     assert not said(scene, goals).fails
+
+
+ROUND_WAYS = {
+    "peg_in_plate": [(0, 0, -1)] * 2,
+    "loose_peg": [(0, 0, -1)] * 2,
+    "nested": [(0, 0, -1)] * 3,
+    "through": [(0, -1, 0), (0, -1, 0), (0, 0, 1)],
+    "in_groove": [(0, 0, -1), (1, 0, 0)],
+    "on_table": [(1, 0, 0)],
+    "countersink": [(0, 0, -1)] * 2,
+    "on_rim": [(0, 0, -1)] * 2,
+    "wedges_meet": [(0, 0, -1), (0, 0, 1)],
+    "dovetail": [(0, 0, -1), (1, 0, 0)],
+}
+"""Of each scene the ways in, in the frame of the part."""
+
+
+def round_ways(name: str) -> list[Attach]:
+    """Long enough to begin beside everything."""
+    return [Attach(np.array(way, dtype=np.float64), 0.15) for way in ROUND_WAYS[name]]
+
+
+@pytest.mark.parametrize("name", rounds.ALL)
+def test_round_and_tilted_parts_fit(name: str) -> None:
+    scene = rounds.ALL[name]()
+    found = said(scene, scene.goals, round_ways(name))
+    assert (found.fails, found.code) == (False, "ok")
+    assert found.size_mm == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "operation", "T", "code", "size_mm"),
+    [
+        ("peg_in_plate", 2, scenes.mm(0.34, 0, 0), "ok", 0.34),
+        ("peg_in_plate", 2, scenes.mm(0.3, 0.4, 0), "residual", 0.5),
+        ("peg_in_plate", 2, scenes.mm(0, 0, 8), "ok", 0.0),
+        ("peg_in_plate", 2, scenes.mm(0, 0, 0, (0, 0, 70)), "ok", 0.0),
+        ("peg_in_plate", 2, scenes.mm(0, 0, 0, (2, 0, 0)), "residual", 20 * np.tan(np.radians(2))),
+        ("loose_peg", 2, scenes.mm(0.19, 0, 0), "ok", 0.19),
+        ("loose_peg", 2, scenes.mm(0.25, 0, 0), "residual", 0.25),
+        ("through", 2, scenes.mm(1, 0, 0), "residual", 1.0),
+        ("through", 3, scenes.mm(0, 0, 12), "ok", 0.0),
+        ("countersink", 2, scenes.mm(0, 0, 3), "ok", 0.0),
+        ("countersink", 2, scenes.mm(0.2, 0, 0), "residual", 0.2),
+        ("on_rim", 2, scenes.mm(0, 0, 0, (2, 0, 0)), "ok", 2 * np.sin(np.radians(2))),
+        ("in_groove", 2, scenes.mm(-0.7, 0.6, 0, (0, 1, 0)), "ok", 0.0),
+        ("on_table", 1, scenes.mm(-1.7, 0, 0, (0, 2, 0)), "ok", 0.0),
+        ("dovetail", 2, scenes.mm(0, 0.7, 0), "residual", 0.7 * np.sin(np.radians(60))),
+    ],
+)
+def test_round_and_tilted_parts_that_are_planned_wrongly(
+    name: str, operation: int, T: Array, code: str, size_mm: float
+) -> None:
+    scene = rounds.ALL[name]()
+    found = said(scene, off(scene, operation, T), round_ways(name))
+    assert found.code == code
+    assert found.size_mm == pytest.approx(size_mm, abs=1e-3)
+
+
+def test_a_shaft_comes_to_rest_on_both_sides_of_its_groove() -> None:
+    scene = rounds.in_groove()
+    operation = scene.assembly.operations[1]
+    (before, _) = placements(scene.assembly, scene.start, scene.goals)
+    brought = {**before, "peg": scene.goals[1] @ scenes.mm(-0.7, 0.6, 0, (0.4, 1.0, 0))}
+    rests = resting_poses(scene.assembly, operation, brought)
+    for contact in operation.contacts:
+        assert is_support(scene.assembly, contact, rests)
+        assert residual(scene.assembly, contact, rests)[0] == pytest.approx(np.zeros(2), abs=1e-7)
+
+
+def test_a_plate_comes_to_rest_on_a_shaft() -> None:
+    """The plane is the part that moves."""
+    peg_on = Operation("peg", touch("peg", "table", "wall-top"))
+    block_on = Operation("block", touch("block", "peg", "nz-wall"))
+    goals = [scenes.mm(0, 0, 5, (0, 90, 0)), scenes.mm(25, 0, 35)]
+    scene = scenes.scene([scenes.table(), rounds.peg(), scenes.block()], [peg_on, block_on], goals)
+    (before, _) = placements(scene.assembly, scene.start, scene.goals)
+    brought = {**before, "block": goals[1] @ scenes.mm(0, 0, 0.8, (0, 1.0, 0))}
+    rests = resting_poses(scene.assembly, block_on, brought)
+    assert residual(scene.assembly, block_on.contacts[0], rests)[0] == pytest.approx(np.zeros(2), abs=1e-9)
+    e, n = residual(scene.assembly, block_on.contacts[0], brought)
+    assert (e.mean(), n[2]) == pytest.approx((0.8e-3, -1.0), abs=2e-4)

@@ -10,7 +10,7 @@ from apo_bench.assembly.topology import Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.prediction.stability import first_unstable
-from tests import scenes
+from tests import rounds, scenes
 
 pytestmark = pytest.mark.numeric
 
@@ -124,3 +124,40 @@ def test_the_first_unstable_operation_is_named_and_nothing_is_changed() -> None:
     before = goals.copy()
     assert first_unstable(scene.assembly, scene.start, goals) == 1
     assert_array_equal(goals, before)
+
+
+@pytest.mark.parametrize("name", rounds.ALL)
+@pytest.mark.parametrize("yaw", [0.0, 37.0])
+def test_round_and_tilted_parts_stand(name: str, yaw: float) -> None:
+    scene = scenes.turned(rounds.ALL[name](), pose.at((0.1, 0.05, 0.0), (0.0, 0.0, yaw)))
+    assert first_unstable(scene.assembly, scene.start, scene.goals) is None
+
+
+@pytest.mark.parametrize("name", rounds.ALL)
+def test_noise_alone_topples_no_round_part(name: str) -> None:
+    scene, rng = rounds.ALL[name](), np.random.default_rng(0)
+    for _ in range(6):
+        goals = scenes.noisy(scene.goals, rng, 1.0, 1.0)
+        assert first_unstable(scene.assembly, scene.start, goals) is None
+
+
+@pytest.mark.parametrize(
+    ("build", "operation", "T", "expected"),
+    [
+        (rounds.through, 3, scenes.mm(0, 0, 35), None),
+        (rounds.through, 3, scenes.mm(0, 0, 90), None),
+        (rounds.through, 3, scenes.mm(0, 0, 110), 3),
+        (rounds.in_groove, 2, scenes.mm(0, 0, 38), None),
+        (rounds.in_groove, 2, scenes.mm(0, 0, 42), 2),
+        (rounds.on_table, 1, scenes.mm(0, 0, 0), None),
+        (rounds.countersink, 2, scenes.mm(0, 0, 0, (0, 0, 40)), None),
+        (rounds.peg_in_plate, 2, scenes.mm(0, 0, 0, (0, 0, 40)), None),
+        (rounds.wedges_meet, 2, scenes.mm(0, 0, 0), None),
+        (rounds.wedges_meet, 2, scenes.mm(0, 45, 0), 2),
+        (rounds.dovetail, 2, scenes.mm(50, 0, 0), None),
+        (rounds.dovetail, 2, scenes.mm(81, 0, 0), 2),
+    ],
+)
+def test_what_carries_round_and_tilted_parts(build, operation: int, T: Array, expected: int | None) -> None:
+    """A bore holds a shaft like a cantilever; the groove and the slope carry what has its centre over them."""
+    assert falls(build(), operation, T) == expected
