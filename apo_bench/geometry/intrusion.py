@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.convex import across_edges, across_sides, all_boxes, piece_corners, shadow
+from apo_bench.geometry.convex import across_edges, across_sides, all_boxes, piece_corners, separating_axes, shadow
 from apo_bench.geometry.solid import Piece, Solid
 
 _TOUCHING_M = 1e-6
