@@ -8,18 +8,21 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.topology import spelled
-from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES
+from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.holding import Hold
 from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.round_face import RoundFace
 from apo_bench.show.words import listed_words, with_article
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 _OFF_M = 1e-6
 """A turn is said to be about a point only if that is farther from the origin of the part."""
+_ALONG = 1e-9
+"""Cosines that are nearer to 1 are of one direction."""
 
 
 def total(found: Explanation) -> str:
@@ -32,7 +35,10 @@ def total(found: Explanation) -> str:
 
 def sentences(found: Explanation) -> list[str]:
     """One for each operation: what is fixed by which parts, and what is free; then one for each shared error."""
-    operations = [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(found, o.free)}" for o in found.operations]
+    operations = [
+        f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(found, o.free)}{_along_axes(found, o)}"
+        for o in found.operations
+    ]
     return operations + [_shared(one) for one in found.shared]
 
 
@@ -123,6 +129,33 @@ def _group(found: Explanation, along: tuple[int, ...], some: list[FreeDirection]
         return f"{names} free, kept as seen, {sizes}"
     others = dict.fromkeys(found.operations[j].part for j in along)
     return f"{names} free together with {listed_words(map(with_article, others))}, {sizes}"
+
+
+def _along_axes(found: Explanation, o: OperationExplanation) -> str:
+    """`; slides along the axis of shaft and turns freely about it`: what is free of round faces that touch."""
+    contacts = found.assembly.operations[o.operation].contacts
+    own = dict.fromkeys(of.face for contact in contacts for of in contact if of.part == o.part)
+    rounds = [
+        found.assembly.solids[o.part].rounds[name] for name in own if name in found.assembly.solids[o.part].rounds
+    ]
+    said, last = list[str](), ""
+    for free in o.free:
+        face = None if free.along else next((one for one in rounds if _is_on(free.direction, one)), None)
+        if face is not None:
+            does = "turns freely about" if free.direction.turns else "slides along"
+            said.append(f"{does} it" if face.name == last else f"{does} the axis of {face.name}")
+            last = face.name
+    return f"; {listed_words(said)}" if said else ""
+
+
+def _is_on(direction: Direction, face: RoundFace) -> bool:
+    """Whether a direction is a shift along the axis of a face, or a pure turn about it."""
+    if abs(direction.axis @ face.axis) < 1.0 - _ALONG:
+        return False
+    if not direction.turns:
+        return True
+    off = np.cross(face.point - direction.point, face.axis)
+    return bool(np.sqrt(off @ off) < _OFF_M and abs(direction.pitch_m) < _OFF_M)
 
 
 def _about(free: FreeDirection) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import Equations
+from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations
@@ -76,7 +77,7 @@ def violations(system: Equations, exact: NDArray[np.bool_], inequalities: Inequa
 
 def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equations, NDArray[np.bool_], Inequalities]:
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
-    low, high = assembly.intervals(play_m).T
+    low, high = lowered(assembly).intervals(play_m).T
     exact = low == high
     if exact.all() and not low.any():
         none = np.zeros(0)
