@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.kinds import OPPOSING, contact_kind
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, product, simplified
 from apo_bench.geometry import pose
@@ -176,8 +177,8 @@ class Pattern:
     """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
     freed: tuple[int, ...]
     """The operations whose motion parameters occur, the most recent first."""
-    opposing: NDArray[np.bool_]
-    """(c,): whether the two faces look at each other when they touch; planes through an axis do not."""
+    opposing: Array
+    """(c,): the largest cosine between normals of faces that look at each other; infinite of planes through an axis."""
 
 
 @remembered
@@ -210,8 +211,17 @@ def pattern(assembly: Assembly) -> Pattern:
         freed=tuple(
             sorted({k - len(parts) for _, _, word in chosen for k, _ in word if k >= len(parts)}, reverse=True)
         ),
-        opposing=np.array([assembly.face(contact.manipulated).opposes for contact, _, _ in chosen], dtype=np.bool_),
+        opposing=np.array([_opposing(assembly, contact) for contact, _, _ in chosen]),
     )
+
+
+def _opposing(assembly: Assembly, contact: Contact) -> float:
+    if not assembly.face(contact.manipulated).opposes:
+        return math.inf
+    tilts = (
+        contact in assembly.origin and contact_kind(*map(assembly.face_of, assembly.origin[contact])) == "cone on rim"
+    )
+    return 0.0 if tilts else OPPOSING
 
 
 def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:

@@ -9,6 +9,9 @@ from apo_bench.geometry.solid import Face
 
 ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
 CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)
+OPPOSING = -0.9
+"""Cosine between the normals of two faces that look at each other, at most: what contacts leave open tilts faces by a
+few degrees."""
 WALLS = 8
 """Planes through an axis that stand for the disc of a round fit: sixteen walls, whose corners lie on its circle."""
 _SAME_SLOPE = 2e-3

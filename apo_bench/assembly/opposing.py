@@ -1,7 +1,8 @@
 """Do faces that touch look at each other? The face contact equations do not ask that.
 
 They say that vertices of one face lie in the plane of the other, whichever way the two look: a cube upside down inside
-the table satisfies them as well as one that stands on it.
+the table satisfies them as well as one that stands on it. Nothing keeps a cone on a rim from tilting, so it may by up
+to a right angle; planes through an axis have no sense.
 """
 
 from __future__ import annotations
@@ -13,10 +14,6 @@ from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
-
-OPPOSING = -0.9
-"""Cosine between the normals of two faces that look at each other, at most: what contacts leave open tilts faces by a
-few degrees."""
 
 
 def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:
@@ -42,4 +39,4 @@ def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.b
     n = np.broadcast_to(known.plane[:, None, :3], (*lead, len(rows), 1, 3))
     for j in range(rows.shape[1]):
         n = n @ turned[..., rows[:, j], :, :]
-    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > OPPOSING) & known.opposing
+    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > known.opposing)

@@ -17,7 +17,8 @@ from scipy.special import chdtrc
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.opposing import OPPOSING, looking_away
+from apo_bench.assembly.kinds import OPPOSING
+from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.consistency import SOFT_M, softened_length
 from apo_bench.correction.ending import status_sentence
@@ -120,7 +121,7 @@ class Layout:
     """(3 c, 3 c), as of `fit_covariance`."""
     freed: tuple[int, ...]
     opposing: bool
-    """Whether the faces of every contact look at each other when they touch."""
+    """Whether the faces of every contact are flat ones, that look at each other when they touch."""
 
 
 @remembered
@@ -145,5 +146,5 @@ def layout(assembly: Assembly, play_m: float) -> Layout | None:
         moments=corner_moments(known),
         correlated=fit_covariance(assembly, play_m),
         freed=known.freed,
-        opposing=bool(known.opposing.all()),
+        opposing=bool((known.opposing == OPPOSING).all()),
     )

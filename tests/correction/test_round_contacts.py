@@ -213,6 +213,18 @@ def test_cones_must_oppose_and_axes_need_not():
     assert "look the same way" in correct(replace(observation, goals=goals), "paper").sentence
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_far_from_the_truth_goals_are_found_and_none_longer_than_it(kind):
+    """At 25 mm and degrees: other starts are made of round contacts, too."""
+    for seed in range(6):
+        observation, truth = case(kind, seed, mm=25.0, deg=25.0)
+        made = correct(observation)
+        assert made.ok, made.sentence
+        scale = np.sqrt(np.diagonal(observation.covariance, axis1=1, axis2=2))
+        found, true = (pose.log(pose.inverse(observation.goals) @ T) / scale for T in (made.goals, truth))
+        assert (found * found).sum() <= (true * true).sum() * (1 + 1e-9)
+
+
 def test_without_round_contacts_nothing_is_lowered_or_kept():
     assembly = shown(SCENARIOS[0])[0].assembly
     assert lowered(assembly) is assembly
