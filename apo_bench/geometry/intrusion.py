@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +74,10 @@ def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Itera
         for i, j in np.argwhere(depths.min(axis=-1) > deep_m):
             yield _ways(a.pieces[i], T_a, b.pieces[j], T_b, axes, along[i, j], depths[i, j])
         return
-    for own, other in product(a.pieces, b.pieces):
+    (balls_a, radii_a), (balls_b, radii_b) = _balls(a.pieces), _balls(b.pieces)
+    between = pose.apply(T_a, balls_a)[:, None] - pose.apply(T_b, balls_b)[None]
+    near = np.sqrt((between * between).sum(axis=-1)) < radii_a[:, None] + radii_b
+    for own, other in ((a.pieces[i], b.pieces[j]) for i, j in np.argwhere(near)):
         axes = separating_axes(own, R_a, other, R_b)
         (middle_a, half_a), (middle_b, half_b) = shadow(own, R_a, axes), shadow(other, R_b, axes)
         along = axes @ (T_a[:3, 3] - T_b[:3, 3]) + middle_a - middle_b

@@ -21,6 +21,7 @@ import numpy as np
 
 from apo_bench.assembly.equations import equations, pattern
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.shared_error import joint_covariance
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
@@ -96,9 +97,10 @@ def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
 def _softness(assembly: Assembly, play_m: float) -> Array:
     """(m, m): covariance of all equations of contacts that are there, [m^2]; their vertices together are off as one."""
     each = []
-    for operation in assembly.operations:
+    flat = lowered(assembly)
+    for operation in flat.operations:
         for contact in operation.contacts:
-            plays = float(assembly.is_fit(contact)) + (_CARRIED - 1.0) * bool(operation.carries)
-            each.append(SOFT_M**2 + plays * play_m**2 / 3.0)
+            carried = (_CARRIED - 1.0) * bool(operation.carries) * play_m**2
+            each.append(SOFT_M**2 + (flat.play(contact, play_m) ** 2 + carried) / 3.0)
     count = np.diff(pattern(assembly).begin)
     return np.diag(np.repeat(np.array(each).reshape(-1) * count, count))

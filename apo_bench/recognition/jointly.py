@@ -141,7 +141,7 @@ class _Search:
                 other, less = (taking, net) if net > 0.0 else (refusing, max(0.0, self._rival(partial, taking) - net))
                 heappush(waiting, (lost + less, steps, other))
                 partial = refusing if net > 0.0 else taking
-            if not any(c.implied and c.distance <= self.rules.most for c in partial.near):
+            if not any(c.implied and self._agrees(c) for c in partial.near):
                 ended += 1
                 offended = surprise(partial.at, self.rules, partial.taken, partial.near)
                 offence = min(offence, offended)
@@ -150,7 +150,11 @@ class _Search:
             yield beginning._replace(surprise=beginning.surprise + IMPOSSIBLE)
 
     def _open(self, partial: _Partial) -> list[Candidate]:
-        return [c for c in partial.near if c.contact not in partial.refused and c.distance <= self.rules.most]
+        return [c for c in partial.near if c.contact not in partial.refused and self._agrees(c)]
+
+    def _agrees(self, c: Candidate) -> bool:
+        """Whether the noise explains that they do not look closed."""
+        return c.distance <= self.rules.most_of(len(c.pair.residual))
 
     def _likeliest(self, partial: _Partial) -> Candidate | None:
         """The pair that is surest to touch, of those that are neither taken nor refused."""
@@ -216,7 +220,7 @@ def _in_order(seen: Observation, k: int, taken: tuple[Candidate, ...]) -> tuple[
             key=lambda c: [
                 i
                 for of, among in zip(c.contact, parts, strict=True)
-                for i in (among.index(of.part), list(solids[of.part].faces).index(of.face))
+                for i in (among.index(of.part), [*solids[of.part].faces, *solids[of.part].rounds].index(of.face))
             ],
         )
     )
@@ -228,6 +232,6 @@ def _evidence(seen: Observation, sets: tuple[tuple[Candidate, ...], ...]) -> tup
     for k, (taken, as_seen) in enumerate(zip(sets, placements(seen.assembly, seen.start, seen.goals), strict=True)):
         for c in taken:
             (a, b), pair = c.contact, c.pair
-            seen_gap_m = face_gap(seen.assembly.face(a), as_seen[a.part], seen.assembly.face(b), as_seen[b.part])
+            seen_gap_m = face_gap(seen.assembly.face_of(a), as_seen[a.part], seen.assembly.face_of(b), as_seen[b.part])
             found.append(Evidence(c.contact, k, pair.gap_m, pair.angle_rad, pair.share, c.most, seen_gap_m))
     return tuple(found)

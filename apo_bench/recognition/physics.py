@@ -92,7 +92,12 @@ def _least_unlikely(
 
 
 def _covers(at: Situation, rules: Rules, c: Candidate, moved: Array) -> bool:
-    """Whether the faces of a contact cover each other, with the manipulated part moved by (3,), [m]."""
+    """Whether the faces of a contact cover each other, with the manipulated part moved by (3,), [m].
+
+    Of round faces nothing is said.
+    """
+    if at.seen.assembly.is_round(c.contact):
+        return True
     least = rules.share if moved.any() else rules.share / 2
     return _overlap(at, c, moved).area >= least * min(face_area(at.seen.assembly.face(face)) for face in c.contact)
 
@@ -107,7 +112,7 @@ def _overlap(at: Situation, c: Candidate, moved: Array | None = None) -> Overlap
 def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
     """Of what was let go of: that it rests on nothing, or that its weight acts beside what carries it.
 
-    Where a face above holds it down, it may lean. Of round parts nothing is said: only flat faces are recognised.
+    Where a face above holds it down, it may lean. Of round parts nothing is said.
     """
     solids = at.seen.assembly.solids
     if not at.seen.seen[at.k] or any(solids[part].rounds for part in at.moves):

@@ -22,8 +22,8 @@ from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresho
 
 _IMPLIED = 1.0
 """A contact that gains less by closing, in twice the logarithm, closes anyway if those before do."""
-_FLAT = np.diag([0.2e-3, radians(0.3), radians(0.3)]) ** 2
-"""(3, 3): gap and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
+_FLAT_M, _FLAT_RAD = 0.2e-3, radians(0.3)
+"""Gaps and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
 
 
 class Candidate(NamedTuple):
@@ -39,7 +39,7 @@ class Candidate(NamedTuple):
     deviation_m: float
     """Of its gap."""
     normal: Array
-    """Of the environment face, (3,), world."""
+    """Of the environment face, (3,), world; zero of round faces."""
 
     @property
     def implied(self) -> bool:
@@ -109,16 +109,18 @@ class Situation:
     def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
         contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
-        play_m = self.seen.play_m if self.seen.assembly.is_fit(contact) else 0.0
+        play_m = self.seen.assembly.play(contact, self.seen.play_m)
         J, noise, e = pair.slope @ self._reach(a, b), reality(pair, play_m), pair.residual
         C, room = J @ self.estimate.covariance @ J.T, J @ self.estimate.room @ J.T
-        most = pair_thresholds(rules, C, slack(pair, play_m))
+        most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
         distance = float(e @ np.linalg.solve(C + noise, e))
         if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
             return
-        soft = noise + _FLAT
+        soft = noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(e) - pair.lengths))
         gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
-        normal = self.now.poses[b][:3, :3] @ self.seen.assembly.solids[b].faces[pair.b].normal
+        normal = np.zeros(3)
+        if not self.seen.assembly.is_round(contact):
+            normal = self.now.poses[b][:3, :3] @ self.seen.assembly.face(contact.environment).normal
         yield Candidate(contact, pair, most, distance, gain, sqrt(C[0, 0] + noise[0, 0]), normal)
 
     def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:

@@ -17,10 +17,12 @@ from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.intrusion import intrusion, ways_out
 from apo_bench.recognition.estimate import estimate
 from apo_bench.recognition.jointly import recognise_jointly
-from tests import scenes
+from tests import rounds, scenes
 from tests.recognition.test_contacts import NAMES, contacts, seen_at, stated, without_contacts
 
 
@@ -151,8 +153,11 @@ def test_operations_that_were_not_seen_make_no_contact() -> None:
     assert names(recognise_jointly(blind).assembly) == {"A.nz on table.top"}
 
 
-def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out() -> None:
+@pytest.mark.parametrize("hulls", [False, True])
+def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None:
     a, b = scenes.block("A"), scenes.block("B")
+    if hulls:
+        a = replace(a, pieces=tuple(Hull(piece.name, piece_corners(piece)) for piece in a.pieces))
     T_a, T_b = scenes.mm(45, 3, 26), scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
     (way,) = ways_out(a, T_a, b, T_b, 1e-4)
     best = int(way.lengths.argmin())
@@ -161,6 +166,14 @@ def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out() -> None:
         out = np.array(T_a)
         out[:3, 3] += (length + 1e-5) * direction
         assert intrusion(a, out, b, T_b) == 0.0
+
+
+def test_round_faces_are_recognised_with_flat_ones() -> None:
+    """A peg in the bore of a plate, both on the table."""
+    scene = rounds.peg_in_plate()
+    goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
+    found = recognise_jointly(stated(scenes.seen(scene, goals), 0.5))
+    assert contacts(found.assembly) == contacts(scene.assembly)
 
 
 @pytest.mark.parametrize("given", [None, {"rules": 3}])

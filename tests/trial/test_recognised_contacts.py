@@ -120,6 +120,18 @@ def test_the_command_prints_the_evidence(capsys: pytest.CaptureFixture[str]) -> 
     assert "all 9 contacts of the scenario were recognised, and no other" in said
 
 
+def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["recognise", "stick_in_tower", "--observation", SEEN, "--relations", "recognised-jointly"]
+    assert cli.main(asked) == 0
+    said = capsys.readouterr().out
+    assert "this set of contacts is right with probability 0.9" in said or "with probability 1.00" in said
+    assert "all 9 contacts of the scenario were recognised, and no other" in said
+    assert cli.main([*asked, "--json"]) == 0
+    form = json.loads(capsys.readouterr().out)
+    assert 0.9 < form["probability"] <= 1.0
+    assert form["next"] is None or form["next"]["with"] or form["next"]["without"]
+
+
 def test_nothing_is_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["recognise", "stick_in_tower", "--level", "0", "--careless", "1", "--seed", "3"]) == 0
     said = capsys.readouterr().out
