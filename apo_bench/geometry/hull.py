@@ -19,8 +19,8 @@ _FLAT = 1e-7
 
 
 def sides_of(radius_m: float) -> int:
-    """Into how many sides a round wall is cut: r (1 / cos(pi / N) - 1) is at most `SAGITTA_M`."""
-    return max(FEWEST_SIDES, int(np.ceil(np.pi / np.arccos(radius_m / (radius_m + SAGITTA_M)))))
+    """Into how many sides, an even number, a round wall is cut: r (1 / cos(pi / N) - 1) is at most `SAGITTA_M`."""
+    return max(FEWEST_SIDES, 2 * int(np.ceil(np.pi / np.arccos(radius_m / (radius_m + SAGITTA_M)) / 2.0)))
 
 
 class Cylinder(NamedTuple):

@@ -26,6 +26,8 @@ _COARSE = 0.09
 _RAYS, _SHARES = 72, np.array([0.02, 0.25, 0.5, 0.75, 0.98])
 _LEAST_WALL = 0.5
 """So much of a round face must be there; bores may cross it."""
+_MOST_TESTS = 10_000
+"""Pairs of pieces with boxes that overlap, of which it is not known yet that they belong together."""
 _NEAR = 0.05
 """So many radii to the free side of a wall nothing of the part is."""
 
@@ -235,13 +237,18 @@ def _fail(place: str, what: str) -> NoReturn:
 
 def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
     """Raise an `InputError` unless every piece touches the others, over some of them."""
-    owner = list(range(len(pieces)))
+    owner, tests = list(range(len(pieces))), 0
     low = np.array([piece.center - piece.half for piece in pieces]) - _IN_PLANE_M
     high = np.array([piece.center + piece.half for piece in pieces]) + _IN_PLANE_M
     for i in range(len(pieces)):
         for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
             a, b = _root(owner, i), _root(owner, int(k))
-            if a != b and _gap(pieces[i], pieces[int(k)]) < _IN_PLANE_M:
+            if a == b:
+                continue
+            tests += 1
+            if tests > _MOST_TESTS:
+                raise InputError(f"{path}: whether the pieces touch takes too long to find out; use fewer pieces.")
+            if _gap(pieces[i], pieces[int(k)]) < _IN_PLANE_M:
                 owner[a] = b
     count = len({_root(owner, i) for i in range(len(pieces))})
     if count > 1:

@@ -12,6 +12,7 @@ LONGEST_NAME = 64
 _LARGEST_M = 10.0
 _THINNEST_M = 0.0005
 """Half of the least thickness of a box or a cylinder."""
+_FILE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*\.stl")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -74,7 +75,17 @@ class CornersRule(NamedTuple):
         return f"4 to {self.most} corners of three numbers of {-_LARGEST_M:g} to {_LARGEST_M:g} m each"
 
 
-Rule = NumbersRule | WordsRule | NameRule | CornersRule
+class FileRule(NamedTuple):
+    """A file in the folder of the part."""
+
+    def allows(self, text: str) -> bool:
+        return len(text) <= LONGEST_NAME and _FILE.fullmatch(text) is not None
+
+    def said(self) -> str:
+        return "the name of an .stl file in the folder of the part, of letters, digits, _ and -,"
+
+
+Rule = NumbersRule | WordsRule | NameRule | CornersRule | FileRule
 
 
 class ElementRule(NamedTuple):
@@ -103,8 +114,10 @@ _DOT: Mapping[str, Rule] = {
     "group": WordsRule(tuple("012345")),
     "rgba": _COLOR,
 }
-MOST_BOXES, MOST_PIECES, MOST_CORNERS, MOST_FACES = 100, 2000, 1000, 1000
+MOST_BOXES, MOST_PIECES, MOST_CORNERS, MOST_FACES = 100, 2000, 640, 1000
 """Boxes of a part of boxes alone, pieces of any other, corners of a piece, faces of any part."""
+MOST_CORNERS_IN_ALL, WIDEST_M = 40_000, 0.1
+"""Corners of all pieces of a part; radius of a cylinder, which is cut into sides."""
 MOST_SITES, MOST_CLASSES = 600, 20
 LARGEST_BYTES = 4_000_000
 """Of a part file."""
@@ -115,10 +128,10 @@ ELEMENT_RULES: Mapping[str, ElementRule] = {
     "default/default": ElementRule(_DEFAULTS, {"class": _NAMED}),
     "default/geom": ElementRule({}, _SURFACE),
     "default/site": ElementRule({}, _DOT),
-    "mujoco/asset": ElementRule({"mesh": MOST_PIECES}, {}),
-    "asset/mesh": ElementRule({}, {"name": _NAMED, "vertex": CornersRule(MOST_CORNERS)}),
+    "mujoco/asset": ElementRule({"mesh": MOST_PIECES + 1}, {}),
+    "asset/mesh": ElementRule({}, {"name": _NAMED, "vertex": CornersRule(MOST_CORNERS), "file": FileRule()}),
     "mujoco/worldbody": ElementRule({"body": 1}, {}),
-    "worldbody/body": ElementRule({"geom": MOST_PIECES, "site": MOST_SITES}, {"name": _NAMED}),
+    "worldbody/body": ElementRule({"geom": MOST_PIECES + 1, "site": MOST_SITES}, {"name": _NAMED}),
     "body/geom": ElementRule(
         {},
         {
@@ -128,6 +141,9 @@ ELEMENT_RULES: Mapping[str, ElementRule] = {
             "size": _HALF_SIZES,
             "zaxis": _DIRECTION,
             "mesh": _NAMED,
+            "contype": WordsRule(("0",)),
+            "conaffinity": WordsRule(("0",)),
+            "group": WordsRule(("1",)),
             **_SURFACE,
         },
     ),
@@ -143,7 +159,6 @@ REMEDIES: Mapping[str, str] = {
     "mass": "the density gives the mass",
     "option": "the scene says how it is simulated",
     "compiler": "lengths are in metres",
-    "file": "give the corners of each convex piece with vertex=",
     "face": "a piece is convex, its corners (vertex=) say all",
     "fromto": "say where with pos=, zaxis= and size=",
     "type": "pieces are boxes (pos, size), cylinders (pos, size, zaxis) and meshes (mesh)",

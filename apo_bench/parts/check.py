@@ -52,8 +52,8 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
     if abs(solid.volume - mesh.volume) > room:
         raise InputError(
-            f"{file}, volume_mm3: {1e9 * solid.volume:.6g} is stated, the pieces have {1e9 * mesh.volume:.6g}, over "
-            "0.1 % and what round walls explain off; state that of the exact solid, or mend the pieces."
+            f"{file}, volume_mm3: {1e9 * solid.volume:.6g} is stated, the pieces have {1e9 * mesh.volume:.6g}; only "
+            "0.1 % and what round walls explain are allowed; state that of the exact solid, or mend the pieces."
         )
     off = np.abs(mesh.center_mass - solid.centroid).max()
     if off * solid.volume > room * reach:

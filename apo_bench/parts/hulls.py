@@ -14,6 +14,8 @@ _SAME_M = 1e-7
 """Corners nearer to each other are one; a corner this far inside of the piece is none."""
 _THINNEST_M = 1e-5
 """A piece is thicker than this across each of its sides."""
+_MOST_SIDES, _MOST_DIRECTIONS = 330, 200
+"""Of one piece, and of its edges: how deep two of them are in each other is asked along each pair of directions."""
 
 
 def checked_hull(path: Path, name: str, corners: Array) -> Hull:
@@ -37,6 +39,11 @@ def checked_hull(path: Path, name: str, corners: Array) -> Hull:
         raise InputError(
             f"{path}: piece '{name}' is flat: a piece is thicker than {1e3 * _THINNEST_M:g} mm across each side; "
             "give it other corners, or remove it."
+        )
+    if len(hull.planes) > _MOST_SIDES or len(hull.edges) > _MOST_DIRECTIONS:
+        raise InputError(
+            f"{path}: piece '{name}' has {len(hull.planes)} sides, and {len(hull.edges)} directions of edges; "
+            f"{_MOST_SIDES} and {_MOST_DIRECTIONS} are the most; give it fewer corners, or cut it."
         )
     inside = below.min(axis=1)
     if inside.max() > _SAME_M:

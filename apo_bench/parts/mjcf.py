@@ -16,8 +16,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.hull import Cylinder, cylinder_hull
 from apo_bench.geometry.solid import Box, Piece
-from apo_bench.parts.allowed import MOST_BOXES
+from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M
 from apo_bench.parts.hulls import checked_hull
+from apo_bench.parts.picture import dress_picture, is_picture
 from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated
 from apo_bench.parts.tree import read_tree
 
@@ -66,15 +67,20 @@ def read_part(path: Path) -> PartFile:
         raise InputError(f"{path}: there is no body; put the boxes of the part into one <body> in <worldbody>.")
     defaults = _defaults(path, root)
     elements = [(child, _resolved(path, child, defaults)) for child in body]
+    pictures = [(e, a) for e, a in elements if e.tag == "geom" and is_picture(a)]
+    if len(pictures) > 1:
+        raise InputError(f"{path}: {_called(pictures[1][0])} is a second picture; a part has one at most.")
+    for element, said in pictures:
+        dress_picture(path, root, body, element, said)
     meshes = _meshes(path, root)
-    geoms = [(_piece(path, e, a, meshes), a) for e, a in elements if e.tag == "geom"]
+    geoms = [(_piece(path, e, a, meshes), a) for e, a in elements if e.tag == "geom" and not is_picture(a)]
     marks = tuple(_mark(path, e, a) for e, a in elements if e.tag == "site")
+    _check_names(path, "geom", [e.attrib["name"] for e, _ in elements if e.tag == "geom"])
     if not geoms:
         raise InputError(f"{path}: body '{body.get('name', '')}' has no geom; give it at least one named box.")
     if meshes:
         raise InputError(f"{path}: no geom has the mesh '{min(meshes)}'; give it one, or remove the mesh.")
     pieces = tuple(piece for piece, _ in geoms)
-    _check_names(path, "geom", [piece.name for piece in pieces])
     _check_names(path, "site", [mark.name for mark in marks])
     if all_boxes(pieces):
         if len(pieces) > MOST_BOXES:
@@ -110,6 +116,8 @@ def _state_matter(path: Path, root: Element, body: Element, stated: StatedPart) 
                     f"{path.with_suffix('.toml').name}, so remove it here."
                 )
     for geom in body.iter("geom"):
+        if "mass" in geom.attrib:
+            continue
         geom.set("density", repr(stated.density))
         if stated.friction:
             geom.set("friction", " ".join(map(repr, stated.friction)))
@@ -160,12 +168,22 @@ def _resolved(path: Path, element: Element, defaults: _Defaults) -> Mapping[str,
 
 def _meshes(path: Path, root: Element) -> dict[str, Array]:
     """Mesh -> its corners, (k, 3)."""
-    meshes = root.findall("asset/mesh")
-    _check_names(path, "mesh", [mesh.attrib["name"] for mesh in meshes])
+    every = root.findall("asset/mesh")
+    _check_names(path, "mesh", [mesh.attrib["name"] for mesh in every])
+    meshes = [mesh for mesh in every if "face" not in mesh.attrib]
     for mesh in meshes:
+        if "file" in mesh.attrib:
+            raise InputError(f"{path}: {_called(mesh)} has file=, which only a picture has; give its corners.")
         if "vertex" not in mesh.attrib:
             raise InputError(f"{path}: {_called(mesh)} has no vertex=; give its corners.")
-    return {mesh.attrib["name"]: _numbers(mesh.attrib["vertex"]).reshape(-1, 3) for mesh in meshes}
+    found = {mesh.attrib["name"]: _numbers(mesh.attrib["vertex"]).reshape(-1, 3) for mesh in meshes}
+    count = sum(map(len, found.values()))
+    if count > MOST_CORNERS_IN_ALL:
+        raise InputError(
+            f"{path}: the meshes have {count} corners; {MOST_CORNERS_IN_ALL} are the most that a part may have, so cut "
+            "round walls that no contact uses into fewer sides."
+        )
+    return found
 
 
 _NEEDED: Mapping[str, Mapping[str, str]] = {
@@ -206,6 +224,8 @@ def _piece(path: Path, element: Element, said: Mapping[str, str], meshes: dict[s
         raise InputError(f"{path}: {_called(element)} has {len(size)} numbers in size=; {_NEEDED[kind]['size']}.")
     if kind == "box":
         return Box(name, at, size)
+    if size[0] > WIDEST_M:
+        raise InputError(f"{path}: {_called(element)} has a radius of {size[0]:g} m; {WIDEST_M:g} is the most allowed.")
     axis = _numbers(said.get("zaxis", "0 0 1"))
     length = float(np.linalg.norm(axis))
     if length < _SHORTEST_AXIS:

@@ -42,7 +42,7 @@ ELEMENTS = {
     "weld": ('<equality><weld body1="thing"/></equality>', "<equality>"),
     "actuator": ('<actuator><motor joint="x"/></actuator>', "<actuator>"),
     "plugin": ('<extension><plugin plugin="mujoco.elasticity.cable"/></extension>', "<extension>"),
-    "file": ('<asset><mesh name="m" file="/etc/passwd"/></asset>', "has file=, which a part may not say"),
+    "file": ('<asset><mesh name="m" file="/etc/passwd"/></asset>', "an .stl file in the folder of the part"),
     "texture": ('<asset><texture name="t" type="2d"/></asset>', "<texture> stands in <asset>"),
     "contact": ('<contact><exclude body1="a" body2="b"/></contact>', "<contact>"),
     "include": ('<include file="/etc/passwd"/>', "write the boxes into the file itself"),
@@ -62,8 +62,6 @@ INSIDE = {
 }
 OF_GEOM = {
     "mass": "1e300",
-    "contype": "0",
-    "conaffinity": "0",
     "condim": "1",
     "margin": "1",
     "gap": "1",
@@ -74,7 +72,6 @@ OF_GEOM = {
     "shellinertia": "true",
     "fluidshape": "ellipsoid",
     "fluidcoef": "9 9 9 9 9",
-    "group": "3",
     "material": "m",
     "hfield": "h",
     "fromto": "0 0 0 1 1 1",
@@ -175,7 +172,7 @@ COSTLY = {
         PART.replace("</body>", (SITE + 'pos="0 0 0"/>') * 20_000 + "</body>"),
         f"{MOST_SITES} <site>",
     ),
-    "boxes": (PART.replace("</body>", (GEOM + 'size="1 1 1"/>') * 20_000 + "</body>"), f"{MOST_PIECES} <geom>"),
+    "boxes": (PART.replace("</body>", (GEOM + 'size="1 1 1"/>') * 20_000 + "</body>"), f"{MOST_PIECES + 1} <geom>"),
     "nested classes": (PART.replace("</default>", '<default class="c">' * 8_000 + "</default>" * 8_001, 1), "at most"),
     "classes": (PART.replace("</default>", '<default class="c"/>' * 8_000 + "</default>", 1), "<default>"),
     "nested bodies": (PART.replace("</body>", "<body>" * 50_000 + "</body>" * 50_001), "<body> stands in <body>"),
@@ -308,3 +305,10 @@ def test_what_stands_at_the_ends_of_the_ranges_is_composed(
     model = build_scene(load_scenario(file)).work.model
     assert model.geom("stick/bar").friction == pytest.approx(friction)
     assert model.body("stick/").subtreemass == pytest.approx(float(said.split('"')[1]) * 0.22 * 0.0195**2)
+
+
+@pytest.mark.parametrize(("key", "value"), [("contype", "1"), ("conaffinity", "2"), ("group", "3"), ("group", "0")])
+def test_a_geom_may_only_say_that_it_never_collides(key: str, value: str, tmp_path: Path) -> None:
+    assert f"<geom> 'low' has {key}=" in refusal(PART.replace(GEOM, f'{GEOM}{key}="{value}" '), tmp_path)
+    allowed = refusal(PART.replace(GEOM, f'{GEOM}contype="0" conaffinity="0" group="1" '), tmp_path)
+    assert "'low' is a picture if it has" in allowed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from apo_bench.errors import InputError
@@ -139,16 +140,19 @@ def test_what_is_stated_must_be_so(case: str, part: Path) -> None:
 
 PIECES = {
     "no corners": (r' vertex="[^"]*"', "", "has no vertex="),
-    "three corners": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0"', "4 to 1000 corners"),
-    "a number too few": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 1"', "4 to 1000 corners"),
-    "an infinite corner": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 inf"', "4 to 1000 corners"),
+    "three corners": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0"', "4 to 640 corners"),
+    "a number too few": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 1"', "4 to 640 corners"),
+    "an infinite corner": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 inf"', "4 to 640 corners"),
     "a flat piece": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 1 1 0"', "is flat"),
     "a thin piece": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 1 1 0.000001"', "is flat"),
     "a corner twice": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 0 0 0"', "corners 1 and 5 of piece"),
     "a corner inside": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 .1 .1 .1"', "is not convex: its corner 5"),
     "a mesh of two geoms": (r'mesh="p2"', 'mesh="p1"', "the mesh 'p1', which <asset> has not, or another geom has"),
     "a mesh of no geom": (r'<geom name="p2"[^>]*>', "", "no geom has the mesh 'p2'"),
-    "a file": (r'<mesh name="p1"', '<mesh file="p1.stl" name="p1"', "has file="),
+    "a file": (r'<mesh name="p1"', '<mesh file="p1.stl" name="p1"', "has file=, which only a picture has"),
+    "a file elsewhere": (r'<mesh name="p1"', '<mesh file="../p1.stl" name="p1"', "in the folder of the part"),
+    "a piece that does not collide": (r'mesh="p2"', 'mesh="p2" contype="0"', "'p2' is a picture if it has"),
+    "a wide cylinder": (r'size="0.004 ', 'size="0.4 ', "has a radius of 0.4 m; 0.1 is the most"),
     "a turned mesh": (r'mesh="p2"', 'mesh="p2" zaxis="1 0 0"', "has zaxis=, which a mesh has not"),
     "a mesh somewhere": (r'mesh="p2"', 'mesh="p2" pos="1 0 0"', "has pos=, which a mesh has not"),
     "a cylinder of three sizes": (r'size="0.004 0.0055"', 'size="0.004 0.0055 0.1"', "has 3 numbers in size="),
@@ -185,3 +189,85 @@ def test_beside_boxes_alone_any_file_may_lie(tmp_path: Path) -> None:
     assert not path.with_suffix(".toml").exists()
     path.with_suffix(".toml").write_text("a scenario, perhaps", encoding="utf-8")
     assert "top" in load_part(path).faces
+
+
+def stl(triangles: np.ndarray) -> bytes:
+    """A binary STL file."""
+    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    rows = np.zeros(len(triangles), dtype=row)
+    rows["corners"] = triangles
+    return bytes(80) + len(triangles).to_bytes(4, "little") + rows.tobytes()
+
+
+TETRAHEDRON = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
+TRIANGLES = TETRAHEDRON[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
+PICTURE = '<geom name="looks" type="mesh" mesh="looks" contype="0" conaffinity="0" group="1"/>'
+
+
+def with_picture(part: Path, geom: str, file: str = "looks.stl") -> None:
+    text = part.read_text(encoding="utf-8")
+    text = text.replace("</asset>", f'<mesh name="looks" file="{file}"/></asset>').replace("</body>", geom + "</body>")
+    part.write_text(text, encoding="utf-8")
+
+
+def test_a_picture_is_shown_and_never_collides(part: Path) -> None:
+    import mujoco
+
+    pieces = load_part(part).pieces
+    with_picture(part, PICTURE)
+    (part.parent / "looks.stl").write_bytes(stl(TRIANGLES))
+    assert [piece.name for piece in load_part(part).pieces] == [piece.name for piece in pieces]
+    file = read_part(part)
+    assert "file=" not in file.xml
+    model = mujoco.MjModel.from_xml_string(file.xml)
+    looks = model.geom("looks")
+    assert (looks.contype[0], looks.conaffinity[0], looks.group[0]) == (0, 0, 1)
+    assert {int(model.geom(piece.name).group[0]) for piece in pieces} == {3}
+    assert model.body("thing").mass[0] == pytest.approx(2700.0 * load_part(part).volume, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("raw", "words"),
+    [
+        (None, "No such file"),
+        (b"", "no binary STL file"),
+        (b"solid looks\nendsolid looks\n" + bytes(200), "no binary STL file"),
+        (stl(TRIANGLES)[:-1], "no binary STL file"),
+        (stl(np.full((2, 3, 3), np.nan)), "corners within 10 m"),
+        (stl(1e5 * TRIANGLES), "corners within 10 m"),
+        (stl(TRIANGLES[:1]), "lie in a plane"),
+        (stl(np.repeat(TRIANGLES, 6000, axis=0)), "larger than 1.0"),
+    ],
+)
+def test_a_picture_that_is_none_is_refused(raw: bytes | None, words: str, part: Path) -> None:
+    with_picture(part, PICTURE)
+    if raw is not None:
+        (part.parent / "looks.stl").write_bytes(raw)
+    with pytest.raises(InputError, match=words):
+        load_part(part)
+
+
+@pytest.mark.parametrize(
+    ("geom", "words"),
+    [
+        (PICTURE.replace('contype="0" ', ""), "is a picture if it has"),
+        (PICTURE.replace('mesh="looks"', 'mesh="p1"'), "is a picture if it has"),
+        (PICTURE + PICTURE.replace('"looks"', '"again"', 1), "is a second picture"),
+        (PICTURE.replace('name="looks"', 'name="p1"'), "two geoms are called 'p1'"),
+        (PICTURE.replace(' contype="0" conaffinity="0" group="1"', ""), "only a picture has"),
+    ],
+)
+def test_what_only_looks_like_a_picture_is_refused(geom: str, words: str, part: Path) -> None:
+    with_picture(part, geom)
+    (part.parent / "looks.stl").write_bytes(stl(TRIANGLES))
+    assert words in refusal(part)
+
+
+def test_pieces_of_many_sides_are_refused(part: Path) -> None:
+    rng = np.random.default_rng(0)
+    ball = rng.normal(size=(600, 3))
+    ball *= 0.004 / np.linalg.norm(ball, axis=1)[:, None]
+    text = part.read_text(encoding="utf-8")
+    corners = " ".join(f"{x:.9f}" for x in ball.ravel())
+    part.write_text(re.sub(r'vertex="[^"]*"', f'vertex="{corners}"', text, count=1), encoding="utf-8")
+    assert "330 and 200 are the most" in refusal(part)

@@ -48,6 +48,24 @@ class Body:
             self.moments.moved(R, t),
         )
 
+    def with_rim(
+        self,
+        name: str,
+        at_mm: Sequence[float],
+        axis: Sequence[float],
+        radius_mm: float,
+        hole: bool = True,
+    ) -> Body:
+        """With the circle at the end of a hole, or of a shaft, as a face of its own.
+
+        Args:
+            at_mm: Its middle.
+            axis: Out of the part.
+        """
+        n, r = np.asarray(axis, dtype=np.float64), 1e-3 * radius_mm
+        rim = RoundFace(name, 1e-3 * np.asarray(at_mm), n / np.linalg.norm(n), (0.0, 0.0), (r, r), hole)
+        return replace(self, rounds=(*self.rounds, rim))
+
     def prefixed(self, prefix: str) -> Body:
         """The same with names that begin so; faces without a name stay without."""
         return replace(

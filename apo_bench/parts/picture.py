@@ -1,0 +1,69 @@
+"""The mesh that a part is shown as: a binary STL file in the folder of the part, which never collides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.reading import read_bytes
+
+NEVER_COLLIDES: Mapping[str, str] = {"contype": "0", "conaffinity": "0", "group": "1"}
+"""What a geom must say to be the picture."""
+MOST_TRIANGLES = 20_000
+_HEADER, _TRIANGLE = 84, 50
+"""Bytes of a binary STL file."""
+_LARGEST_M = 10.0
+_HIDDEN_GROUP = "3"
+"""Of MuJoCo's groups of geoms, 0 to 2 are shown."""
+
+
+def is_picture(said: Mapping[str, str]) -> bool:
+    """Whether a geom says that it is no piece."""
+    return any(key in said for key in NEVER_COLLIDES)
+
+
+def dress_picture(path: Path, root: Element, body: Element, geom: Element, said: Mapping[str, str]) -> None:
+    """Write the triangles of the picture into the tree in place of the file, and hide the pieces.
+
+    Raises:
+        InputError: The geom is another one than a picture, or its file is no binary STL file of metres.
+    """
+    called = f"<geom> '{geom.attrib['name']}'"
+    meshes = {mesh.attrib["name"]: mesh for mesh in root.iterfind("asset/mesh")}
+    mesh = meshes.get(said.get("mesh", ""))
+    right = all(said.get(key) == value for key, value in NEVER_COLLIDES.items())
+    if said.get("type") != "mesh" or not right or mesh is None or "file" not in mesh.attrib:
+        wanted = " ".join(f'{key}="{value}"' for key, value in NEVER_COLLIDES.items())
+        raise InputError(
+            f"{path}: {called} is a picture if it has {wanted} and a mesh with file=; give it these, or none of them."
+        )
+    file = path.parent / mesh.attrib.pop("file")
+    triangles = _read_stl(file)
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    mesh.set("vertex", " ".join(f"{x:.9g}" for x in corners.ravel()))
+    mesh.set("face", " ".join(map(str, index.ravel())))
+    mesh.set("inertia", "shell")
+    geom.set("mass", "0")
+    for other in body.iter("geom"):
+        if other is not geom:
+            other.set("group", _HIDDEN_GROUP)
+
+
+def _read_stl(file: Path) -> Array:
+    """The triangles, (t, 3, 3), [m]."""
+    raw = read_bytes(file, "binary STL file", _HEADER + _TRIANGLE * MOST_TRIANGLES)
+    count = int.from_bytes(raw[80:_HEADER], "little")
+    if len(raw) < _HEADER + _TRIANGLE or len(raw) != _HEADER + _TRIANGLE * count:
+        raise InputError(f"{file}: this is no binary STL file; save the mesh as one, in metres.")
+    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    corners = np.frombuffer(raw, dtype=row, offset=_HEADER)["corners"].astype(np.float64)
+    if not (np.abs(corners) <= _LARGEST_M).all():
+        raise InputError(f"{file}: corners within {_LARGEST_M:g} m are needed; save the mesh in metres.")
+    if np.ptp(corners.reshape(-1, 3), axis=0).min() <= 0.0:
+        raise InputError(f"{file}: all triangles lie in a plane; give a mesh of the part, or no picture.")
+    return np.asarray(corners)
