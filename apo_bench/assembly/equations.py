@@ -247,6 +247,10 @@ def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, in
     ]
 
 
+_MOST_CORNERS = 8
+"""Of an outline with more, such as a circle, those farthest out in so many directions say as much."""
+
+
 class _Flat(NamedTuple):
     """What the equations need of a face, measured once."""
 
@@ -263,7 +267,18 @@ def _flat(face: Face) -> _Flat:
     twice = _cross(corners, np.concatenate([corners[1:], corners[:1]])).sum(axis=0)
     size = math.sqrt(twice @ twice)
     n = twice / size
-    return _Flat(corners, np.append(n, -(corners @ n).sum() / len(corners)), size / 2)
+    return _Flat(_outermost(corners, n), np.append(n, -(corners @ n).sum() / len(corners)), size / 2)
+
+
+def _outermost(corners: Array, n: Array) -> Array:
+    """At most `_MOST_CORNERS` corners of an outline, in its order: any three that lie in no line fix its plane."""
+    if len(corners) <= _MOST_CORNERS:
+        return corners
+    x = corners[1] - corners[0]
+    x = x / math.sqrt(x @ x)
+    turn = 2.0 * np.pi * np.arange(_MOST_CORNERS) / _MOST_CORNERS
+    ways = np.outer(np.cos(turn), x) + np.outer(np.sin(turn), np.cross(n, x))
+    return np.asarray(corners[np.unique((corners @ ways.T).argmax(axis=0))])
 
 
 def _smaller(manipulated: _Flat, environment: _Flat) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly.goals import Layout, Poses
 from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.placement import placements
-from apo_bench.assembly.topology import Contact
+from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -55,6 +55,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     Raises:
         InputError: The first thing found wrong.
     """
+    _check_play(scenario, file)
     apart: set[_Pair] = set()
     for case in _cases(scenario):
         stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.goals))
@@ -124,7 +125,6 @@ def _stays(scenario: Scenario, contact: Contact) -> bool:
 
 def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:
     if scenario.assembly.is_round(contact):
-        _check_play(scenario, file, case, key, contact)
         _check_round(scenario, file, case, key, contact, poses)
         return
     face, on = scenario.assembly.face(contact.manipulated), scenario.assembly.face(contact.environment)
@@ -147,18 +147,40 @@ def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact:
         raise _refuse(file, case, key, sentence, remedy)
 
 
-def _check_play(scenario: Scenario, file: str, case: Case, key: str, contact: Contact) -> None:
+def without_play(assembly: Assembly, clearance_mm: float) -> tuple[Contact, str] | None:
+    """The first shaft that is as thick as its hole or thicker, and why: radii and clearance leave it no play."""
+    for contact in (contact for operation in assembly.operations for contact in operation.contacts):
+        a, b = map(assembly.face_of, contact)
+        play = play_mm(a, b, clearance_mm) if contact_kind(a, b) == "shaft in hole" else None
+        if play is not None and play <= _NO_PLAY_MM:
+            why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
+            fit = f" and {clearance_mm:g} mm of clearance" if assembly.is_fit(contact) else ", and neither is fit"
+            return contact, f"'{contact}': the shaft has no play in the hole, {why}{fit}"
+    return None
+
+
+def check_clearance(scenario: Scenario, clearance_mm: float) -> None:
+    """Check a clearance that is asked for in place of the scenario's.
+
+    Raises:
+        InputError: It leaves a shaft no play in its hole.
+    """
+    found = without_play(scenario.assembly, clearance_mm)
+    if found is not None:
+        raise InputError(f"a clearance of {clearance_mm:g} mm was given, with which {found[1]}; give more.")
+
+
+def _check_play(scenario: Scenario, file: str) -> None:
     """A shaft goes into a hole only if that is wider, by its size or by the clearance."""
-    a, b = (scenario.assembly.face_of(of) for of in contact)
-    if contact_kind(a, b) != "shaft in hole":
-        return
-    play = play_mm(a, b, scenario.clearance_mm)
-    if play is not None and play <= _NO_PLAY_MM:
-        why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
-        fits = scenario.assembly.is_fit(contact)
-        why += f" and {scenario.clearance_mm:g} mm of clearance" if fits else ", and neither is fit"
-        sentence = f"'{contact}': the shaft has no play in the hole, {why}"
-        raise _refuse(file, case, key, sentence, "make the hole wider, or mark it as fit and give a clearance")
+    found = without_play(scenario.assembly, scenario.clearance_mm)
+    if found is not None:
+        contact, sentence = found
+        k = next(k for k, operation in enumerate(scenario.assembly.operations) if contact in operation.contacts)
+        number = scenario.assembly.operations[k].contacts.index(contact) + 1
+        raise InputError(
+            f"{file}, operation {k + 1}, contacts, contact {number}: {sentence}; make the hole wider, or mark it as "
+            "fit and give a clearance."
+        )
 
 
 def _check_round(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:

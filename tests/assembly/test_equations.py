@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.equations import equations, largest_gap
+from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from tests import scenes
+from tests import rounds, scenes
 
 pytestmark = pytest.mark.numeric
 
@@ -236,3 +237,20 @@ def test_displacement_starts_out_as_the_body_twist() -> None:
     for i in range(6):
         q = 1e-7 * np.eye(6)[i]
         assert_allclose(displacement(q[None])[0], pose.exp(q), atol=1e-13)
+
+
+def test_of_a_circle_eight_corners_say_what_all_say() -> None:
+    """The plane of any three corners is that of all: the same free directions and rank; squares keep their corners."""
+    scene = rounds.peg_in_plate()
+    faces = [contact.manipulated.face for contact, _, _ in lowered(scene.assembly).relations()]
+    system = equations(scene.assembly, scene.start, scene.goals)
+    rows = np.flatnonzero(system.contact == faces.index("end"))
+    assert len(rows) == 8
+    J = system.linearised(scene.goals)[1]
+    all_corners = scene.assembly.solids["peg"].faces["end"].outline
+    assert {tuple(v) for v in np.round(system.vertex[rows, :3], 9)} <= {tuple(v) for v in np.round(all_corners, 9)}
+    centre = system.vertex[rows, :3].mean(axis=0)
+    assert centre == pytest.approx(np.zeros(3), abs=1e-3)
+    assert np.linalg.matrix_rank(J[rows], tol=1e-6) == 3
+    block = equations(*(lambda s: (s.assembly, s.start, s.goals))(scenes.bridge()))
+    assert np.bincount(block.contact).tolist() == [4] * len(block.letters)

@@ -11,7 +11,7 @@ import pytest
 from apo_bench.assembly.topology import Contact, Gap, PartFace
 from apo_bench.errors import InputError
 from apo_bench.io.strict_json import JsonNode
-from apo_bench.scenario.checks import check_scenario
+from apo_bench.scenario.checks import check_clearance, check_scenario
 from apo_bench.scenario.contacts import Asked, read_contacts
 from apo_bench.scenario.scenario import Shift, Site
 from tests import rounds, scenes
@@ -125,3 +125,11 @@ def test_a_shaft_varied_out_of_its_bores_is_named() -> None:
     along = Shift(2, np.array([0.0, 0.0, 1.0]), -0.01, 0.09)
     with pytest.raises(InputError, match=r"vary: .* no length in common when it is varied by 90 mm; vary by less"):
         check_scenario(as_scenario(rounds.through(), shifts=(along,)), "mine.toml")
+
+
+def test_a_clearance_that_leaves_a_shaft_no_play_is_named() -> None:
+    scenario = as_scenario(rounds.peg_in_plate())
+    check_clearance(scenario, 0.01)
+    with pytest.raises(InputError, match=r"^a clearance of 0 mm was given, with which 'peg.wall .*; give more"):
+        check_clearance(scenario, 0.0)
+    check_clearance(as_scenario(rounds.loose_peg()), 0.0)

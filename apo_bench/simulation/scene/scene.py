@@ -18,6 +18,7 @@ from apo_bench.parts import read_part
 from apo_bench.records.settings import check
 from apo_bench.records.thresholds import Criteria
 from apo_bench.resources import folder
+from apo_bench.scenario.checks import check_clearance
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
@@ -82,10 +83,12 @@ def build_scene(
     """Compile a scenario.
 
     Raises:
-        InputError: Unknown grasp or arm, a clearance that a part cannot have, an unchecked time step.
+        InputError: Unknown grasp or arm, a clearance that a part cannot have or that leaves a shaft no play, an
+            unchecked time step.
     """
     check("grasp", grasp)
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
+    check_clearance(scenario, clearance)
     found, settings = find_arm(arm), physics(timestep_s)
     shown = _compiled(scenario, _compose(scenario, clearance, settings, None, grasp))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
