@@ -102,10 +102,10 @@ def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece,
     for i, own in enumerate(a):
         between = at[:, None] + places_a[i] - places_b[None]
         rooms = np.sqrt((between * between).sum(axis=-1)) - radii_a[i] - radii_b
-        for j in np.argsort(rooms.min(axis=0)):
-            room = rooms[:, j]
-            near = (room <= 0.0) & (-room > deepest)
-            deepest = np.where(room > 0.0, np.maximum(deepest, -room), deepest)
+        deepest = np.maximum(deepest, np.where(rooms > 0.0, -rooms, -np.inf).max(axis=1))
+        close = np.flatnonzero((rooms <= 0.0).any(axis=0))
+        for j in close[np.argsort(rooms[:, close].min(axis=0))]:
+            near = (rooms[:, j] <= 0.0) & (-rooms[:, j] > deepest)
             if not near.any():
                 continue
             R_b, found = T_b[:3, :3], np.full(len(at), -np.inf)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_boxes, separating_axes, shadow
+from apo_bench.geometry.convex import across_edges, across_sides, all_boxes, shadow
 from apo_bench.geometry.solid import Piece
 
 _SLACK_M = 5e-5
@@ -40,6 +40,16 @@ def overlap_intervals(
         slack_m: Negative: pieces count that are still this far apart.
         within: Overlaps that end before or begin after these places may be left out, [m].
     """
+    pairs, spans = _boxed(moving, way, resting, slack_m)
+    if all_boxes(moving.pieces) and all_boxes(resting.pieces):
+        return spans
+    near = (spans[:, 1] > within[0]) & (spans[:, 0] < within[1])
+    found = [_exactly(moving, way, resting, slack_m, int(k)) for k in pairs[near]]
+    return np.concatenate([np.zeros((0, 2)), *found])
+
+
+def _boxed(moving: Posed, way: Array, resting: Posed, slack_m: float) -> tuple[NDArray[np.intp], Array]:
+    """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
     a, half_a = _world(moving)
     b, half_b = _world(resting)
     axes = _axes(moving.T[:3, :3], resting.T[:3, :3])
@@ -47,24 +57,25 @@ def overlap_intervals(
     reach_b = half_b @ np.abs(axes @ resting.T[:3, :3]).T
     reach = (reach_a[:, None] + reach_b[None]).reshape(-1, len(axes)) - slack_m
     at = ((a @ axes.T)[:, None] - (b @ axes.T)[None]).reshape(-1, len(axes))
-    if all_boxes(moving.pieces) and all_boxes(resting.pieces):
-        return _intervals(at, axes @ way, reach)[1]
-    near, spans = _intervals(at, axes @ way, reach)
-    near = near[(spans[:, 1] > within[0]) & (spans[:, 0] < within[1])]
-    return _pair_by_pair(moving, way, resting, slack_m, near)
+    return _intervals(at, axes @ way, reach)
 
 
-def _pair_by_pair(moving: Posed, way: Array, resting: Posed, slack_m: float, pairs: NDArray[np.intp]) -> Array:
-    """`overlap_intervals` where sides look anywhere, of those pairs whose boxes overlap; pairs by number, (p,)."""
-    found = [np.zeros((0, 2))]
-    (R_a, R_b), between = (moving.T[:3, :3], resting.T[:3, :3]), moving.T[:3, 3] - resting.T[:3, 3]
-    for i, j in zip(*np.divmod(pairs, len(resting.pieces)), strict=True):
-        a, b = moving.pieces[i], resting.pieces[j]
-        axes = separating_axes(a, R_a, b, R_b)
+def _exactly(moving: Posed, way: Array, resting: Posed, slack_m: float, pair: int) -> Array:
+    """Where the pieces of a pair meet, (1, 2), or nowhere, (0, 2): across their sides, then across edges."""
+    a, b = (of.pieces[i] for of, i in zip((moving, resting), divmod(pair, len(resting.pieces)), strict=True))
+    R_a, R_b, between = moving.T[:3, :3], resting.T[:3, :3], moving.T[:3, 3] - resting.T[:3, 3]
+
+    def meet(axes: Array) -> Array:
         (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, R_b, axes)
         at, reach = middle_a - middle_b + axes @ between, half_a + half_b - slack_m
-        found.append(_intervals(at[None], axes @ way, reach[None])[1])
-    return np.concatenate(found)
+        return _intervals(at[None], axes @ way, reach[None])[1]
+
+    sides = meet(across_sides(a, R_a, b, R_b))
+    edges = meet(across_edges(a, R_a, b, R_b)) if len(sides) else sides
+    if not len(edges):
+        return edges
+    low, high = max(sides[0, 0], edges[0, 0]), min(sides[0, 1], edges[0, 1])
+    return np.array([[low, high]]) if low < high else np.zeros((0, 2))
 
 
 def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: Sequence[Posed]) -> bool:
@@ -78,12 +89,25 @@ def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: S
 
 
 def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:
-    """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap."""
-    found = [overlap_intervals(m, way, r, -_SLACK_M) for m in moving for r in resting]
-    spans = np.concatenate(found) if found else np.zeros((0, 2))
-    at = 0.0
-    while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):
-        at = float(on[:, 1].max())
+    """How far parts must be moved as one until they touch none of the others any more, [m]: the end of the overlap.
+
+    Pieces that are no boxes are compared by the boxes around them first, those that go on the longest before others.
+    """
+    spans, exact, asked = list[Array](), list[bool](), list[tuple[Posed, Posed, int]]()
+    for m, r in product(moving, resting):
+        pairs, found = _boxed(m, way, r, -_SLACK_M)
+        spans += list(found)
+        exact += [all_boxes(m.pieces) and all_boxes(r.pieces)] * len(found)
+        asked += [(m, r, int(k)) for k in pairs]
+    at, last = 0.0, np.array([span[1] for span in spans])
+    order = np.argsort(-last, kind="stable")
+    while (i := next((i for i in order if spans[i][0] <= at < spans[i][1]), None)) is not None:
+        if not exact[i]:
+            m, r, k = asked[i]
+            met = _exactly(m, way, r, -_SLACK_M, k)
+            spans[i], exact[i] = met[0] if len(met) else np.array([np.inf, -np.inf]), True
+        if spans[i][0] <= at < spans[i][1]:
+            at = float(spans[i][1])
     return max(0.0, at - _SLACK_M)
 
 
