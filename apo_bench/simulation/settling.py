@@ -126,7 +126,7 @@ def _xml(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float,
 
 
 def _spelled_all(said: Mapping[str, object]) -> dict[str, str]:
-    return {key: value if isinstance(value, str) else _spelled(value) for key, value in said.items()}
+    return {key: str(value) if isinstance(value, str | int) else _spelled(value) for key, value in said.items()}
 
 
 def _spelled(numbers: object) -> str:

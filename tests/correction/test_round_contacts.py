@@ -17,6 +17,7 @@ from apo_bench.assembly.topology import Assembly, Gap, PartFace
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.explanation import explain
+from apo_bench.correction.learning.evidence import readings
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.own_code.forms import observation_message, parse_observation
 from apo_bench.correction.play import fit_covariance
@@ -25,6 +26,7 @@ from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.show.explain_text import sentences
+from apo_bench.trial.methods import with_simulated
 from tests.correction.robust.test_robust import SCENARIOS, shown
 from tests.round_contacts import CONTACTS, IN_BORE, LYING, MM, PLATE_AT, scene, seen, tilted, touching
 
@@ -267,6 +269,51 @@ def test_play_of_a_round_fit_is_a_disc(radius, fit, play):
         ends = [(at + (z - at[2]) / along[2] * along)[:2] for z in (0.0, 20 * MM)]
         far = max(np.linalg.norm(ends, axis=1))
         assert np.cos(np.pi / 16) * play * MM - 1e-6 <= far <= play * MM + 1e-6
+
+
+@pytest.mark.parametrize("mm", [0.02, 0.5])
+def test_a_shaft_that_stands_anywhere_in_its_play_is_no_alarm(mm):
+    """Of 300 draws with both ends somewhere in a disc of 0.25 mm, at a nominal 1 %."""
+    bore, c = touching("pin.shaft", "plate.bore"), 0.25 * MM
+    assembly, start, _ = scene(bore, at=IN_BORE, fit=True)
+    rng, many = np.random.default_rng(3), []
+    for _ in range(300):
+        radius, angle = c * np.sqrt(rng.uniform(size=2)), rng.uniform(0.0, 2 * np.pi, 2)
+        low, high = (
+            np.array([r * np.cos(a), r * np.sin(a), z]) for r, a, z in zip(radius, angle, (0, 20 * MM), strict=True)
+        )
+        axis = (high - low) / np.linalg.norm(high - low)
+        off = pose.inverse(PLATE_AT) @ IN_BORE
+        x = off[:3, 0] - (off[:3, 0] @ axis) * axis
+        off[:3, :3] = np.column_stack([x / np.linalg.norm(x), np.cross(axis, x / np.linalg.norm(x)), axis])
+        off[:3, 3] = low + axis * off[2, 3] / axis[2]
+        many.append(seen(assembly, start, np.array([PLATE_AT, PLATE_AT @ off]), rng, mm, mm, play_m=c))
+    made = correct_many(many)
+    assert all(one.ok for one in made)
+    assert np.mean([not one.test.passes for one in made]) <= 0.03
+    told_nothing = correct_many([replace(one, play_m=0.0) for one in many])
+    assert mm > 0.1 or np.mean([not one.test.passes for one in told_nothing]) > 0.5
+
+
+def test_learning_reads_what_round_contacts_fix():
+    observation, _ = case("shaft in hole")
+    both, first = readings(observation, correct(observation).goals, [(), (1,)])
+    assert (len(both.known), len(first.known)) == (7, 3)
+
+
+def test_parts_of_any_pieces_settle():
+    """A pin seen 2 mm above where it lies comes down."""
+    observation, truth = case("shaft on plane", mm=1e-3, deg=1e-3)
+    raised = np.array(observation.goals)
+    raised[1, 2, 3] += 2 * MM
+    made = correct(replace(observation, goals=raised), with_simulated("settle"))
+    assert made.ok, made.sentence
+    assert made.goals[1, 2, 3] == pytest.approx(truth[1, 2, 3], abs=0.1 * MM)
+
+
+def test_a_message_of_cadquery_says_that_it_knows_flat_contacts_only():
+    with pytest.raises(InputError, match="'cadquery' knows flat contacts"):
+        correct(case("shaft in hole")[0], "cadquery")
 
 
 @pytest.mark.parametrize(
