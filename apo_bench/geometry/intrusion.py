@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
@@ -92,29 +93,52 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
 
 
 def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
-    """`intrusion_depths` where sides look anywhere: pairs whose balls meet nowhere count by how far these are apart.
+    """`intrusion_depths` where sides look anywhere: pairs of which balls or upright boxes meet nowhere count by how far
+    these are apart.
 
-    A pair that is less deep across its sides alone than another one need not be looked at across its edges.
+    No pair is deeper than its balls and boxes are in each other, nor than it is across its sides alone, so most need
+    not be looked at.
     """
-    deepest = np.full(len(at), -np.inf)
-    (balls_a, radii_a), (balls_b, radii_b) = _balls(a), _balls(b)
-    places_a, places_b = balls_a @ R_a.T, balls_b @ T_b[:3, :3].T + T_b[:3, 3]
-    for i, own in enumerate(a):
-        between = at[:, None] + places_a[i] - places_b[None]
-        rooms = np.sqrt((between * between).sum(axis=-1)) - radii_a[i] - radii_b
-        deepest = np.maximum(deepest, np.where(rooms > 0.0, -rooms, -np.inf).max(axis=1))
-        close = np.flatnonzero((rooms <= 0.0).any(axis=0))
-        for j in close[np.argsort(rooms[:, close].min(axis=0))]:
-            near = (rooms[:, j] <= 0.0) & (-rooms[:, j] > deepest)
-            if not near.any():
-                continue
-            R_b, found = T_b[:3, :3], np.full(len(at), -np.inf)
-            found[near] = _depths(own, R_a, at[near], b[j], T_b, across_sides(own, R_a, b[j], R_b))
-            near &= found > deepest
-            if near.any():
-                edges = _depths(own, R_a, at[near], b[j], T_b, across_edges(own, R_a, b[j], R_b))
-                deepest[near] = np.maximum(deepest[near], np.minimum(found[near], edges))
+    R_b, rooms = T_b[:3, :3], _rooms(a, R_a, at, b, T_b)
+    deepest = np.where(rooms > 0.0, -rooms, -np.inf).max(axis=(1, 2))
+    closest = rooms.min(axis=0)
+    pairs = np.argwhere(closest <= 0.0)
+    for i, j in pairs[np.argsort(closest[closest <= 0.0], kind="stable")]:
+        room = rooms[:, i, j]
+        near = (room <= 0.0) & (-room > deepest)
+        if not near.any():
+            continue
+        found = np.full(len(at), -np.inf)
+        found[near] = _depths(a[i], R_a, at[near], b[j], T_b, across_sides(a[i], R_a, b[j], R_b))
+        near &= found > deepest
+        if near.any():
+            edges = _depths(a[i], R_a, at[near], b[j], T_b, across_edges(a[i], R_a, b[j], R_b))
+            deepest[near] = np.maximum(deepest[near], np.minimum(found[near], edges))
     return deepest
+
+
+def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
+    """How far apart pieces are at least, at k places, (k, a, b), [m]: by balls, and by upright boxes, around them."""
+    (balls_a, radii_a), (balls_b, radii_b) = _balls(a), _balls(b)
+    (boxes_a, halves_a), (boxes_b, halves_b) = _upright(a, R_a), _upright(b, T_b[:3, :3])
+    shift = (at - T_b[:3, 3])[:, None, None]
+    between = shift + (balls_a @ R_a.T)[:, None] - (balls_b @ T_b[:3, :3].T)[None]
+    rooms = np.sqrt((between * between).sum(axis=-1)) - (radii_a[:, None] + radii_b[None])
+    apart = np.abs(shift + boxes_a[:, None] - boxes_b[None]) - (halves_a[:, None] + halves_b[None])
+    return np.asarray(np.maximum(rooms, apart.max(axis=-1)))
+
+
+def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
+    """Middles and half sizes, (k, 3) each, of the boxes around turned pieces whose sides are those of the world."""
+    corners, begin = _corners(pieces) @ R.T, _begins(pieces)
+    low, high = np.minimum.reduceat(corners, begin), np.maximum.reduceat(corners, begin)
+    return (low + high) / 2, (high - low) / 2
+
+
+@lru_cache(maxsize=1024)
+def _begins(pieces: tuple[Piece, ...]) -> NDArray[np.intp]:
+    """Where the corners of each piece begin among those of all."""
+    return np.cumsum([0, *(len(piece_corners(piece)) for piece in pieces[:-1])])
 
 
 def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.convex import piece_corners, separating_axes
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.geometry.intrusion import intrusion, intrusion_depths
 from apo_bench.geometry.round_face import RoundFace
@@ -91,3 +93,29 @@ def test_a_shaft_beside_the_middle_of_its_hole_is_as_deep_as_it_is_off(off_mm: f
     T[:2, 3] = 1e-3 * off_mm * np.array([np.cos(0.4), np.sin(0.4)])
     deep = intrusion(shaft, T, plate, np.eye(4))
     assert deep == pytest.approx(max(0.0, 1e-3 * (off_mm - 0.25)), abs=2 * SAGITTA_M)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_pairs_that_are_not_looked_at_change_no_depth(seed: int):
+    """Against every pair of pieces across every side and edge."""
+    rng = np.random.default_rng(seed)
+    a, b = (
+        tuple(Hull(f"{i}", rng.uniform(-0.01, 0.01, (8, 3)) + rng.uniform(-0.02, 0.02, 3)) for i in range(6))
+        for _ in range(2)
+    )
+    T_a, T_b = posed(rng, 0.02), posed(rng, 0.02)
+    at = T_a[:3, 3] + rng.uniform(-0.05, 0.05, (5, 3))
+    found = intrusion_depths(a, T_a[:3, :3], at, b, T_b)
+    for place, depth in zip(at, found, strict=True):
+        every = []
+        for p, q in product(a, b):
+            axes = separating_axes(p, T_a[:3, :3], q, T_b[:3, :3])
+            low_p, low_q = (
+                (p.corners @ T_a[:3, :3].T + place) @ axes.T,
+                (q.corners @ T_b[:3, :3].T + T_b[:3, 3]) @ axes.T,
+            )
+            outs = np.minimum(low_p.max(0) - low_q.min(0), low_q.max(0) - low_p.min(0))
+            every.append(outs.min())
+        if max(every) > 0.0:
+            assert depth == pytest.approx(max(every), abs=1e-12)
+        assert (depth > 0.0) == (max(every) > 0.0)
