@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any, final
 
 import numpy as np
@@ -14,10 +14,11 @@ from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.polygon import straightened
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
+from apo_bench.parts.making.bands import bands
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.moments import Moments, extruded
-from apo_bench.parts.making.outline import Outline, arc_of, goes_on, outline_moments, ring
+from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 from apo_bench.parts.making.steps import Step, at_height, heights_of, tangent
 
 _NARROW_MM = 6e-3
@@ -80,24 +81,30 @@ def extrude(
 
     Args:
         holes: Outlines, counter-clockwise too, that go all the way through.
-        bores: Round holes, cut into wedges that are tangent to them.
+        bores: Round holes, cut into wedges that are tangent to them; what has no room for wedges of its own, and is a
+            cylinder all the way through, becomes a hole like others.
         bottom: Name of the lower face; else one is found.
         fit: Which of the two end faces, by name, recede by the clearance.
 
     Raises:
-        ValueError: Holes that meet each other or the outline.
+        ValueError: Holes meet each other or the outline, or another bore has no room for wedges.
     """
-    from shapely import Polygon
+    from shapely import Polygon, unary_union
 
     area = Polygon(ring(outline), [ring(hole, hole=True) for hole in holes])
     discs = [Polygon(tangent(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
-    if not area.is_valid or area.area <= 0.0 or not all(area.contains(disc) for disc in discs):
+    apart = all(not a.intersects(b) for a, b in combinations(discs, 2))
+    if not area.is_valid or area.area <= 0.0 or not apart or not all(area.contains(disc) for disc in discs):
         raise ValueError("an outline with holes and bores inside of it, none of which meet, is needed")
-    cells = _cells(area, bores)
-    rest = area
+    beside = _bands(area, outline, holes)
+    rest = area.difference(unary_union([Polygon(band) for band in beside]))
+    cells = _cells(rest, bores)
+    if len(cells) < len(bores):
+        hole, others = _as_hole(bores[len(cells)], low, high), [*bores[: len(cells)], *bores[len(cells) + 1 :]]
+        return extrude(outline, low, high, holes=[*holes, hole], bores=others, bottom=bottom, top=top, fit=fit)
     for cell in cells:
         rest = rest.difference(Polygon(cell))
-    prisms = [_prism(cell, low, high) for cell in convex_cells(rest)]
+    prisms = [_prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
     flat = outline_moments(outline)
     for hole in holes:
         flat = flat.plus(outline_moments(hole), -1.0)
@@ -119,8 +126,30 @@ def extrude(
     )
 
 
+def _bands(area: Any, outline: Outline, holes: Sequence[Outline]) -> list[Array]:
+    """Areas behind the sides that recede, of outlines and holes of which an arc does."""
+    rings = [] if not _round_fit(outline) else [(ring(outline), receding(outline))]
+    for hole in filter(_round_fit, holes):
+        fit = receding(hole, hole=True)
+        rings.append((ring(hole, hole=True)[::-1], np.roll(fit[::-1], -1)))
+    return bands(area, rings)
+
+
+def _round_fit(outline: Outline) -> bool:
+    return any(edge.fit and edge.center is not None for edge in outline)
+
+
+def _as_hole(each: Bore, low: float, high: float) -> Outline:
+    """A bore that is a cylinder all the way through as the outline of a hole."""
+    step = each.steps[0]
+    through = abs(step.low - low) < 1e-6 and abs(step.high - high) < 1e-6 and step.radii[0] == step.radii[1]
+    if len(each.steps) > 1 or not through:
+        raise ValueError(f"there is no convex area around the bore at {each.at} mm; cut the part in two beside it")
+    return circle(step.radius, each.at, step.name, step.fit, step.sides)
+
+
 def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
-    """A convex area around each bore, none of which overlap."""
+    """A convex area around each bore, none of which overlap, up to the first one that has no room for one."""
     from shapely import Polygon
 
     found: list[Array] = []
@@ -128,7 +157,7 @@ def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
         others = [(np.array(b.at), b.widest) for k, b in enumerate(bores) if k != i]
         cell = bore_cell(area, np.array(each.at), each.widest, others)
         if cell is None:
-            raise ValueError(f"there is no convex area around the bore at {each.at} mm; cut the part in two beside it")
+            break
         area = area.difference(Polygon(cell))
         found.append(cell)
     return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import sides_of
@@ -141,6 +142,12 @@ def ring(outline: Outline, hole: bool = False) -> Array:
     from outside, so that what is free inside of them stays free.
     """
     return np.array([corner for i in range(len(outline)) for corner in _corners(outline, i, hole)])
+
+
+def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
+    """Whether the sides of a ring recede by the clearance: each that begins at a corner of `ring`, (k,)."""
+    found = [edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)]
+    return np.array(found, dtype=np.bool_)
 
 
 def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
