@@ -132,7 +132,7 @@ def test_a_bore_without_room_for_wedges_is_a_hole_like_others(tmp_path: Path):
     assert list(solid.rounds) == ["bore"]
     assert free_radius(solid.pieces, np.array([0.015, 0.008])) == pytest.approx(0.007, abs=1e-9)
     with pytest.raises(ValueError, match="no convex area around the bore"):
-        extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 2, 8)])
+        extrude(outline, 0, 8, bores=[bore((15, 8), 7.0, 2, 8, sides=96)])
 
 
 def test_holes_that_meet_are_refused():
