@@ -13,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import RoundFace
 
-_BEYOND_M = 0.012
+_BEYOND_M = 0.02
 """How far a line goes on beyond the faces."""
 _ONE_M, _ONE_COSINE = 1e-3, 1.0 - 1e-4
 """Axes that are nearer to each other are drawn as one line."""

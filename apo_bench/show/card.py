@@ -81,7 +81,8 @@ def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
 
 
 def _way(scenario: Scenario, arc: Arc) -> str:
-    """`into` between walls, `over` what stands in its hole, `against` upright faces, `onto` others."""
+    """`into` between walls, `over` what stands in its hole, `under` faces that look down, `against` upright ones, `onto`
+    others."""
     assembly = scenario.assembly
     poses = placements(assembly, scenario.start, scenario.goals)[arc.made]
     touched = touched_contacts(assembly, arc.contacts, assembly.operations[arc.made].moves, poses)
@@ -89,7 +90,9 @@ def _way(scenario: Scenario, arc: Arc) -> str:
     if classify(N).state.constraining:
         rounds = [assembly.round_face(c.manipulated) for c in arc.contacts if holds_axis(assembly, c)]
         return "over" if rounds and all(face.hole for face in rounds) else "into"
-    return "against" if np.abs(N[:, 2]).max() < _LEVEL else "onto"
+    if N[:, 2].min() < -_LEVEL:
+        return "under"
+    return "against" if N[:, 2].max() < _LEVEL else "onto"
 
 
 def _human(scenario: Scenario) -> Iterator[str]:

@@ -26,8 +26,8 @@ def test_axes_are_drawn_once_and_a_little_longer_than_their_faces() -> None:
     contacts, poses = standing(scene)
     (line,) = axes_of(scene.assembly, contacts, poses)
     ends = sorted([line.begin.tolist(), line.end.tolist()], key=lambda end: end[1])
-    assert ends[0] == pytest.approx([0.0, -0.072, 0.03], abs=1e-9)
-    assert ends[1] == pytest.approx([0.0, 0.072, 0.03], abs=1e-9)
+    assert ends[0] == pytest.approx([0.0, -0.08, 0.03], abs=1e-9)
+    assert ends[1] == pytest.approx([0.0, 0.08, 0.03], abs=1e-9)
 
 
 def test_parts_that_are_seen_apart_have_an_axis_each() -> None:

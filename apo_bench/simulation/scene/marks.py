@@ -14,7 +14,7 @@ from apo_bench.geometry.arrays import Array, frozen
 
 _Color = tuple[float, float, float]
 _WIDTH_M = 0.0035
-_DASH_DOT, _LINE_M = (0.006, 0.0022, 0.0008, 0.0022), 0.0005
+_DASH_DOT, _LINE_M = (0.007, 0.0025, 0.0008, 0.0025), 0.0007
 """Dash, gap, dot, gap; the radius of the line."""
 _PIECES = 48
 """Straight pieces of a whole ring."""
