@@ -81,8 +81,8 @@ def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
 
 
 def _way(scenario: Scenario, arc: Arc) -> str:
-    """`into` between walls, `over` what stands in its hole, `under` faces that look down, `against` upright ones, `onto`
-    others."""
+    """`into` between walls, `over` what stands in its hole, `under` faces that look down, `against` upright faces,
+    `onto` others."""
     assembly = scenario.assembly
     poses = placements(assembly, scenario.start, scenario.goals)[arc.made]
     touched = touched_contacts(assembly, arc.contacts, assembly.operations[arc.made].moves, poses)
