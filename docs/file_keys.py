@@ -96,7 +96,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "goal": "pose of the moved part in the frame of the assembly when the operation is over",
             "contacts": "pairs `[face of what moves, part.face of what rests]`, or tables",
             "attach": "a preference for the way to the goal; else it is found",
-            "grasp": "where the gripper takes the part; else above its middle",
+            "grasp": "where the gripper takes the part; else above the middle of boxes, or as its shape offers",
             "vary": "a shift that each trial draws, or a list of them (20 in a scenario at most)",
         },
         "operations, contacts": {

@@ -73,7 +73,7 @@ def peg_in_hole(folder: Path, off: tuple[float, float] = (0.0, 0.0)) -> Scenario
     """
     operations = [
         Operation("plate", contacts("plate", "bottom-table.top")),
-        Operation("peg", contacts("peg", "bottom-table.top")),
+        Operation("peg", contacts("peg", "wall-plate.bore", "bottom-table.top")),
     ]
     goals = [np.eye(4), pose.at((*off, 0.025))]
     start = {"plate": pose.at((0, -0.27, 0)), "peg": pose.at((0, 0.27, 0.025))}

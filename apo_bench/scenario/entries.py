@@ -13,6 +13,8 @@ from apo_bench.assembly.topology import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import all_boxes
+from apo_bench.geometry.holds import holds, holds_whole
 from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Preference
 from apo_bench.io.strict_json import JsonNode
@@ -28,6 +30,8 @@ _ARM = "arm"
 """What the robot is called in a scene."""
 _RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
+_OPENING_M = 0.046
+"""How far each finger of the arm that comes with the benchmark opens."""
 _LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""
 
@@ -183,24 +187,55 @@ def _attach(node: JsonNode) -> Preference:
 
 
 def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) -> Grasp:
-    """The grasp; above the middle, across the narrower level axis unless the file says otherwise."""
+    """The grasp; unless the file says otherwise, above the middle, across the narrower level axis of a part of boxes.
+
+    Where that leaves pads beside the part, and of other parts, it is the best place that the shape offers.
+    """
     keys = node.fields((), ("at_mm", "across")) if node else {}
     low, high = solid.bounds
-    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else _above_middle(solid, before)
-    if ((point < low) | (point > high)).any():
-        span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
-        keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
+    level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
+    across, point = None, _above_middle(solid, before)
+    if "at_mm" in keys:
+        point = 1e-3 * keys["at_mm"].numbers(3)
+        if ((point < low) | (point > high)).any():
+            span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
+            keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
     if "across" in keys:
         across = read_unit_axis(keys["across"])
         if abs((before[:3, :3] @ across)[2]) > _LEVEL:
             keys["across"].fail(
                 "an axis that is level where the part is picked is needed", "the gripper comes from above"
             )
-        return Grasp(point, across)
-    level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
-    if len(level) < 2:
-        refuse(entry, "the part does not stand straight where it is picked; say grasp = { across = [x, y, z] }")
-    return Grasp(point, np.eye(3)[min(level, key=lambda axis: (high - low)[axis])])
+    elif len(level) >= 2:
+        across = np.eye(3)[min(level, key=lambda axis: (high - low)[axis])]
+    stated = Grasp(point, across) if across is not None else None
+    if stated and (keys.keys() == {"at_mm", "across"} or _holds_box(solid, stated, before)):
+        return stated
+    return _by_shape(keys, entry, solid, before, point)
+
+
+def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
+    """Whether this is a grasp of a part of boxes, with the part between the pads."""
+    up = T[2, :3]
+    return all_boxes(solid.pieces) and holds_whole(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
+
+
+def _by_shape(keys: Mapping[str, JsonNode], entry: JsonNode, solid: Solid, T: Array, point: Array) -> Grasp:
+    """The best place for pads; of those that are near to what is stated, if something is."""
+    found = [Grasp(hold.point, hold.across) for hold in holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
+    if "across" in keys:
+        across = read_unit_axis(keys["across"])
+        found = [grasp for grasp in found if abs(grasp.across @ across) > 1.0 - _LEVEL]
+    if not found:
+        size = " x ".join(f"{1e3 * x:g}" for x in solid.bounds[1] - solid.bounds[0])
+        refuse(
+            entry,
+            f"the part, {size} mm, offers no place to pads from above that open to {2e3 * _OPENING_M:g} mm; say "
+            "grasp = { at_mm = [x, y, z], across = [x, y, z] }, or let it stand otherwise",
+        )
+    if "at_mm" in keys:
+        return Grasp(point, min(found, key=lambda grasp: float(np.linalg.norm(grasp.point - point))).across)
+    return found[0]
 
 
 def _above_middle(solid: Solid, T: Array) -> Array:

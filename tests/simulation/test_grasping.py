@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Plan, Poses, Step
 from apo_bench.assembly.placement import placements
+from apo_bench.assembly.topology import Operation
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion_depths
+from apo_bench.geometry.solid import Box
+from apo_bench.parts.making import Body, extrude, polygon, rectangle
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.execution.grasping import RestingPart, grasp_at, obstacles, tip_frame
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.execution.grasping import RestingPart, grasp_at, half_width, obstacles, tip_frame
 from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.near import obstacle
 from apo_bench.simulation.robot.paths import turn_from, waypoints_unwound
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from tests.round_scenes import contacts, scenario
 
 
 @pytest.fixture(scope="module")
@@ -156,3 +165,52 @@ def test_a_wrist_turns_back_instead_of_winding_up() -> None:
     assert np.degrees(turn_from(rest, middle)) == pytest.approx(-5)
     np.testing.assert_allclose(middle[:3, 3], (0.1, 0, 0.3), atol=1e-12)
     assert len(waypoints_unwound(rest, start, pose.at((0, 0, 0), (0, 0, -70)) @ rest)) == 1
+
+
+SIDEWAYS = Grasp(np.array([0.018, 0.0, 0.026]), np.array([0.0, 1.0, 0.0]))
+
+
+def one_part(folder: Path, body: Body, grasp: Grasp, density: float = 1000.0) -> Scene:
+    """A part that is put down elsewhere on the table."""
+    operation = Operation("part", contacts("part", "bottom-table.top"))
+    start = {"part": pose.at((0, 0.25, 0))}
+    return build_scene(scenario(folder, {"part": body}, [operation], [np.eye(4)], start, [grasp], density))
+
+
+def bracket() -> Body:
+    """L-shaped, standing on its foot."""
+    names = ("bottom", "end", "tread", "inner", "tip", "back")
+    outline = polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40), names=names)
+    return extrude(outline, -10, 10).moved((0, 0, 0), (90, 0, 0))
+
+
+def test_where_a_wall_stands_a_bracket_is_held_by_its_other_sides(tmp_path: Path) -> None:
+    scene = one_part(tmp_path, bracket(), SIDEWAYS)
+    T = scene.scenario.start["part"]
+    around = obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
+    wall = obstacle((Box("wall", np.array([0.018, 0.03, 0.03]), np.array([0.03, 0.005, 0.03])),), T)
+    assert grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, around)]) is SIDEWAYS
+    found = grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, (*around, wall))])
+    assert abs(found.across[0]) == 1.0
+    assert half_width(scene.pieces["part"], found, T) == pytest.approx(0.005)
+
+
+def test_the_robot_carries_an_l_shaped_bracket_by_its_arm(tmp_path: Path) -> None:
+    scene = one_part(tmp_path, bracket(), Grasp(np.array([0.005, 0.0, 0.026]), np.array([1.0, 0.0, 0.0])))
+    layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene)
+    assert result.outcome.code == "ok"
+    final = result.reached.final
+    assert final is not None
+    assert final.poses["part"] == pytest.approx(layout.goals[0], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("width", "density", "words"),
+    [(80, 20000.0, "operation 1 lifts .* kg; the friction of the pads holds 2.45 kg"), (100, 1000.0, "spans 100 mm")],
+)
+def test_what_cannot_be_held_is_named_before_anything_moves(
+    tmp_path: Path, width: float, density: float, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        one_part(tmp_path, extrude(rectangle(120, width), 0, 60, bottom="bottom"), SIDEWAYS, density)

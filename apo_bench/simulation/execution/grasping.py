@@ -10,8 +10,10 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import all_boxes
+from apo_bench.geometry.holds import held_width, holds, holds_whole
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.solid import Piece, Solid, extent
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import Obstacle, obstacle
@@ -29,6 +31,8 @@ _MOST_LEFT_M = 0.1
 """A grip is changed so near to the goal that the part already lies in what it was put into."""
 _HEIGHT = 0.65
 """Height of the tip over the part's lowest point, as a part of its height."""
+_UPRIGHT = float(np.cos(np.radians(10.0)))
+"""Parts that were seen tilted stand as they stood, up to 10 degrees."""
 
 
 class RestingPart(NamedTuple):
@@ -109,10 +113,22 @@ def tip_frame(grasp: Grasp, T_part: Array) -> Array:
     return T
 
 
-def _half_width(solid: Solid, grasp: Grasp) -> float:
-    """Half the nominal part's width between the fingers, [m]."""
-    low, high = solid.bounds
-    return float(np.abs(grasp.across) @ (high - low)) / 2
+def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
+    """Half of the width between the fingers of a part that stands at T, [m]: of boxes that of the part, where they hold
+    that."""
+    up = _upwards(T)
+    own = held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
+    if own is None or (all_boxes(pieces) and holds_whole(pieces, grasp.point, grasp.across, up)):
+        low, high = extent(pieces, grasp.across)
+        return (high - low) / 2
+    return own
+
+
+def _upwards(T: Array) -> Array:
+    """The vertical in the frame of a part at T; one of its axes where it is near to it."""
+    up = T[2, :3]
+    k = int(np.abs(up).argmax())
+    return np.asarray(np.sign(up[k]) * np.eye(3)[k] if abs(up[k]) > _UPRIGHT else up)
 
 
 def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
@@ -130,8 +146,18 @@ def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, G
 
 
 def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
-    """Across either level axis, the narrower one first, from the middle outwards."""
-    solid = scene.scenario.assembly.solids[part]
+    """Places on the part at T: those of the box around it where they are on a part of boxes, else by its shape."""
+    solid, up = scene.scenario.assembly.solids[part], _upwards(T)
+    if all_boxes(solid.pieces):
+        around = _around_box(scene, solid, T)
+        if all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
+            return around
+    found = holds(solid, up, scene.arm.opening_m)
+    return [Grasp(hold.point, hold.across) for hold in found]
+
+
+def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
+    """Across either level axis of the box around a part, the narrower one first, from the middle outwards."""
     low, high = solid.bounds
     size, middle = high - low, (high + low) / 2
     up = int(np.abs(T[2, :3]).argmax())
@@ -160,10 +186,14 @@ def _clear(
     scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
 ) -> list[Grasp]:
     """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place."""
-    kept = []
-    for across, those in groupby(grasps, key=lambda grasp: tuple(grasp.across)):
+    kept, pieces, T = [], scene.scenario.assembly.solids[part].pieces, places[0].T
+
+    def kind(grasp: Grasp) -> tuple[float, ...]:
+        return (*map(float, grasp.across), round(half_width(pieces, grasp, T), 6))
+
+    for (*across, _), those in groupby(grasps, key=kind):
         same = list(those)
-        width = _half_width(scene.scenario.assembly.solids[part], same[0])
+        width = half_width(pieces, same[0], T)
         opening = min(width + _STAND_OFF_M, scene.arm.opening_m)
         points = np.array([grasp.point for grasp in same])
         struck = np.zeros(len(same), dtype=np.bool_)
@@ -177,7 +207,7 @@ def _clear(
 
 def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
-    width = _half_width(scene.scenario.assembly.solids[part], grasp)
+    width = half_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
     lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way

@@ -30,6 +30,7 @@ from apo_bench.simulation.execution.grasping import (
     clear_across,
     grasp_at,
     grips_along,
+    half_width,
     obstacles,
     tip_frame,
 )
@@ -217,8 +218,8 @@ def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> G
     rest = scene.kinematics.forward(scene.arm.home)
     tips = [tip_frame(each, start) for each in (grasp, other)]
     tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
-    near, far = extent(physical_pieces(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3), grasp.across)
-    return Grip(tip, (far - near) / 2)
+    pieces = physical_pieces(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3)
+    return Grip(tip, half_width(pieces, grasp, start))
 
 
 def _centring(

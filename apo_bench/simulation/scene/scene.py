@@ -24,6 +24,7 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
 from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.graphics import import_mjcf
+from apo_bench.simulation.scene.holdable import check_holdable
 from apo_bench.simulation.scene.physics import Physics, physics
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, world
@@ -84,7 +85,7 @@ def build_scene(
 
     Raises:
         InputError: Unknown grasp or arm, a clearance that a part cannot have or that leaves a shaft no play, an
-            unchecked time step.
+            unchecked time step, a part that the gripper cannot hold.
     """
     check("grasp", grasp)
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
@@ -92,6 +93,9 @@ def build_scene(
     found, settings = find_arm(arm), physics(timestep_s)
     shown = _compiled(scenario, _compose(scenario, clearance, settings, None, grasp))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
+    work = _compiled(scenario, _compose(scenario, clearance, settings, found, grasp))
+    if grasp == "friction":
+        check_holdable(scenario, work, found)
     return Scene(
         scenario=scenario,
         clearance_mm=clearance,
@@ -100,7 +104,7 @@ def build_scene(
         physics=settings,
         pieces={name: physical_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=shown,
-        work=_compiled(scenario, _compose(scenario, clearance, settings, found, grasp)),
+        work=work,
         kinematics=Kinematics(found),
     )
 

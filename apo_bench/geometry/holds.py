@@ -1,0 +1,234 @@
+"""Where two flat pads that come from above can hold a part: its thickness along level rays, and the places it offers.
+
+Rays go through a part along the direction in which the pads close, in rows and columns. Where what they pass through
+begins and ends at the same places over some length, pads hold it: opposite flat faces, the wall of a shaft.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.solid import Piece, Solid, extent
+
+PAD_M = (0.016, 0.010, 0.026)
+"""How far pads reach from between their tips: to each side, down and up, [m]."""
+_FINGER_M, _ROOM_M = 0.012, 0.012
+"""How thick a finger is; how far it stands off before it closes."""
+_PALM_M, _OVER_M = 0.060, 0.0115
+"""A part reaches at most so far up beside the tips, which are at least so high above what it stands on."""
+_RAY_M, _FLAT_M, _LINE_M = 0.003, 1e-4, 0.003
+"""Rays are so far apart; surfaces so deep behind the outermost one are pressed, too; and so long at least."""
+_LEVEL = 1e-3
+_HEIGHT = 0.65
+"""Height of the tips over the part's lowest point that is best, as a part of its height."""
+_LESS_M = 0.002
+_UNEVEN_M = 0.003
+"""So much farther from the middle a flat hold may be than a line on a shaft."""
+
+
+class Hold(NamedTuple):
+    """A place for the pads; in the frame of the part, [m]."""
+
+    point: Array
+    """Between the tips, (3,)."""
+    across: Array
+    """Along which they close, unit vector, (3,)."""
+    half_width: float
+
+
+class _Rays(NamedTuple):
+    """What rays along a direction pass through."""
+
+    across: Array
+    along: Array
+    up: Array
+    t: Array
+    """Along `along`, of each ray, (r,)."""
+    h: Array
+    """Along `up`, of each ray, (r,)."""
+    low: Array
+    """Where they enter each piece, (r, p); infinite where they miss it."""
+    high: Array
+
+
+def held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> tuple[float, float] | None:
+    """From where to where the part reaches between pads that close on a point, [m] from it; None: nothing is there.
+
+    Pads that close on the gap between two arms of a part press these towards each other.
+
+    Args:
+        up: The vertical, unit vector, (3,), frame of the part.
+    """
+    along = np.cross(up, across)
+    side, down, over = PAD_M
+    t, h = float(point @ along), float(point @ up)
+    columns = _lines(t - side, t + side, _axes_within(pieces, along, t - side, t + side))
+    rows = _lines(h - down, h + over, _axes_within(pieces, up, h - down, h + over))
+    rays = _cast(pieces, across, up, columns, rows)
+    here = float(point @ across)
+    spans = _clusters(rays, np.ones(len(rays.t), dtype=np.bool_))
+    begins, ends = [low for low, _ in spans if low < here], [high for _, high in spans if high > here]
+    return (begins[-1] - here, ends[0] - here) if begins and ends else None
+
+
+@lru_cache(maxsize=4096)
+def held_width(
+    pieces: tuple[Piece, ...], point: tuple[float, ...], across: tuple[float, ...], up: tuple[float, ...]
+) -> float | None:
+    """Half of the width of what pads hold that close on a point, [m]; None if there is nothing between them."""
+    span = held_span(pieces, np.array(point), np.array(across), np.array(up))
+    return None if span is None else (span[1] - span[0]) / 2
+
+
+def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array) -> bool:
+    """Whether pads hold all the width of a part, not an arm of it, nor the air beside it."""
+    low, high = extent(pieces, across)
+    own = held_width(pieces, tuple(point), tuple(across), tuple(up))
+    return own is not None and own > (high - low) / 2 - _LESS_M
+
+
+def holds(solid: Solid, up: Array, opening_m: float) -> tuple[Hold, ...]:
+    """Places at which a gripper from above can hold a part, the best first: near the centre of mass, and not too low.
+
+    Args:
+        up: The vertical, unit vector, (3,), frame of the part.
+        opening_m: Of each finger, [m].
+    """
+    return _holds(solid, tuple(map(float, up)), opening_m)
+
+
+def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
+    """Where the middles of cylinders are along an axis, between two places."""
+    middles = [float(p.cylinder.center @ axis) for p in pieces if isinstance(p, Hull) and p.cylinder is not None]
+    return [x for x in middles if low < x < high]
+
+
+@lru_cache(maxsize=64)
+def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float) -> tuple[Hold, ...]:
+    up = np.array(vertical)
+    bottom, top = extent(solid.pieces, up)
+    best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
+    found: list[tuple[float, int, Hold]] = []
+    for across in _directions(solid, up):
+        along = np.cross(up, across)
+        low, high = extent(solid.pieces, along)
+        t = _lines(low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _LEVEL])
+        level = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _LEVEL]
+        rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level))
+        tips = _lines(bottom, max(top, best), [best])
+        for tip in tips[(tips >= bottom + _OVER_M) & (tips >= top - _PALM_M)]:
+            for place in t:
+                for low, high, uneven in _offers(rays, place, tip, opening_m):
+                    point = (low + high) / 2 * across + place * along + tip * up
+                    off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
+                    cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
+                    found.append((round(cost, 9), len(found), Hold(point, across, (high - low) / 2)))
+    return tuple(hold for _, _, hold in sorted(found, key=lambda each: each[:2]))
+
+
+def _directions(solid: Solid, up: Array) -> Iterator[Array]:
+    """Level directions in which pads may close, each once up to its sign."""
+    ways = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _LEVEL]
+    for face in solid.rounds.values():
+        if not face.hole and face.kind == "cylinder" and abs(face.axis @ up) < _LEVEL:
+            ways.append(np.cross(up, face.axis))
+        elif not face.hole and face.kind == "cylinder" and abs(face.axis @ up) > 1.0 - _LEVEL:
+            x, y = (np.asarray(axis - (axis @ up) * up) for axis in _level_axes(up))
+            ways += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
+    kept: list[Array] = []
+    for way in ways:
+        way = way - (way @ up) * up
+        way = way / np.linalg.norm(way)
+        if all(abs(way @ other) < 1.0 - 1e-6 for other in kept):
+            kept.append(way)
+            yield np.asarray(way * np.sign(way[np.abs(way).argmax()]) + 0.0)
+
+
+def _level_axes(up: Array) -> tuple[Array, Array]:
+    """Two perpendicular level directions, along axes of the part where there are such."""
+    x = np.eye(3)[int(np.abs(up).argmin())]
+    x = x - (x @ up) * up
+    x = x / np.linalg.norm(x)
+    return x, np.cross(up, x)
+
+
+def _lines(low: float, high: float, also: Sequence[float]) -> Array:
+    """Places from one end to the other, the middle among them, just inside, and some more."""
+    middle, reach = (low + high) / 2, (high - low) / 2 - 1e-6
+    n = max(4, int(np.ceil(reach / _RAY_M)))
+    return np.unique(np.round(np.append(middle + np.linspace(-reach, reach, 2 * n + 1), also), 9))
+
+
+def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
+    """Send rays along a direction through all places of a grid."""
+    along = np.cross(up, across)
+    T, H = (grid.ravel() for grid in np.meshgrid(t, h))
+    start = T[:, None] * along + H[:, None] * up
+    low, high = np.empty((len(T), len(pieces))), np.empty((len(T), len(pieces)))
+    for k, piece in enumerate(pieces):
+        planes = _sides(piece)
+        rate, room = planes[:, :3] @ across, planes[:, 3] - start @ planes[:, :3].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = room / rate
+        flat = np.abs(rate) < 1e-12
+        low[:, k] = np.where(rate < 0.0, at, -np.inf)[:, ~flat].max(axis=1, initial=-np.inf)
+        high[:, k] = np.where(rate > 0.0, at, np.inf)[:, ~flat].min(axis=1, initial=np.inf)
+        missed = (room[:, flat] < 0.0).any(axis=1) | (low[:, k] >= high[:, k])
+        low[missed, k], high[missed, k] = np.inf, -np.inf
+    return _Rays(across, along, up, T, H, low, high)
+
+
+def _sides(piece: Piece) -> Array:
+    """The sides of a piece, (s, 4), n . x <= d inside."""
+    if isinstance(piece, Hull):
+        return piece.planes
+    n = np.concatenate([np.eye(3), -np.eye(3)])
+    return np.column_stack([n, n @ piece.center + np.tile(piece.half, 2)])
+
+
+def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """From where to where there is something, [m], one after the other; gaps that no finger fits into do not count."""
+    low, high = rays.low[within], rays.high[within]
+    order = np.argsort(low[np.isfinite(low)])
+    spans: list[tuple[float, float]] = []
+    for a, b in zip(low[np.isfinite(low)][order], high[np.isfinite(low)][order], strict=True):
+        if spans and a < spans[-1][1] + _FINGER_M + _ROOM_M:
+            spans[-1] = spans[-1][0], max(spans[-1][1], float(b))
+        else:
+            spans.append((float(a), float(b)))
+    return spans
+
+
+def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple[float, float, bool]]:
+    """What pads between (t, h) can hold: from where to where, and whether along a line only."""
+    side, down, over = PAD_M
+    above = (np.abs(rays.t - t) <= side + _RAY_M) & (rays.h >= h - down - _RAY_M)
+    within = above & (rays.h <= h + over)
+    on = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[within]
+    for low, high in _clusters(rays, within):
+        if (high - low) / 2 + _ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
+            continue
+        own = np.where((rays.low >= low - 1e-9) & (rays.high <= high + 1e-9), 1.0, np.nan)[within]
+        with np.errstate(invalid="ignore"):
+            first = np.fmin.reduce(rays.low[within] * own, axis=1)
+            last = np.fmax.reduce(rays.high[within] * own, axis=1)
+            pressed = on & (first < low + _FLAT_M) & (last > high - _FLAT_M)
+        if (np.abs(rays.t[within][pressed] - t) < side / 3).any():
+            lengths = [float(np.ptp(places[within][pressed])) for places in (rays.t, rays.h)]
+            if max(lengths) >= _LINE_M:
+                yield low, high, min(lengths) < _LINE_M
+
+
+def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) -> bool:
+    """Whether a finger, open or on its way down, would strike the part itself."""
+    a, b = rays.low[above], rays.high[above]
+    room = _FINGER_M + _ROOM_M
+    struck = [(a < end) & (b > begin) for begin, end in ((low - room, low - 1e-6), (high + 1e-6, high + room))]
+    return bool((struck[0] | struck[1]).any())

@@ -1,0 +1,59 @@
+"""What the gripper cannot hold, named before anything moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.convex import all_boxes
+from apo_bench.geometry.holds import held_span
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.scene.world import World
+
+_GRAVITY = 9.81
+_SAFE = 2.0
+"""Friction must hold so many times the weight: carried, a part also pulls by its inertia and its lever."""
+_BESIDE_M = 0.002
+"""Room beside the part for each finger."""
+
+
+def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
+    """Raise an `InputError` if a part is wider than the gripper opens where it is to be held, or too heavy for it.
+
+    Parts of boxes alone are held across all their width, and a gripper that finds nothing loses them.
+    """
+    for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
+        solid, up = scenario.assembly.solids[operation.main], scenario.start[operation.main][2, :3]
+        which = f"operation {k + 1}: the grasp of '{operation.main}'"
+        span = held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
+        if span is None and not all_boxes(solid.pieces):
+            at = ", ".join(f"{1e3 * x:g}" for x in grasp.point)
+            raise InputError(
+                f"{which} at ({at}) mm has nothing between the pads; give a point of the part, or leave 'grasp' out."
+            )
+        if span is not None and (span[1] - span[0]) / 2 + _BESIDE_M > arm.opening_m:
+            raise InputError(
+                f"{which} spans {1e3 * (span[1] - span[0]):g} mm; the gripper opens to {2e3 * arm.opening_m:g} mm, so "
+                "hold the part elsewhere, across another way, or make it narrower."
+            )
+        weight = _GRAVITY * sum(float(world.model.body_subtreemass[world.body[part]]) for part in operation.moves)
+        most = _most_weight(world.model, arm)
+        if weight > most:
+            raise InputError(
+                f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg; the friction of the pads holds "
+                f"{most / _GRAVITY:.3g} kg with twofold safety, so make '{operation.main}' smaller or less dense, or "
+                "take the grasp 'weld'."
+            )
+
+
+def _most_weight(model: Any, arm: Arm) -> float:
+    """What friction holds safely, [N]; infinite where the force of the fingers has no limit."""
+    force = float(model.actuator(f"arm/{arm.grip}").forcerange[1])
+    if force <= 0.0:
+        return float("inf")
+    fingers = {int(model.jnt_bodyid[model.joint(f"arm/{finger}").id]) for finger in arm.fingers}
+    pads = [float(model.geom_friction[g, 0]) for g in range(model.ngeom) if int(model.geom_bodyid[g]) in fingers]
+    return force * max(pads) / _SAFE

@@ -1,0 +1,87 @@
+"""Where pads can hold a part: both of them touch it there, open fingers come by, and air is no place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from apo_bench.geometry.holds import PAD_M, held_span, holds, holds_whole
+from apo_bench.geometry.intrusion import intrusion_depths
+from apo_bench.geometry.solid import Box, Solid
+from apo_bench.parts.making import Step, bore, extrude, polygon, rectangle, shaft, solid_of, turned
+
+OPENING_M = 0.046
+L = extrude(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 0, 20)
+U = extrude(polygon((0, 0), (80, 0), (80, 40), (68, 40), (68, 10), (12, 10), (12, 40), (0, 40)), 0, 30)
+BUSH = turned([Step(0, 3, 9, name="flange"), Step(3, 20, 7, name="outer")], [Step(0, 20, 5, name="inner", fit=True)])
+PARTS = {
+    "peg": (shaft(5, -25, 25, "wall"), (0, 0, 1)),
+    "lying peg": (shaft(5, -25, 25, "wall"), (1, 0, 0)),
+    "disc": (turned([Step(0, 8, 30, name="rim")], [Step(0, 8, 5, name="inner")]), (0, 0, 1)),
+    "bush": (BUSH, (0, 0, 1)),
+    "plate": (extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 5, 0, 20)]), (0, 0, 1)),
+    "standing L": (L, (0, 1, 0)),
+    "lying L": (L, (0, 0, 1)),
+    "standing U": (U, (0, 1, 0)),
+    "upside down U": (U, (0, -1, 0)),
+}
+
+
+def made(name: str) -> tuple[Solid, np.ndarray]:
+    body, up = PARTS[name]
+    return solid_of("part", body), np.array(up, dtype=np.float64)
+
+
+def fingers(
+    hold_up: np.ndarray, across: np.ndarray, point: np.ndarray, opening: float
+) -> tuple[Sequence[Box], np.ndarray]:
+    """Both pads with what is above them, and the pose of their frame: x across, z up."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.column_stack([across, np.cross(hold_up, across), hold_up]), point
+    side, down, _ = PAD_M
+    half, high = np.array([0.006, side, 0.05]), 0.05 - down
+    return [Box(f"f{s}", np.array([s * (opening + 0.006), 0.0, high]), half) for s in (-1, 1)], T
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_pads_touch_both_sides_and_open_fingers_strike_nothing(name: str):
+    solid, up = made(name)
+    found = holds(solid, up, OPENING_M)
+    assert found
+    for hold in found[:: max(1, len(found) // 40)]:
+        span = held_span(solid.pieces, hold.point, hold.across, up)
+        assert span is not None
+        assert span == pytest.approx((-hold.half_width, hold.half_width), abs=1e-4)  # rays pass beside a round crest
+        assert abs(hold.across @ up) < 1e-9
+        boxes, T = fingers(up, hold.across, hold.point, min(hold.half_width + 0.012, OPENING_M))
+        own = np.linalg.inv(T)
+        depth = intrusion_depths(solid.pieces, own[:3, :3], own[None, :3, 3], tuple(boxes), np.eye(4))
+        assert depth[0] <= 1e-6
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_the_best_place_is_near_the_centre_of_mass(name: str):
+    solid, up = made(name)
+    off = holds(solid, up, OPENING_M)[0].point - solid.centroid
+    assert np.linalg.norm(off - (off @ up) * up) < 0.012
+
+
+def test_an_arm_of_a_u_may_be_held_from_the_inside():
+    solid, up = made("standing U")
+    arms = [hold for hold in holds(solid, up, OPENING_M) if abs(hold.half_width - 0.006) < 1e-9]
+    assert arms
+    assert {round(1e3 * float(hold.point[0])) for hold in arms} == {6, 74}
+
+
+def test_what_is_too_wide_everywhere_offers_no_place():
+    assert not holds(solid_of("base", extrude(rectangle(120, 100), 0, 15)), np.array([0.0, 0.0, 1.0]), OPENING_M)
+
+
+def test_the_middle_of_the_box_around_an_l_is_no_place():
+    solid, up = made("standing L")
+    middle = np.array([0.03, 0.026, 0.01])
+    assert held_span(solid.pieces, middle, np.array([1.0, 0.0, 0.0]), up) is None
+    assert not holds_whole(solid.pieces, middle, np.array([1.0, 0.0, 0.0]), up)
+    assert holds_whole(solid.pieces, np.array([0.018, 0.026, 0.01]), np.array([0.0, 0.0, 1.0]), up)
