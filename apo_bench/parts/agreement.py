@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -11,6 +12,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.hull import SAGITTA_M, Hull
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
@@ -23,6 +25,8 @@ _ABOVE_M = 2e-5
 """So far above a face nothing of the part is."""
 _COARSE = 0.09
 """Sides of a wall that no contact uses may be this part of its radius away from it: eight of them are."""
+_TRIED_M = 5e-5
+"""A clearance that any part can have; receded pieces are remembered."""
 _RAYS, _SHARES = 72, np.array([0.02, 0.25, 0.5, 0.75, 0.98])
 _LEAST_WALL = 0.5
 """So much of a round face must be there; bores may cross it."""
@@ -203,6 +207,23 @@ def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
             f"{_LEAST_WALL:.0%} is needed",
         )
     return off * wall.extent_rad * max(wall.radii) * max(wall.length, 0.0)
+
+
+def check_receding(solid: Solid, path: Path) -> None:
+    """Raise an `InputError` unless round holes that are fit get wider all around.
+
+    A piece that only touches such a wall in a corner has no side that recedes.
+    """
+    walls = [wall for wall in solid.rounds.values() if wall.fit and wall.hole and wall.kind == "cylinder"]
+    for wall in walls:
+        wider = replace(wall, radii=(wall.radius + _TRIED_M, wall.radius + _TRIED_M))
+        try:
+            _check_round(wider, _sides(physical_pieces(solid, _TRIED_M)), "")
+        except InputError as error:
+            raise InputError(
+                f"{path}, faces, {wall.name}: the wall is fit, and pieces that touch it in a corner only keep it from "
+                "getting wider by the clearance; cut what is around it into pieces that have sides on it."
+            ) from error
 
 
 def _samples(wall: RoundFace) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.solid import Box, Face, Solid
-from apo_bench.parts.agreement import check_faces, check_one_piece
+from apo_bench.parts.agreement import check_faces, check_one_piece, check_receding
 from apo_bench.parts.allowed import MOST_FACES
 from apo_bench.parts.check import check_matter, check_solid
 from apo_bench.parts.faces import SIDES, Surface, unite
@@ -74,6 +74,7 @@ def check_part(file: PartFile, solid: Solid) -> None:
     check_one_piece(solid.pieces, file.path)
     beside = file.path.with_suffix(".toml")
     check_matter(solid, str(beside), check_faces(solid, beside))
+    check_receding(solid, beside)
 
 
 def _stated(file: PartFile, said: StatedPart) -> Solid:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.parts import load_part, read_part
-from apo_bench.parts.making import bore, extrude, join, rectangle, shaft, write_part
+from apo_bench.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
 
 MADE = join(
     extrude(
@@ -271,3 +272,14 @@ def test_pieces_of_many_sides_are_refused(part: Path) -> None:
     corners = " ".join(f"{x:.9f}" for x in ball.ravel())
     part.write_text(re.sub(r'vertex="[^"]*"', f'vertex="{corners}"', text, count=1), encoding="utf-8")
     assert "330 and 200 are the most" in refusal(part)
+
+
+def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) -> None:
+    """Triangles that fan out from corners of the wall have no side on it."""
+    hole = circle(5, name="bore", sides=64)
+    body = extrude(rectangle(60, 40), 0, 10, holes=[hole])
+    marked = replace(body, rounds=tuple(replace(wall, fit=True) for wall in body.rounds))
+    assert load_part(write_part("free", body, tmp_path, source="a test", licence="none")).rounds["bore"].hole
+    assert "touch it in a corner only" in refusal(write_part("fan", marked, tmp_path, source="a test", licence="none"))
+    banded = extrude(rectangle(60, 40), 0, 10, holes=[circle(5, name="bore", sides=64, fit=True)])
+    assert load_part(write_part("band", banded, tmp_path, source="a test", licence="none")).fits
