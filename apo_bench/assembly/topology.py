@@ -158,12 +158,19 @@ class Assembly:
         return self.origin.get(contact, contact)
 
     def play(self, contact: Contact, play_m: float) -> float:
-        """How far from nominal a contact may really be, [m]: the clearance of parts that fit, and what shapes leave."""
+        """How far from nominal a contact may really be, [m]: the clearance of parts that fit, and what shapes leave.
+
+        A cone whose wall recedes by the clearance lets in deeper what sits in it.
+        """
         whole = self.given(contact)
         fits = play_m if self.is_fit(whole) else 0.0
         if not self.is_round(whole):
             return fits
-        return max(0.0, fits + geometric_play(self.face_of(whole.manipulated), self.face_of(whole.environment)))
+        a, b = self.face_of(whole.manipulated), self.face_of(whole.environment)
+        if contact in self.origin and self.face(contact.manipulated).opposes:
+            slope = max(abs(one.slope) for one in (a, b) if isinstance(one, RoundFace))
+            return fits * math.hypot(1.0, slope) / slope
+        return max(0.0, fits + geometric_play(a, b))
 
     def interval(self, contact: Contact, play_m: float) -> tuple[float, float]:
         """Least and greatest distance that is asked of a contact, [m]; parts that do not fit have no play.

@@ -271,6 +271,17 @@ def test_play_of_a_round_fit_is_a_disc(radius, fit, play):
         assert np.cos(np.pi / 16) * play * MM - 1e-6 <= far <= play * MM + 1e-6
 
 
+def test_a_cone_that_recedes_lets_its_shaft_in_deeper():
+    """At 45 degrees by root two of the clearance, along the axis."""
+    sits = touching("pin.taper", "plate.sink")
+    assembly = scene(sits, at=CONTACTS["cone in cone"][1])[0]
+    plate = assembly.solids["plate"]
+    fit = replace(plate, rounds={**plate.rounds, "sink": replace(plate.rounds["sink"], fit=True)})
+    low = lowered(replace(assembly, solids={**assembly.solids, "plate": fit}))
+    plays = [low.play(r.contact, 0.1e-3) for r in low.relations() if low.given(r.contact) == sits]
+    assert plays == pytest.approx([0.1e-3, 0.1e-3, np.sqrt(2) * 0.1e-3])
+
+
 @pytest.mark.parametrize("mm", [0.02, 0.5])
 def test_a_shaft_that_stands_anywhere_in_its_play_is_no_alarm(mm):
     """Of 300 draws with both ends somewhere in a disc of 0.25 mm, at a nominal 1 %."""

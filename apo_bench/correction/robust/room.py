@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.assembly.facing_round import measure_round
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
@@ -59,16 +60,10 @@ def crowding(observation: Observation, goals: Array) -> Crowding:
 
 
 def _covered(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
-    """How much of the smaller of two faces that touch covers the other one, 0 to 1; of axes, by their length."""
+    """How much of the smaller of two faces that touch covers the other one, 0 to 1; of round ones, of their length."""
     if isinstance(a, Face) and isinstance(b, Face):
         return overlap(a, T_a, b, T_b).area / min(face_area(a), face_area(b))
-    if isinstance(a, Face) or isinstance(b, Face) or "rim" in (a.kind, b.kind):
-        return 1.0
-    axis = T_b[:3, :3] @ b.axis
-    low_a, high_a = sorted(pose.apply(T_a, a.ends) @ axis)
-    low_b, high_b = sorted(pose.apply(T_b, b.ends) @ axis)
-    common = min(high_a, high_b) - max(low_a, low_b)
-    return float(max(0.0, common) / min(a.length, b.length))
+    return measure_round(a, T_a, b, T_b).share
 
 
 def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
