@@ -158,7 +158,7 @@ def check_walls(solid: Solid, wanted: Wanted) -> None:
 def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
     wanted = random_solid(seed)
     solid = solid_of("thing", wanted.body)
-    if seed % 40 == 0:
+    if seed % 100 < 2:
         solid = load_part(write_part("thing", wanted.body, tmp_path, source="a test", licence="Apache-2.0"))
     assert 1e9 * solid.volume == pytest.approx(wanted.volume, rel=1e-9)
     check_walls(solid, wanted)
@@ -173,7 +173,7 @@ def wall_area(wanted: Wanted) -> float:
 
 
 def test_the_mesh_of_the_pieces_agrees_with_centroid_and_inertia():
-    for seed in range(6):
+    for seed in range(3):
         wanted = random_solid(seed)
         check_matter(solid_of("thing", wanted.body), "thing.toml", 1e-3 * FREE_MM * wall_area(wanted))
 
