@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid
 from apo_bench.geometry.swept import Posed, exit_distance, is_way_free, overlap_intervals
@@ -89,3 +91,25 @@ def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
     beyond = posed(scenes.block(), scenes.mm(300, 0, 25))
     assert is_way_free([stick], X, 0.1649, [cube, beyond])
     assert not is_way_free([stick], X, 0.1652, [cube, beyond])
+
+
+def test_the_end_of_the_overlap_is_the_same_for_all_kinds_of_pieces() -> None:
+    """Looked for among boxes around pieces first; held against the intervals of all pairs, one chained to the next."""
+    rng, left = np.random.default_rng(5), 0
+    for _ in range(40):
+        a, b, c = boxes(rng), boxes(rng), boxes(rng)
+        near = [Posed(of.pieces, pose.at(rng.uniform(-0.02, 0.02, 3) - of.T[:3, 3]) @ of.T) for of in (b, c)]
+        way = rng.standard_normal(3)
+        way = way / np.linalg.norm(way)
+        moving = Posed(a.pieces, np.eye(4))
+        hulls = [Posed(tuple(Hull(p.name, piece_corners(p)) for p in of.pieces), of.T) for of in (moving, *near)]
+        spans = np.concatenate([overlap_intervals(moving, way, of, -5e-5) for of in near])
+        at = 0.0
+        while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):
+            at = float(on[:, 1].max())
+        wanted = max(0.0, at - 5e-5)
+        left += wanted > 0.0
+        assert exit_distance([moving], way, near) == pytest.approx(wanted, abs=1e-12)
+        assert exit_distance(hulls[:1], way, hulls[1:]) == pytest.approx(wanted, abs=1e-9)
+        assert exit_distance([moving], way, [near[0], hulls[2]]) == pytest.approx(wanted, abs=1e-9)
+    assert left > 20
