@@ -12,6 +12,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import SAGITTA_M, Hull
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
@@ -125,8 +126,6 @@ def _plane(n: Array) -> Array:
 def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
     """A side of a piece as a flat area."""
     from shapely import MultiPoint
-
-    from apo_bench.geometry.convex import piece_corners
 
     corners = piece_corners(piece)
     return MultiPoint(corners[np.abs(corners @ side[:3] - side[3]) < _IN_PLANE_M] @ to_plane).convex_hull

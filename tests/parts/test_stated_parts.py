@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.parts import load_part, read_part
+from apo_bench.parts import load_part, part_names, part_path, read_part
+from apo_bench.parts.load import check_part
 from apo_bench.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
 
 MADE = join(
@@ -283,3 +284,9 @@ def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) 
     assert "touch it in a corner only" in refusal(write_part("fan", marked, tmp_path, source="a test", licence="none"))
     banded = extrude(rectangle(60, 40), 0, 10, holes=[circle(5, name="bore", sides=64, fit=True)])
     assert load_part(write_part("band", banded, tmp_path, source="a test", licence="none")).fits
+
+
+@pytest.mark.parametrize("name", part_names())
+def test_parts_of_the_package_are_as_they_say(name: str) -> None:
+    """They are not held against their pieces each time that they are loaded."""
+    check_part(read_part(part_path(name)), load_part(name))
