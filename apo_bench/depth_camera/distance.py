@@ -1,4 +1,4 @@
-"""Unions of boxes as the range finder meets them: how far points are from them, and where rays strike them."""
+"""Unions of convex pieces as the range finder meets them: how far points are from them, where rays strike them."""
 
 from __future__ import annotations
 
@@ -8,40 +8,78 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.depth_camera.convex import Convex, convex_distance, convex_of, convex_passage, least_distance
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.solid import Piece
 
 
 class Shape(NamedTuple):
-    """A union of boxes: k boxes, each in a frame of its own, in the frame of the shape."""
+    """A union of k convex pieces, each in a frame of its own, in the frame of the shape."""
 
     center: Array
-    """(k, 3), [m]."""
+    """(k, 3), of the box around the piece, [m]."""
     half: Array
-    """(k, 3), [m]."""
+    """(k, 3), of that box, [m]."""
     turn: Array
-    """(k, 3, 3), rotations whose columns are the axes of the boxes."""
+    """(k, 3, 3), rotations whose columns are the axes of that box."""
+    inside: tuple[Convex | None, ...] = ()
+    """What is in each box, in the frame of its middle; None: all of it. Empty of boxes alone."""
+
+    def only(self, kept: NDArray[np.intp]) -> Shape:
+        """Some of the pieces, by number."""
+        inside = tuple(self.inside[k] for k in kept) if self.inside else ()
+        return Shape(self.center[kept], self.half[kept], self.turn[kept], inside)
 
 
 def shape_of(pieces: Iterable[Piece], T: Array | None = None) -> Shape:
-    """The union of pieces, as the boxes around them, whose frame is at T, (4, 4), of the shape's (none: the same)."""
+    """The union of pieces whose frame is at T, (4, 4), of the shape's (none: the same)."""
     kept = tuple(pieces)
     center, half = np.array([box.center for box in kept]), np.array([box.half for box in kept])
     T = np.eye(4) if T is None else T
-    return Shape(center @ T[:3, :3].T + T[:3, 3], half, np.repeat(T[None, :3, :3], len(kept), axis=0))
+    inside = tuple(convex_of(piece) if isinstance(piece, Hull) else None for piece in kept)
+    inside = inside if any(inside) else ()
+    return Shape(center @ T[:3, :3].T + T[:3, 3], half, np.repeat(T[None, :3, :3], len(kept), axis=0), inside)
 
 
 def join_shapes(shapes: Iterable[Shape]) -> Shape:
     """One shape of several that have the same frame."""
     kept = tuple(shapes)
-    return Shape(*(np.concatenate([shape[i] for shape in kept]) for i in range(3)))
+    center, half, turn = (np.concatenate([shape[i] for shape in kept]) for i in range(3))
+    inside = [each for shape in kept for each in shape.inside or (None,) * len(shape.center)]
+    return Shape(center, half, turn, tuple(inside) if any(inside) else ())
 
 
 def signed_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
     """Distance of points (*, 3) from the surface, (*), and its gradient, (*, 3); frame of the shape, [m].
 
-    Negative inside. Exact outside; inside it is the depth in the box that the point is deepest in.
+    Negative inside. Exact outside; inside it is the depth in the piece that the point is deepest in.
     """
+    if not shape.inside:
+        return _box_distance(shape, points)
+    boxes = np.array([k for k, each in enumerate(shape.inside) if each is None], dtype=np.intp)
+    hulls = [(k, each) for k, each in enumerate(shape.inside) if each is not None]
+    flat = np.ascontiguousarray(points.reshape(-1, 3))
+    d, gradient = np.full(len(flat), np.inf), np.zeros_like(flat)
+    if len(boxes):
+        d, gradient = _box_distance(shape.only(boxes), flat)
+    least = np.array([least_distance(each, (flat - shape.center[k]) @ shape.turn[k]) for k, each in hulls])
+    for i in _first_of_all(least):
+        (k, each), near = hulls[i], np.flatnonzero(least[i] < d)
+        own, way = convex_distance(each, (flat[near] - shape.center[k]) @ shape.turn[k])
+        closer = own < d[near]
+        d[near[closer]], gradient[near[closer]] = own[closer], way[closer] @ shape.turn[k].T
+    return d.reshape(points.shape[:-1]), gradient.reshape(points.shape)
+
+
+def _first_of_all(least: Array) -> list[int]:
+    """The numbers of pieces, (k, n) the least distances of points from them: first those that most are nearest to."""
+    nearest = np.bincount(least.argmin(axis=0), minlength=len(least)) if least.shape[1] else np.zeros(len(least))
+    return [int(i) for i in np.argsort(-nearest, kind="stable")]
+
+
+def _box_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
+    """`signed_distance` of boxes alone."""
     local = np.einsum("...ki,kij->...kj", points[..., None, :] - shape.center, shape.turn)
     beyond = np.abs(local) - shape.half
     outside = np.maximum(beyond, 0.0)
@@ -60,19 +98,23 @@ def signed_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
 
 
 def strike_distances(shape: Shape, origin: Array, rays: Array) -> tuple[Array, NDArray[np.int64]]:
-    """How far rays from one point go until they strike the shape, (n,), and which box, (n,); infinite and -1 if none.
+    """How far rays from one point go until they strike the shape, (n,), and which piece, (n,); infinite, -1 if none.
 
     Args:
         origin: (3,), frame of the shape, outside of it, [m].
         rays: (n, 3), unit vectors.
     """
     best, which = np.full(len(rays), np.inf), np.full(len(rays), -1, dtype=np.int64)
-    for k, (center, half, turn) in enumerate(zip(*shape, strict=True)):
+    for k, (center, half, turn) in enumerate(zip(*shape[:3], strict=True)):
+        inside = shape.inside[k] if shape.inside else None
         near = _in_cone(center - origin, float(np.linalg.norm(half)), rays)
         start, way = (origin - center) @ turn, rays[near] @ turn
-        with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = (-half - start) / way, (half - start) / way
-        enter, leave = np.fmin(a, b).max(axis=1), np.fmax(a, b).min(axis=1)
+        if inside is None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                a, b = (-half - start) / way, (half - start) / way
+            enter, leave = np.fmin(a, b).max(axis=1), np.fmax(a, b).min(axis=1)
+        else:
+            enter, leave = convex_passage(inside, start, way)
         hit = (enter <= leave) & (enter > 0.0) & (enter < best[near])
         best[near[hit]], which[near[hit]] = enter[hit], k
     return best, which

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
+from apo_bench.depth_camera.convex import alike
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
 from apo_bench.depth_camera.range_finder import RangeFinder
@@ -155,7 +156,7 @@ def _owners(view: View, shapes: Mapping[str, Shape], believed: Poses) -> NDArray
 
 
 def _posed(shape: Shape, T: Array) -> Shape:
-    return Shape(shape.center @ T[:3, :3].T + T[:3, 3], shape.half, T[:3, :3] @ shape.turn)
+    return Shape(shape.center @ T[:3, :3].T + T[:3, 3], shape.half, T[:3, :3] @ shape.turn, shape.inside)
 
 
 def _recognised(
@@ -192,7 +193,8 @@ def _moved(assembly: Assembly, shapes: Mapping[str, Shape], believed: Poses, whi
 
 
 def _alike(a: Shape, b: Shape) -> bool:
-    return all(x.shape == y.shape and np.allclose(x, y) for x, y in zip(a, b, strict=True))
+    same = all(x.shape == y.shape and np.allclose(x, y) for x, y in zip(a[:3], b[:3], strict=True))
+    return same and len(a.inside) == len(b.inside) and all(map(alike, a.inside, b.inside))
 
 
 def _turned(found: LocatedModel, T: Array) -> Array:

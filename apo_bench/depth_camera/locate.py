@@ -110,7 +110,7 @@ def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel
     if share < _LEAST_EXPLAINED:
         return None
     if model.main is not None:
-        main, rest = (Shape(*(a[part] for a in model.shape)) for part in (slice(model.main), slice(model.main, None)))
+        main, rest = map(model.shape.only, np.split(np.arange(len(model.shape.center)), [model.main]))
         local = (points.at - T[:3, 3]) @ T[:3, :3]
         d = np.abs(signed_distance(main, local)[0])
         own = points.only((d < 2.0 * appearance.width_m) & (d < np.abs(signed_distance(rest, local)[0])))

@@ -1,0 +1,108 @@
+"""One convex piece that is no box as the range finder meets it, in the frame of the middle of the box around it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Cylinder, Hull
+
+_ON_M = 1e-9
+
+
+class Convex(NamedTuple):
+    """The sides and edges of a piece."""
+
+    planes: Array
+    """(s, 4): n . x <= d inside, [m]."""
+    edges: Array
+    """(e, 2, 3), ends of each, [m]."""
+    cylinder: Cylinder | None
+    """What it stands for, if it does."""
+
+
+def convex_of(hull: Hull) -> Convex:
+    """The piece in the frame of the middle of the box around it."""
+    planes = np.array(hull.planes)
+    planes[:, 3] -= planes[:, :3] @ hull.center
+    if hull.cylinder is not None:
+        moved = hull.cylinder._replace(center=hull.cylinder.center - hull.center)
+        return Convex(planes, np.zeros((0, 2, 3)), moved)
+    corners = hull.corners - hull.center
+    on = np.abs(corners @ planes[:, :3].T - planes[:, 3]) < 100 * _ON_M
+    shared = on.astype(np.int64) @ on.T.astype(np.int64)
+    pairs = np.argwhere(np.triu(shared >= 2, k=1))
+    return Convex(planes, corners[pairs], None)
+
+
+def alike(a: Convex | None, b: Convex | None) -> bool:
+    """Whether two pieces are the same, or both boxes."""
+    if a is None or b is None:
+        return a is b
+    return a.planes.shape == b.planes.shape and np.allclose(a.planes, b.planes)
+
+
+def least_distance(convex: Convex, points: Array) -> Array:
+    """How far points, (n, 3), are at least, (n,), [m]: exact inside and over a side, too little beyond an edge."""
+    if convex.cylinder is not None:
+        return _cylinder_distance(convex.cylinder, points)[0]
+    return np.asarray((points @ convex.planes[:, :3].T - convex.planes[:, 3]).max(axis=1))
+
+
+def convex_distance(convex: Convex, points: Array) -> tuple[Array, Array]:
+    """Distance of points, (n, 3), from the surface, (n,), negative inside, and its gradient, (n, 3), [m]."""
+    if convex.cylinder is not None:
+        return _cylinder_distance(convex.cylinder, points)
+    n, d = convex.planes[:, :3], convex.planes[:, 3]
+    room = points @ n.T - d
+    first = room.argmax(axis=1)
+    distance = room[np.arange(len(points)), first]
+    gradient = n[first]
+    foot = points - distance[:, None] * gradient
+    beyond = np.flatnonzero((distance > 0.0) & ((foot @ n.T - d).max(axis=1) > _ON_M))
+    if len(beyond):
+        off = points[beyond] - _nearest_on_edges(convex.edges, points[beyond])
+        distance[beyond] = length = np.linalg.norm(off, axis=1)
+        gradient[beyond] = off / np.maximum(length, 1e-15)[:, None]
+    return distance, gradient
+
+
+def _nearest_on_edges(edges: Array, points: Array) -> Array:
+    """The nearest points of edges, (n, 3).
+
+    The nearest point of a convex piece lies on an edge, or over the side whose plane is the farthest, which is looked
+    at before.
+    """
+    start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    part = np.clip(((points[:, None] - start) * along).sum(axis=-1) / (along * along).sum(axis=-1), 0.0, 1.0)
+    at = start + part[..., None] * along
+    off = points[:, None] - at
+    nearest = (off * off).sum(axis=-1).argmin(axis=1)
+    return np.asarray(at[np.arange(len(points)), nearest])
+
+
+def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]:
+    off = points - cylinder.center
+    z = off @ cylinder.axis
+    across = off - z[:, None] * cylinder.axis
+    r = np.linalg.norm(across, axis=1)
+    ways = np.stack([across / np.maximum(r, 1e-15)[:, None], np.sign(z)[:, None] * cylinder.axis], axis=1)
+    beyond = np.stack([r - cylinder.radius, np.abs(z) - cylinder.half_length], axis=1)
+    outside = np.maximum(beyond, 0.0)
+    length = np.linalg.norm(outside, axis=1)
+    deepest = beyond.argmax(axis=1)
+    weights = np.where(length[:, None] > 0.0, outside / np.maximum(length, 1e-15)[:, None], np.eye(2)[deepest])
+    return length + np.minimum(beyond.max(axis=1), 0.0), np.einsum("nk,nki->ni", weights, ways)
+
+
+def convex_passage(convex: Convex, start: Array, ways: Array) -> tuple[Array, Array]:
+    """Where rays, (n, 3), from a point enter a piece, and where they leave it, (n,) each; sooner if they miss."""
+    rate, room = ways @ convex.planes[:, :3].T, convex.planes[:, 3] - convex.planes[:, :3] @ start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = room / rate
+    enter = np.where(rate < 0.0, at, -np.inf).max(axis=1)
+    leave = np.where(rate > 0.0, at, np.inf).min(axis=1)
+    missed = ((np.abs(rate) < 1e-15) & (room < 0.0)).any(axis=1)
+    return np.where(missed, np.inf, enter), np.where(missed, -np.inf, leave)
