@@ -14,6 +14,7 @@ from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
+from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 _EXACT_M = 1e-9
@@ -80,9 +81,13 @@ def explain(
 def correct(
     scenario: ScenarioArgument,
     observation: Annotated[Path, typer.Option(help="What was seen: .csv, or .json of `replay --save-observation`.")],
-    method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = "contact",
+    method: Annotated[
+        str | None,
+        typer.Option(help=f"A corrector, or package.module:name; default: {CORRECTOR}, contact with --if-doubtful."),
+    ] = None,
     if_doubtful: Annotated[
-        str | None, typer.Option(help="If the test fails: apply, warn, refuse or drop; default: warn.")
+        str | None,
+        typer.Option(help="What contact does if its test fails: apply, warn, refuse or drop; else warn."),
     ] = None,
     deviation_mm: _DeviationMm = 1.0,
     deviation_deg: _DeviationDeg = 1.0,
@@ -108,6 +113,7 @@ def correct(
             raise InputError(
                 f"--out {out} is the file of the observation; name another, so that what was seen is kept."
             )
+    method = method or (CORRECTOR if if_doubtful is None else "contact")
     corrector = _corrector(method, if_doubtful)
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg

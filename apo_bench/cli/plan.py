@@ -13,6 +13,7 @@ from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io.output import redirect_output
+from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 
@@ -46,7 +47,7 @@ def plan(
         asked, where = Plan(loaded.assembly, loaded.start, loaded.goals), "at the nominal goals"
         frames = "directions and until in the frame of the assembly"
     else:
-        method = "contact" if method is None else method
+        method = CORRECTOR if method is None else method
         with redirect_output(as_json):
             loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"

@@ -12,6 +12,7 @@ from apo_bench.cli.arguments import check_writable
 from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
+from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def show(
     seen: Annotated[bool, typer.Option("--seen", help="Only what was seen.")] = False,
     corrected: Annotated[bool, typer.Option("--corrected", help="Only what the method makes of it.")] = False,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
-    method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = "contact",
+    method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = CORRECTOR,
     observation: Annotated[Path | None, typer.Option(help="Show this observation file instead.")] = None,
     deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
     deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,

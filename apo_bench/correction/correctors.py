@@ -21,7 +21,7 @@ from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry.arrays import Array, NotReal, real
 from apo_bench.geometry.rigid import is_rigid
 from apo_bench.names import resolve
-from apo_bench.records.short_names import CORRECTORS
+from apo_bench.records.short_names import CORRECTOR, CORRECTORS
 
 _Corrector = Callable[[Observation], Correction]
 """Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
@@ -33,7 +33,7 @@ class CorrectorMisbehaved(InputError):
     """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
 
 
-def correct(observation: Observation, corrector: Any = "contact", look: Look | None = None) -> Correction:
+def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | None = None) -> Correction:
     """What the corrector makes of an observation.
 
     Args:

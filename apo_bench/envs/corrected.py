@@ -9,6 +9,7 @@ import gymnasium
 from apo_bench.envs.apo_replay import Action, APOReplay, Seen, packed
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.records.short_names import CORRECTOR, CORRECTORS, SIMULATED
 
 
 @final
@@ -21,7 +22,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
     again is executed with its schedule; the twist of an operation then acts on every target of that operation.
     """
 
-    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = "contact") -> None:
+    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = CORRECTOR) -> None:
         """Wrap an `APOReplay` environment.
 
         Args:
@@ -32,7 +33,6 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
         """
         from apo_bench.correction.correctors import correct
         from apo_bench.names import resolve
-        from apo_bench.records.short_names import CORRECTORS, SIMULATED
 
         gymnasium.utils.RecordConstructorArgs.__init__(self, corrector=corrector)
         super().__init__(env)

@@ -19,6 +19,7 @@ from apo_bench.records.method import checked_method, is_own, parsed
 from apo_bench.records.relations import checked_relations
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
+from apo_bench.records.short_names import CORRECTOR
 
 ENV_ID = "APOReplay-v0"
 ROW = "apo-bench/row/7"
@@ -27,8 +28,6 @@ Eye = Literal["noise", "range"]
 RANGE = "range"
 USUAL = "isotropic"
 """The noise model where none is asked for."""
-METHOD = "contact"
-"""The method where none is asked for."""
 Fidelity = Literal["full", "contact"]
 """Every motion is simulated, or the part of each in which things may touch."""
 LARGEST_SEED = 2**53 - 1
@@ -157,14 +156,14 @@ class TrialSettings:
     """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`,
     `recognised-jointly`, or wrong ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
     method: Name = field(
-        default=METHOD,
+        default=CORRECTOR,
         metadata=about(
             "oracle, none, search, a corrector or package.module:name; any of them with +search",
             spelled=checked_method,
             key=True,
             axis="methods",
             axis_option="methods",
-            swept=("oracle", "none", "paper", "contact"),
+            swept=("oracle", "none", "paper", CORRECTOR),
         ),
     )
     """Who plans: `oracle`, `none`, `search`, a corrector by name, or `module:name`; with `+search` the robot feels for

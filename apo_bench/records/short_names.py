@@ -28,6 +28,8 @@ CORRECTORS = MappingProxyType(
     }
 )
 """The correctors that need an observation and nothing else."""
+CORRECTOR = "contact-robust"
+"""The corrector where none is asked for."""
 LOOKING = ("contact-robust",)
 """Correctors that can ask to see operations again."""
 SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.settling:settle"})

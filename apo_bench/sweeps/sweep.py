@@ -14,7 +14,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
-from apo_bench.records.settings import METHOD
+from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm, find_arm
@@ -127,7 +127,7 @@ def _left(
             if row_hash is None:
                 trials.append(trial)
                 continue
-            cell = replace(trial, method=METHOD, seed=0)
+            cell = replace(trial, method=CORRECTOR, seed=0)
             if cell not in hashes:
                 hashes[cell] = spec_hash(trial, lock.content[trial.scenario])
             if row_hash != hashes[cell]:

@@ -143,14 +143,15 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from apo_bench.cli.show import show
     from apo_bench.correction.correctors import correct
     from apo_bench.envs.corrected import Corrected
-    from apo_bench.records.settings import METHOD, TrialSettings
+    from apo_bench.records.settings import TrialSettings
+    from apo_bench.records.short_names import CORRECTOR
     from apo_bench.sweeps.grid import SweepSettings
 
     commands = [signature(command).parameters["method"].default for command in (correct_command, show)]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
-    assert {*commands, *doors, TrialSettings("").method} == {METHOD}
-    assert METHOD in SweepSettings(("stick_in_tower",)).methods
-    assert f"default: {METHOD}." in trial_options("method")[0].annotation.__metadata__[0].help
+    assert {*commands, *doors, TrialSettings("").method} == {CORRECTOR}
+    assert CORRECTOR in SweepSettings(("stick_in_tower",)).methods
+    assert f"default: {CORRECTOR}." in trial_options("method")[0].annotation.__metadata__[0].help
 
 
 def test_json_is_exactly_one_row(capsys: pytest.CaptureFixture[str]) -> None:
