@@ -147,7 +147,10 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from apo_bench.records.short_names import CORRECTOR
     from apo_bench.sweeps.grid import SweepSettings
 
-    commands = [signature(command).parameters["method"].default for command in (correct_command, show)]
+    asked = signature(correct_command, eval_str=True).parameters["method"]
+    assert asked.default is None
+    assert f"default: {CORRECTOR}," in asked.annotation.__metadata__[0].help
+    commands = [signature(show).parameters["method"].default]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
     assert {*commands, *doors, TrialSettings("").method} == {CORRECTOR}
     assert CORRECTOR in SweepSettings(("stick_in_tower",)).methods

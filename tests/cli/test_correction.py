@@ -181,9 +181,9 @@ def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.Captu
     lines = SEEN.read_text(encoding="utf-8").splitlines()
     path = tmp_path / "missed.csv"
     path.write_text("\n".join([f"{lines[0]},seen", *(f"{line},{i != 1}" for i, line in enumerate(lines[1:]))]))
-    code, out, err = run(capsys, *asked(path))
+    code, out, err = run(capsys, *asked(path, "--method", "contact"))
     assert (code, err, "not_seen" in out) == (1, "", True)
-    assert json.loads(run(capsys, *asked(path, "--json"))[1])["operations"] is None
+    assert json.loads(run(capsys, *asked(path, "--method", "contact", "--json"))[1])["operations"] is None
     code, _, err = run(capsys, "explain", "stick_in_tower", "--observation", str(path))
     assert (code, err.count("\n"), "cannot be corrected" in err) == (1, 1, True)
 

@@ -332,10 +332,11 @@ def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.Monk
     assert seen["seen"].tolist() == [1, 0]
     _, reward, _, _, info = env.step(zeros(env))
     assert (reward, info["stage"], info["code"], info["operation"]) == (0.0, "observe", "not_seen", 2)
-    corrected = apo_bench.Corrected(env)
-    corrected.reset(seed=SEED)
-    _, _, _, _, info = corrected.step(zeros(env))
-    assert (info["stage"], info["code"]) == ("correct", "not_seen")
+    for corrector, ended in (("contact", ("correct", "not_seen")), ("contact-robust", ("done", "ok"))):
+        corrected = apo_bench.Corrected(env, corrector)
+        corrected.reset(seed=SEED)
+        _, _, _, _, info = corrected.step(zeros(env))
+        assert (info["stage"], info["code"]) == ended
 
 
 def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
