@@ -204,9 +204,7 @@ def _operations(
 
 
 def _pose(fields: Mapping[str, JsonNode]) -> Array:
-    position, q = fields["position_mm"].numbers(3), fields["quaternion_wxyz"].numbers(4)
-    if abs(np.linalg.norm(q) - 1.0) > 1e-3:
-        fields["quaternion_wxyz"].fail("a quaternion of length 1 (within 0.001) is needed", "divide it by its length")
+    position, q = fields["position_mm"].numbers(3), fields["quaternion_wxyz"].quaternion()
     return pose.unpack(np.concatenate([position * 1e-3, q]))
 
 

@@ -79,6 +79,13 @@ class JsonNode:
             self.fail(f"{size} finite numbers are needed")
         return array
 
+    def quaternion(self) -> Array:
+        """Four numbers of length 1, w first."""
+        q = self.numbers(4)
+        if abs(np.linalg.norm(q) - 1.0) > 1e-3:
+            self.fail("a quaternion of length 1 (within 0.001) is needed", "divide it by its length")
+        return q
+
     def number(self, low: float, high: float = math.inf, *, above: bool = False) -> float:
         """A finite number that is at least `low`, or above it, and at most `high`."""
         most = f" to {high:g}" if math.isfinite(high) else ""
