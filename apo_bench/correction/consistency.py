@@ -20,8 +20,7 @@ from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.play import plays
 from apo_bench.correction.posterior import jacobian_rank
-from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.manifold import SMALLEST, NearestGoals, nearest_goals
+from apo_bench.correction.solvers.manifold import SMALLEST, NearestGoals
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.remembered import remembered
 
@@ -101,24 +100,16 @@ def p_value(chi_square: float, freedom: int) -> float:
 
 
 def correction_length(
-    system: CompactEquations,
-    observed: Array,
-    L: Array,
-    found: NearestGoals,
-    slack_m: Array,
-    correlated: Array | None = None,
-    begin: Array | None = None,
+    found: NearestGoals, slack_m: Array, correlated: Array | None, relaxed_by: Callable[[Array], NearestGoals]
 ) -> tuple[float, int, NearestGoals | None]:
     """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
 
     These have no nearest goals; those that share the contradiction out are returned with the numbers, otherwise None.
 
     Args:
-        seen: (n, 4, 4), the goals that were seen.
-        L: (n, 6, 6), their covariance is L L^t.
         slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
         correlated: (3 c, 3 c), the covariance of the equations that has these deviations, [m^2]; None: independent.
-        begin: As of `nearest_goals`.
+        relaxed_by: The nearest goals if equations have these standard deviations, (3 c,), [m].
     """
     freedom = jacobian_rank(found.Jt)
     if not found.finite:
@@ -130,7 +121,7 @@ def correction_length(
         Jt = found.Jt if isinstance(found.Jt, np.ndarray) else found.Jt.toarray()
         return float(softened_length(found.z[None], Jt[None], correlated)[0]), freedom, None
     soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
-    relaxed = nearest_goals(system, observed, L, soft, begin)
+    relaxed = relaxed_by(soft)
     asked = soft > 0.0
     over = relaxed.e[asked] / soft[asked]
     return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed

@@ -59,7 +59,7 @@ def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> 
     plain = equations(observations[0].assembly, observations[0].start, observations[0].goals)
     system, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)
     solve = corrector.chosen_solver()
-    found = solve(compact_many(observations[0].assembly, system, goals).among(exact), goals, L)
+    found = solve(compact_many(observations[0].assembly, system, goals).among(exact), goals, L, None)
     return [corrector.given(one, _one(found, i)) for i, one in enumerate(observations)]
 
 

@@ -29,8 +29,8 @@ from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.correction.tailed import drawn_lengths, drawn_p_value
 from apo_bench.geometry.arrays import Array
 
-Solver = Callable[[CompactEquations, Array, Array], NearestGoals]
-"""(equations, goals seen, L) -> nearest goals; `manifold.nearest_goals` and what does the same."""
+Solver = Callable[[CompactEquations, Array, Array, Array | None], NearestGoals]
+"""(equations, goals seen, L, soft_m) -> nearest goals; `manifold.nearest_goals` and what does the same."""
 
 
 class Solved(NamedTuple):
@@ -123,15 +123,15 @@ class Problem:
 
     def _nearest(self, part: CompactEquations, soft_m: Array | None = None) -> NearestGoals:
         """The nearest goals by some of the equations, demanded or given a standard deviation each, [m]."""
-        if soft_m is None and self.begin is None:
-            return self.solver(part, self.observation.goals, self.L)
+        if self.begin is None:
+            return self.solver(part, self.observation.goals, self.L, soft_m)
         return nearest_goals(part, self.observation.goals, self.L, soft_m, self.begin)
 
     def _length(self, chosen: NDArray[np.bool_], found: NearestGoals) -> tuple[float, int, NearestGoals | None]:
         """As `correction_length`, by the contacts that are chosen, (c,)."""
         part, slack_m = self._equal(chosen)
         S = self._play(chosen)
-        return correction_length(part, self.observation.goals, self.L, found, slack_m, S, self.begin)
+        return correction_length(found, slack_m, S, lambda soft_m: self._nearest(part, soft_m))
 
     def _equal(self, chosen: NDArray[np.bool_]) -> tuple[CompactEquations, Array]:
         """The equations of the contacts that are chosen, (c,), and the slack of each, [m]."""

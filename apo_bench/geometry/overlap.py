@@ -62,24 +62,43 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     Returns:
         The overlap; nothing, if the faces only touch along an edge or `face` is seen edge-on.
     """
-    T_on_face = pose.inverse(T_on) @ T_face
-    if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
-        return NOTHING
-    frame = plane_frame(on)
-    lower = face_shape(on, pose.inverse(frame))
-    upper = face_shape(face, pose.inverse(frame) @ T_on_face)
-    common = upper.intersection(lower)
-    pieces = [piece for piece in _pieces(common) if piece.area > SLIVER_M2]
+    common, pieces = _common(face, T_face, on, T_on)
     if not pieces:
         return NOTHING
     flat = np.concatenate([_corners(piece) for piece in pieces])
-    corners = pose.apply(T_on @ frame, np.column_stack([flat, np.zeros(len(flat))]))
+    corners = pose.apply(T_on @ plane_frame(on), np.column_stack([flat, np.zeros(len(flat))]))
     return Overlap(corners, float(sum(piece.area for piece in pieces)), common)
+
+
+def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
+    """The area of `overlap` alone, [m^2]."""
+    return float(sum(piece.area for piece in _common(face, T_face, on, T_on)[1]))
 
 
 def face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
-    return float(face_shape(face, pose.inverse(plane_frame(face))).area)
+    return float(_own_shape(face).area)
+
+
+def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list[Any]]:
+    """What two faces cover of each other, in the plane of `on`, and its pieces without slivers."""
+    T_on_face = pose.inverse(T_on) @ T_face
+    if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
+        return None, []
+    upper = face_shape(face, _into_plane(on) @ T_on_face)
+    common = upper.intersection(_own_shape(on))
+    return common, [piece for piece in _pieces(common) if piece.area > SLIVER_M2]
+
+
+@lru_cache(maxsize=4096)
+def _own_shape(face: Face) -> Any:
+    """The face in its own plane."""
+    return face_shape(face, _into_plane(face))
+
+
+@lru_cache(maxsize=4096)
+def _into_plane(face: Face) -> Array:
+    return pose.inverse(plane_frame(face))
 
 
 @lru_cache(maxsize=4096)
@@ -96,9 +115,10 @@ def plane_frame(face: Face) -> Array:
 
 def face_shape(face: Face, T: Array) -> Any:
     """The face, as a shapely polygon, in the plane z = 0 after `T`: heights are dropped, a projection along z."""
-    from shapely import Polygon
+    from shapely import linearrings, polygons
 
-    return Polygon(pose.apply(T, face.outline)[:, :2], [pose.apply(T, hole)[:, :2] for hole in face.holes])
+    holes = [linearrings(pose.apply(T, hole)[:, :2]) for hole in face.holes]
+    return polygons(pose.apply(T, face.outline)[:, :2], holes or None)
 
 
 def _pieces(shape: Any) -> Iterator[Any]:

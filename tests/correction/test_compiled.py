@@ -203,9 +203,9 @@ def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> Non
     seen = [replace(first, goals=goals) for goals in drawn_ones]
     calls = list[int]()
 
-    def counting(system: CompactEquations, goals: Array, L: Array) -> NearestGoals:
+    def counting(system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
         calls.append(len(goals))
-        return compiled.nearest_goals_compiled(system, goals, L)
+        return compiled.nearest_goals_compiled(system, goals, L, soft_m)
 
     for one, other in zip(correct_many(seen), correct_many(seen, ContactCorrector(solver=counting)), strict=True):
         assert (one.status, one.rank) == (other.status, other.rank)

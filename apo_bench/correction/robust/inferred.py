@@ -9,7 +9,6 @@ known to the others.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from itertools import permutations
 from itertools import product as pairs
 from typing import Literal, NamedTuple
 
@@ -22,6 +21,7 @@ from apo_bench.assembly.topology import Assembly, Contact, product
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.symmetry import quarter_turns
 
 _APART = 0.1
 """Normals with a smaller singular value are in one plane, or along one line."""
@@ -237,13 +237,14 @@ def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:
     """(3, 3): R own = way. Where these look along one line, parts stand square to each other, as near as can be."""
     rank = _directions(own)
     if rank == 1:
-        square = [beside @ Q for Q in _quarter_turns() if (beside @ Q @ own[0]) @ way[0] > _SAME_WAY]
-        if square:
-            return max(square, key=lambda R: float(np.trace(R.T @ seen)))
+        square = beside @ quarter_turns()
+        square = square[square @ own[0] @ way[0] > _SAME_WAY]
+        if len(square):
+            return np.asarray(square[np.einsum("kij,ij->k", square, seen).argmax()])
         return _nearest(np.outer(way[0], own[0]) + _PLANE_M * seen)
     H = way.T @ own
     if rank == 2:
-        i, j = max(permutations(range(len(own)), 2), key=lambda ij: float(np.linalg.norm(np.cross(*own[list(ij)]))))
+        i, j = divmod(int(np.linalg.norm(np.cross(own[:, None], own), axis=2).argmax()), len(own))
         H = H + np.outer(np.cross(way[i], way[j]), np.cross(own[i], own[j]))
     return _nearest(H)
 
@@ -252,14 +253,3 @@ def _nearest(H: Array) -> Array:
     """The rotation R with the largest trace of R^t H (Kabsch, 1976)."""
     U, _, Vt = np.linalg.svd(H)
     return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
-
-
-def _quarter_turns() -> list[Array]:
-    """The 24 rotations of a cube."""
-    found = []
-    for order, signs in pairs(permutations(range(3)), pairs((1.0, -1.0), repeat=3)):
-        Q = np.zeros((3, 3))
-        Q[range(3), order] = signs
-        if np.linalg.det(Q) > 0.0:
-            found.append(Q)
-    return found

@@ -18,7 +18,7 @@ from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.overlap import face_area, overlap
+from apo_bench.geometry.overlap import face_area, overlap_area
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face
 
@@ -62,7 +62,7 @@ def crowding(observation: Observation, goals: Array) -> Crowding:
 def _covered(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:
     """How much of the smaller of two faces that touch covers the other one, 0 to 1; of round ones, of their length."""
     if isinstance(a, Face) and isinstance(b, Face):
-        return overlap(a, T_a, b, T_b).area / min(face_area(a), face_area(b))
+        return overlap_area(a, T_a, b, T_b) / min(face_area(a), face_area(b))
     return measure_round(a, T_a, b, T_b).share
 
 

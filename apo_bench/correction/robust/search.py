@@ -13,6 +13,7 @@ from itertools import combinations, groupby, product
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import pattern
 from apo_bench.correction.consistency import p_value
@@ -30,7 +31,6 @@ from apo_bench.correction.robust.hypotheses import (
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, State, beliefs
 from apo_bench.correction.solvers.joint import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
-from apo_bench.geometry.arrays import Array
 
 MOST_EXACT = 12
 """Operations up to which every set is looked at; of more, sets grow by one operation at a time."""
@@ -101,7 +101,7 @@ class Search:
         several = [one for _, one in zip(range(_MOST_STARTS), product(*likeliest), strict=False)]
         if len(several) == 1:
             return several[0]
-        return min(several, key=lambda states: _Rest(self._case, states).disagreement())
+        return min(several, key=lambda states: Rest(self._case, states).disagreement())
 
     def _smallest(self, start: States) -> Hypothesis | None:
         """The likeliest of the smallest sets, or single relations, whose test holds; else of all that were solved."""
@@ -115,7 +115,7 @@ class Search:
 
     def _sets(self, start: States) -> Iterator[list[States]]:
         """States in which some operations are in another than at the start, size by size, the best agreeing first."""
-        rest, seen = _Rest(self._case, start), [k for k, views in enumerate(self._case.views) if views]
+        rest, seen = Rest(self._case, start), [k for k, views in enumerate(self._case.views) if views]
         other = {k: [state for _, state in self._beliefs[k] if state != start[k]] for k in seen}
         size = {k: self._size(k, start[k]) for k in other}
         for some in self._grown(size, rest):
@@ -124,7 +124,7 @@ class Search:
             every = (changed(start, s, to) for s in agreeing for to in product(*(other[k] for k in s)))
             yield [states for _, states in zip(range(_MOST_SOLVED), every, strict=False)]
 
-    def _grown(self, size: dict[int, int], rest: _Rest) -> Iterator[list[tuple[int, ...]]]:
+    def _grown(self, size: dict[int, int], rest: Rest) -> Iterator[list[tuple[int, ...]]]:
         """Sets of operations by size; not all of them together."""
         if len(size) <= MOST_EXACT:
             every = [s for m in range(1, len(size)) for s in combinations(size, m)]
@@ -166,7 +166,7 @@ class Search:
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
         """Relations, or those that depend on an operation, without which the rest agrees."""
-        assembly, rest = self._case.observation.assembly, _Rest(self._case, states)
+        assembly, rest = self._case.observation.assembly, Rest(self._case, states)
         letters = pattern(assembly).letters - len(assembly.solids)
         for i, arc in enumerate(assembly.arcs()):
             if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:
@@ -191,31 +191,40 @@ def _badness(one: Hypothesis) -> float:
     return one.badness
 
 
-class _Rest:
+@final
+class Rest:
     """How well contacts agree that none of some operations has a part in, linearised once at what was seen."""
 
     def __init__(self, case: Case, states: States) -> None:
         seen, self._unknown = believed_observation(case, states), unbelieved(states)
         system = seen_system(seen)
-        self._e, Jt = linearised_by(system, seen.goals, noise_factor(seen))
-        self._Jt: Array = Jt
+        self._e, self._Jt = linearised_by(system, seen.goals, noise_factor(seen))
         known = np.delete(seen.covariance, self._unknown, axis=0)
         turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
-        self._soft = np.hypot(soft_deviation(seen), turned * turned * _LEVER_M)
-        self._operations = pattern(seen.assembly).letters - len(seen.assembly.solids)
+        soft = np.hypot(soft_deviation(seen), turned * turned * _LEVER_M)
+        self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
+        letters, c = pattern(seen.assembly).letters - len(seen.assembly.solids), len(system)
+        self._uses = (letters[..., None] == np.arange(len(seen.goals))).any(axis=1)
+        each = self._e.reshape(c, 3, 1), self._S.reshape(c, 3, c, 3)[np.arange(c), :, np.arange(c)]
+        self._alone = (each[0] * np.linalg.solve(each[1], each[0])).sum(axis=(1, 2))
 
     def agreement(self, left_out: Sequence[int], contacts: Sequence[int] = ()) -> float:
         """The p-value of the test of the other contacts."""
-        square, J = self._square(left_out, contacts)
-        return p_value(square, jacobian_rank(J.T)) if len(J) else 1.0
+        kept = self._kept(left_out, contacts)
+        if p_value(self._alone[kept].max(initial=0.0), 3 * len(kept)) == 0.0:
+            return 0.0
+        rows = np.repeat(kept, 3)
+        return p_value(self._square(rows), jacobian_rank(self._Jt[:, rows]))
 
     def disagreement(self) -> float:
         """The squared length of what all that is believed leaves, in standard deviations."""
-        return self._square((), ())[0]
+        return self._square(np.repeat(self._kept((), ()), 3))
 
-    def _square(self, left_out: Sequence[int], contacts: Sequence[int]) -> tuple[float, Array]:
-        chosen = np.asarray(~np.isin(self._operations, (*left_out, *self._unknown)).any(axis=1))
-        chosen[list(contacts)] = False
-        kept = np.repeat(chosen, 3)
-        J, e, soft = self._Jt[:, kept].T, self._e[kept], self._soft[kept]
-        return float(e @ np.linalg.solve(J @ J.T + np.diag(soft * soft), e)) if len(e) else 0.0, J
+    def _kept(self, left_out: Sequence[int], contacts: Sequence[int]) -> NDArray[np.bool_]:
+        kept = ~self._uses[:, [*left_out, *self._unknown]].any(axis=1)
+        kept[list(contacts)] = False
+        return np.asarray(kept)
+
+    def _square(self, rows: NDArray[np.bool_]) -> float:
+        e = self._e[rows]
+        return float(e @ np.linalg.solve(self._S[np.ix_(rows, rows)], e))

@@ -41,7 +41,7 @@ SQUARED_GAP_FLOOR = 1e-14
 """mu is at least this part of the mean square of the rows: rounding."""
 LARGEST_TURN = 0.25
 """[rad]. No goal turns further in one step."""
-LARGEST_DENSE = 48
+LARGEST_DENSE = 72
 """Unknowns above which one observation is solved with sparse matrices."""
 SMALLEST = 1e-300
 

@@ -2,24 +2,33 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.equations import largest_gap
+from apo_bench.assembly.equations import largest_gap, pattern
 from apo_bench.assembly.goals import Demonstration
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.placement import placements
+from apo_bench.correction.consistency import p_value
 from apo_bench.correction.correctors import correct
+from apo_bench.correction.posterior import jacobian_rank
+from apo_bench.correction.problem import seen_system
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.robust.hypotheses import Case, hypothesis
+from apo_bench.correction.robust.hypotheses import Case, hypothesis, soft_deviation
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.correction.robust.room import crowding
+from apo_bench.correction.robust.search import Rest
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
+from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.geometry.overlap import overlap, overlap_area
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import culprit, make_relations, with_relations
 from apo_bench.scenario.file import load_scenario
@@ -220,3 +229,30 @@ def test_of_many_operations_sets_grow_one_at_a_time(monkeypatch):
     monkeypatch.setattr("apo_bench.correction.robust.search.MOST_EXACT", 2)
     found = RobustCorrector()(astray(look("stick_in_tower", 2), 1))
     assert found.left_out == (1,)
+
+
+@pytest.mark.parametrize("name", ["pocket_table", "vanished_fixture"])
+def test_sets_are_scored_as_if_each_were_looked_at_alone(name):
+    observation = astray(look(name, 2), 1)
+    n, p = len(observation.goals), len(observation.assembly.solids)
+    rest = Rest(Case(observation, views_of(observation), OutlierModel()), ((INLIER,),) * n)
+    e, Jt = linearised_by(seen_system(observation), observation.goals, noise_factor(observation))
+    soft = np.hypot(soft_deviation(observation), 3.0 * np.radians(1.0) ** 2 * 0.1)
+    found = []
+    for left_out in (s for size in range(n) for s in combinations(range(n), size)):
+        rows = np.repeat(~np.isin(pattern(observation.assembly).letters - p, left_out).any(axis=1), 3)
+        J = Jt[:, rows].T
+        square = e[rows] @ np.linalg.solve(J @ J.T + np.diag(soft[rows] ** 2), e[rows])
+        found.append(rest.agreement(left_out))
+        assert found[-1] == pytest.approx(p_value(square, jacobian_rank(J.T)), rel=1e-6)
+    assert found[0] == 0.0
+    assert max(found) > 0.01
+
+
+def test_what_faces_cover_is_the_area_of_their_overlap():
+    for name in SCENARIOS:
+        observation = look(name, 1)
+        at = placements(observation.assembly, observation.start, observation.goals)[-1]
+        for m, e in (contact for operation in observation.assembly.operations for contact in operation.contacts):
+            faces = observation.assembly.face(m), at[m.part], observation.assembly.face(e), at[e.part]
+            assert overlap_area(*faces) == overlap(*faces).area
