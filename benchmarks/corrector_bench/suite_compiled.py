@@ -31,7 +31,7 @@ def _row(level: str, draws: int) -> Row:
     for of in map(apo_bench.load_scenario, SCENARIOS):
         for seed in range(FIRST, FIRST + draws):
             seen = _drawn(of, level, seed)
-            a, b = apo_bench.correct(seen, plain), apo_bench.correct(seen)
+            a, b = apo_bench.correct(seen, plain), apo_bench.correct(seen, "contact")
             otherwise += (a.status, a.rank, a.sentence, a.dropped) != (b.status, b.rank, b.sentence, b.dropped)
             off, count = max(off, 1e3 * float(np.abs(a.goals - b.goals).max())), count + 1
     what = "goals compiled against not compiled, all scenarios, mm"

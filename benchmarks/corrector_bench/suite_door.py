@@ -33,7 +33,7 @@ def suite(draws: int) -> list[Row]:
         ms, _, note = _measured([YARDSTICK, UNCOMPILED, CONTACT], name, draws)
         rows.append(_row("P1", name, "`paper`: `correct(seen, 'paper')`", ms, 0, "", note))
         rows.append(_row("P1", name, f"`contact` not compiled: {_UNCOMPILED}", ms, 1, "<= 1.3", note))
-        rows.append(_row("P2", name, "`contact`: `correct(seen)`", ms, 2, "<= 0.35", note))
+        rows.append(_row("P2", name, "`contact`: `correct(seen, 'contact')`", ms, 2, "<= 0.35", note))
         ms, _, note = _measured([YARDSTICK, MANY], name, draws)
         rows.append(_row("P4", name, f"{5 * draws:,} at once: `correct_many(seen)`", ms, 1, TOGETHER[name], note))
         for peer, what in PEERS.items():

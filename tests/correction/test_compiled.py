@@ -173,15 +173,15 @@ def check_same(expected: Correction, actual: Correction) -> None:
 def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(name: str, play_m: float) -> None:
     seen = [observed(name, 2.0, 1.0, seed, play_m) for seed in range(4)]
     for one in seen:
-        check_same(correct(one, ContactCorrector(solver=manifold.nearest_goals)), correct(one))
-        assert np.array_equal(correct(one, "contact-fast").goals, correct(one).goals)
+        check_same(correct(one, ContactCorrector(solver=manifold.nearest_goals)), correct(one, "contact"))
+        assert np.array_equal(correct(one, "contact-fast").goals, correct(one, "contact").goals)
 
 
 def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
     first = observed("pocket_table", 2.0, 1.0, 0)
     seen = [replace(first, goals=observed("pocket_table", 2.0, 1.0, seed).goals) for seed in range(3)]
     for one, made in zip(seen, correct_many(seen), strict=True):
-        alone = correct(one)
+        alone = correct(one, "contact")
         assert np.array_equal(made.goals, alone.goals)
         assert (made.covariance is None) == (alone.covariance is None)
         assert made.trace == alone.trace

@@ -69,7 +69,7 @@ def test_many_operations_that_fit_are_corrected():
     assembly = replace(of.assembly, operations=of.assembly.operations[:-1])
     seen = draw(of, "2/1", 0)
     observation = Observation(assembly, of.start, seen.seen[:10], seen.covariance[:10], np.ones(10, bool), 1e-4, PLAY_M)
-    found = correct(observation)
+    found = correct(observation, "contact")
     assert found.ok
     assert found.test.passes
 

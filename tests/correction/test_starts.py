@@ -36,7 +36,7 @@ def length(observation, goals):
 @pytest.mark.parametrize("turn", UPSIDE_DOWN)
 def test_a_part_seen_upside_down_is_turned_back(name, k, turn):
     seen = turned(name, k, turn)
-    found = correct(seen)
+    found = correct(seen, "contact")
     assert found.ok
     assert f"seen turned: operation {k + 1} by 1" in found.sentence
     assert not found.test.passes
@@ -48,7 +48,7 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
     """At 40 mm and degrees half of the corrections that begin with what was seen are, or end nowhere."""
     _, layout, _ = shown(name, 3)
     for seen in (look(name, 3, 25.0), look(name, 3, 40.0)):
-        found = correct(seen)
+        found = correct(seen, "contact")
         assert found.ok
         assert length(seen, found.goals) <= length(seen, layout.goals)
         assert largest_gap(seen.assembly, seen.start, found.goals) <= seen.gap_m
@@ -57,14 +57,14 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
 def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
     for name in SCENARIOS:
         seen = look(name, 1, 4.0)
-        one, other = correct(seen), correct(seen, ContactCorrector(elsewhere=False))
+        one, other = correct(seen, "contact"), correct(seen, ContactCorrector(elsewhere=False))
         assert one.goals.tolist() == other.goals.tolist()
         assert one.sentence == other.sentence
 
 
 def test_many_at_once_find_the_same():
     seen = [turned("bridge_cycle", 2, turn) for turn in UPSIDE_DOWN]
-    for many, one in zip(correct_many(seen), map(correct, seen), strict=True):
+    for many, one in zip(correct_many(seen), (correct(one, "contact") for one in seen), strict=True):
         assert (many.status, many.sentence) == (one.status, one.sentence)
         assert many.goals.tolist() == one.goals.tolist()
 
@@ -73,7 +73,7 @@ def test_where_contacts_bend_newton_ends_where_small_steps_would():
     """A cube seen upside down: each turn of it is about as far, so small steps shrink by a percent only."""
     seen = turned("block_on_block", 1, [180, 0, 0])
     L = scales(seen.covariance)
-    goals = correct(seen).goals
+    goals = correct(seen, "contact").goals
     system = compact_equations(equations(seen.assembly, seen.start, goals), 2)
     beside = goals.copy()
     beside[1] = beside[1] @ pose.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))

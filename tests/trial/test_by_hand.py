@@ -42,6 +42,6 @@ def test_what_was_observed_is_replayed_as_it_is_unless_an_operation_was_not_seen
     )
     with pytest.raises(apo_bench.InputError, match="operation 2 was not seen"):
         missed.plan()
-    refused = apo_bench.correct(missed)
+    refused = apo_bench.correct(missed, "contact")
     with pytest.raises(apo_bench.InputError, match=r"ended as not_seen .* which no robot should carry out"):
         refused.plan(missed)

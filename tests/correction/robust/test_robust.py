@@ -78,7 +78,7 @@ def fixed_error_mm(name, seed, correction):
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_without_outliers_it_is_contact(name):
     observation = look(name, 1)
-    plain, robust = correct(observation), correct(observation, "contact-robust")
+    plain, robust = correct(observation, "contact"), correct(observation, "contact-robust")
     assert plain.test.passes
     assert robust.goals.tolist() == plain.goals.tolist()
     assert (robust.status, robust.sentence) == ("converged", plain.sentence)
@@ -154,7 +154,9 @@ def test_ten_times_the_noise_is_seen_badly_and_not_left_out():
     assert f"; seen badly: operation {last + 1}" in found.sentence
     assert not found.test.passes
     assert found.test_after.passes
-    assert fixed_error_mm("stick_in_tower", 5, found) < fixed_error_mm("stick_in_tower", 5, correct(observation))
+    assert fixed_error_mm("stick_in_tower", 5, found) < fixed_error_mm(
+        "stick_in_tower", 5, correct(observation, "contact")
+    )
 
 
 def test_states_are_weighed_by_how_likely_they_make_what_was_seen():
