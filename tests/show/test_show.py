@@ -64,7 +64,7 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert cli.main(["show", "stick_in_tower", "--observation", "docs/seen.csv", "--out", str(out)]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("as seen: largest gap 5.466 mm; open: ")
-    assert said[1:] == ["corrected by contact: largest gap 0.000 mm; all hold", f"Wrote {out}"]
+    assert said[1:] == ["corrected by contact-robust: largest gap 0.000 mm; all hold", f"Wrote {out}"]
     drawn = imageio.imread(out)
     left, right = drawn[60:530, :620], drawn[60:530, 620:1240]
     assert left.std() > 10.0
@@ -123,7 +123,8 @@ def test_what_speaks_against_a_correction_is_said(
     far: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Planes that coincide a metre apart are no contact."""
-    assert cli.main(["show", "stick_in_tower", "--observation", str(far), "--out", str(tmp_path / "far.png")]) == 0
+    asked = ["stick_in_tower", "--observation", str(far), "--method", "contact"]
+    assert cli.main(["show", *asked, "--out", str(tmp_path / "far.png")]) == 0
     _, corrected, assumed, _ = capsys.readouterr().out.splitlines()
     assert corrected.startswith("corrected by contact: largest gap 0.000 mm; open: R2 castle2 -> castle1: beside it")
     for said in (
@@ -132,7 +133,7 @@ def test_what_speaks_against_a_correction_is_said(
     ):
         assert said in corrected
     assert assumed == "a standard deviation of 1 mm and 1 deg per axis, assumed where the file states none"
-    assert cli.main(["plan", "stick_in_tower", "--observation", str(far), "--deviation-mm", "3"]) == 0
+    assert cli.main(["plan", *asked, "--deviation-mm", "3"]) == 0
     *_, assumed, wrong = capsys.readouterr().out.splitlines()
     assert assumed == "a standard deviation of 3 mm and 1 deg per axis, assumed where the file states none"
     assert wrong.startswith("the stated noise does not explain the correction (p = ")

@@ -138,7 +138,7 @@ def test_a_stop_is_heard_while_the_work_is_laid_out(
 
 
 def test_by_default_the_ceiling_the_raw_the_papers_way_and_contact_are_compared() -> None:
-    assert SweepSettings(("stick_in_tower",)).methods == ("oracle", "none", "paper", "contact")
+    assert SweepSettings(("stick_in_tower",)).methods == ("oracle", "none", "paper", "contact-robust")
     for method in CORRECTORS:
         assert replace(SPEC, methods=(method,)).methods == (method,)
 
