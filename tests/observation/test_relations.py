@@ -25,10 +25,11 @@ from apo_bench.observation.relations import (
     with_relations,
 )
 from apo_bench.records.settings import TrialSettings
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import load_scenario
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream
 from tests import scenes
+from tests.shipped import BOXES
 
 SEEDS = range(12)
 
@@ -69,7 +70,7 @@ def test_a_shifted_face_is_off_by_its_size_and_every_other_contact_holds(name: s
     assert off[~np.array(accused)].max(initial=0.0) < 1e-12
 
 
-@pytest.mark.parametrize("name", scenario_names())
+@pytest.mark.parametrize("name", BOXES)
 def test_a_false_contact_is_plausible(name: str) -> None:
     """It joins a moved part and one that stands there; their faces are apart, and where a scenario has them, near."""
     s = load_scenario(name)

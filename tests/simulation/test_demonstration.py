@@ -27,6 +27,7 @@ LEVEL_MM = 0.01
 """How far a hand that takes care, and what physics does after it has let go, may put a part aside."""
 LOW = {"stick_in_tower": {2: 1}, "stick_on_castles": {2: 1}, "vanished_fixture": {4: 1}}
 LOW |= {"pocket_table": {4: 1, 5: 1}, "carried_bridge": {3: 1, 4: 2}}
+LOW |= {"shaft_through_brackets": {2: 1}, "dovetail": {1: 1}}
 """Operations, counted from 0, whose part ends some clearances low: a stick lies on the floor of its slot, and a cube
 hangs on the stick that does."""
 
@@ -70,9 +71,10 @@ def test_a_careful_human_shows_the_truth(name: str):
 def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, careless: float):
     of = shown(name, careless, 2)
     assert of.demonstration.code == "ok"
-    k = of.demonstration.assembly.operations[1].main
-    axis = of.layout.goals[1][:2, :2] @ load_scenario(name).careless.axis[:2]
-    erring = {1, 2} if name == "vanished_fixture" else {1}
+    asked = load_scenario(name).careless
+    k = of.demonstration.assembly.operations[asked.operation].main
+    axis = of.layout.goals[asked.operation][:2, :2] @ asked.axis[:2]
+    erring = {1, 2} if name == "vanished_fixture" else {asked.operation}
     for operation, off in enumerate(off_mm(of)):
         if operation in erring:
             assert 1.5 * careless - LEVEL_MM < abs(off[:2] @ axis) < 4.0 * careless + LEVEL_MM

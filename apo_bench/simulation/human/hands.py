@@ -13,6 +13,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import all_boxes
 from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
@@ -164,10 +165,15 @@ class Hands:
 
     def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
         weld = self._weld(hand, part)
-        quaternion = _quaternion(T_hand_part)
-        self.world.model.eq_data[weld, :11] = (0, 0, 0, *T_hand_part[:3, 3], *quaternion, 1)
+        quaternion, at = _quaternion(T_hand_part), self._held_at(part)
+        self.world.model.eq_data[weld, :11] = (*at, *(T_hand_part[:3, :3] @ at + T_hand_part[:3, 3]), *quaternion, 1)
         self.data.eq_active[weld] = 1
         self._held[hand][part] = T_hand_part
+
+    def _held_at(self, part: str) -> Array:
+        """Where the weld pulls, (3,): parts of boxes at their frame, others at the centre of mass, to hang straight."""
+        solid = self.scene.scenario.assembly.solids[part]
+        return np.zeros(3) if all_boxes(solid.pieces) else solid.centroid
 
     def _weld(self, hand: int, part: str) -> int:
         return int(self.world.model.equality(f"{HANDS[hand]}_{part}").id)

@@ -36,6 +36,8 @@ _HAND_WELD = {"solref": (0.01, 1.0), "solimp": (0.95, 0.99, 0.001, 0.5, 2.0)}
 _DROWSY_M_S = 5e-5
 """What moves slower for ten steps, and against nothing that moves, sleeps while a human demonstrates: parts that settle
 end within 2 micrometres of where they would."""
+_MEMORY = "64M"
+"""For the contacts of many pieces at once: what MuJoCo takes by itself is too little for rings of wedges that fall."""
 _ARM_WELD = {"solref": (0.004, 1.0), "solimp": (0.98, 0.999, 0.0005, 0.5, 2.0)}
 
 
@@ -139,6 +141,8 @@ def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Ar
     mjcf = import_mjcf()
     room = mjcf.from_path(str(folder("assets") / "room.xml"))
     room.model = scenario.name
+    if not all(all_boxes(solid.pieces) for solid in scenario.assembly.solids.values()):
+        room.size.memory = _MEMORY
     _set_physics(room, settings)
     start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
     bodies = {

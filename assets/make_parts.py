@@ -1,0 +1,114 @@
+"""Makes the parts with round and tilted faces that come with the package: `python assets/make_parts.py [FOLDER]`.
+
+Lengths in mm. Holes and slots are marked fit, shafts and what slides in them never are: a hole is made wider by the
+clearance, and its shaft as it is drawn.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.parts.making import Body, bore, extrude, join, polygon, rectangle, shaft, write_part
+
+SOURCE, LICENCE, DENSITY = "assets/make_parts.py of apo_bench", "Apache-2.0", 700.0
+SIDES = ("ny", "px", "py", "nx")
+TAN_60 = float(np.tan(np.radians(60.0)))
+
+
+def bored_plate() -> Body:
+    """60 x 60 x 20 mm with a bore of 10 mm."""
+    hole = bore((0, 0), 5, 0, 20, "bore", fit=True)
+    return extrude(rectangle(60, 60, names=SIDES), 0, 20, bores=[hole], bottom="bottom", top="top")
+
+
+def peg() -> Body:
+    """10 mm thick, 50 mm long; stands on its tip."""
+    return shaft(5, 0, 50, "side", bottom="tip", top="head")
+
+
+def bracket() -> Body:
+    """An L of 50 x 40 x 64 mm; a bore of 16 mm along x through its wall, 40 mm above its bottom."""
+    foot = extrude(rectangle(50, 40), 0, 10, bottom="bottom", top="tread")
+    wall = extrude(
+        rectangle(54, 40, (-27 - 10, 0)),
+        0,
+        14,
+        bores=[bore((-40, 0), 8, 0, 14, "bore", fit=True)],
+        bottom="wx",
+        top="wn",
+    )
+    # lying along z it is turned up: what was -x becomes z, what was z becomes x
+    return join(foot, wall.moved(turn_deg=(0, 90, 0)).moved((-25, 0, 0)))
+
+
+def rod() -> Body:
+    """16 mm thick, 150 mm long, along x; a square head of 16 mm at -x keeps it from rolling."""
+    length = shaft(8, 0, 130, "side", chamfer_high=1, top="tip")
+    head = extrude(rectangle(16, 16), -24, 0, bottom="end")
+    return join(head, length).moved(turn_deg=(0, 90, 0))
+
+
+def dovetail_base() -> Body:
+    """80 x 60 x 20 mm with a slot along x whose sides lean by 60 degrees: 20 mm wide at the top, 10 mm deep."""
+    wide = 10 + 10 / TAN_60
+    section = polygon(
+        (-30, 0), (30, 0), (30, 20), (10, 20), (wide, 10), (-wide, 10), (-10, 20), (-30, 20),
+        names={0: "bottom", 3: "slot_n", 4: "floor", 5: "slot_p"},
+        fit=("slot_n", "floor", "slot_p"),
+    )  # fmt: skip
+    return _along_x(extrude(section, -40, 40))
+
+
+def dovetail_slide() -> Body:
+    """Fits into the slot of dovetail_base, 70 mm long, with a handle 16 mm wide on top."""
+    wide = 10 + 10 / TAN_60
+    section = polygon(
+        (-wide, 0), (wide, 0), (10, 10), (8, 10), (8, 40), (-8, 40), (-8, 10), (-10, 10),
+        names={0: "bottom", 1: "lean_n", 7: "lean_p"},
+    )  # fmt: skip
+    return _along_x(extrude(section, -35, 35))
+
+
+def pin_plate() -> Body:
+    """100 x 70 x 12 mm with two pins of 8 mm, 60 mm apart, 20 mm high with chamfers."""
+    plate = extrude(rectangle(100, 70), 0, 12, bottom="bottom", top="top")
+    pin = shaft(4, 12, 32, "pin", chamfer_high=1.5)
+    return join(plate, pin.moved((-30, 0, 0)).prefixed("a_"), pin.moved((30, 0, 0)).prefixed("b_"))
+
+
+def l_plate() -> Body:
+    """An L of 90 x 50 x 16 mm with two bores of 8 mm, 60 mm apart, in its long leg."""
+    outline = polygon((-45, -12), (45, -12), (45, 38), (21, 38), (21, 12), (-45, 12))
+    holes = [bore((x, 0), 4, 0, 16, name, fit=True) for x, name in ((-30, "a_bore"), (30, "b_bore"))]
+    return extrude(outline, 0, 16, bores=holes, bottom="bottom", top="top")
+
+
+def _along_x(body: Body) -> Body:
+    """A prism over an outline (y, z), drawn along z, as one along x."""
+    return body.moved(turn_deg=(90, 0, 90))
+
+
+PARTS: Mapping[str, Body] = {
+    "bored_plate": bored_plate(),
+    "peg": peg(),
+    "bracket": bracket(),
+    "rod": rod(),
+    "dovetail_base": dovetail_base(),
+    "dovetail_slide": dovetail_slide(),
+    "pin_plate": pin_plate(),
+    "l_plate": l_plate(),
+}
+
+
+def main() -> None:
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "parts"
+    for name, body in PARTS.items():
+        write_part(name, body, folder, density=DENSITY, source=SOURCE, licence=LICENCE)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,15 @@
+"""Which scenarios come with the package, by the shapes of their parts."""
+
+BOXES = (
+    "block_on_block",
+    "bridge_cycle",
+    "carried_bridge",
+    "fixture_alignment",
+    "pocket_table",
+    "stick_in_tower",
+    "stick_on_castles",
+    "vanished_fixture",
+)
+"""The figures and examples of the paper."""
+TILTED = ("dovetail",)
+ROUND = ("l_bracket_on_plate", "peg_in_hole", "shaft_through_brackets")
