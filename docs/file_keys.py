@@ -251,8 +251,11 @@ def page() -> str:
 
 
 def scenario_keys() -> Keys:
+    """Of scenarios whose parts have no files beside them, which have keys of their own."""
+    parts = {name: load_scenario(name).part_files.values() for name in scenario_names()}
+    plain = [name for name, files in parts.items() if not any(Path(f).with_suffix(".toml").exists() for f in files)]
     with listening() as heard, tempfile.TemporaryDirectory() as folder:
-        for name in scenario_names():
+        for name in plain:
             load_scenario(name)
         own = Path(folder) / "own.toml"
         own.write_text(example(EXAMPLES[0], "own.toml"), encoding="utf-8")
