@@ -20,6 +20,7 @@ from apo_bench import __version__
 from apo_bench.cli import correction as cli_correction
 from apo_bench.cli import eye as cli_eye
 from apo_bench.cli import noise as cli_noise
+from apo_bench.cli import part as cli_part
 from apo_bench.cli import plan as cli_plan
 from apo_bench.cli import power as cli_power
 from apo_bench.cli import recognition as cli_recognition
@@ -150,7 +151,7 @@ def graph(
 
 
 for commands in (
-    *(cli_correction, cli_eye, cli_noise, cli_plan, cli_power, cli_recognition, cli_show, cli_sweep, cli_report),
+    *(cli_correction, cli_eye, cli_noise, cli_part, cli_plan, cli_power, cli_recognition, cli_show, cli_sweep, cli_report),
 ):
     commands.register(app)
 

@@ -21,6 +21,8 @@ _IN_PLANE_M, _PARALLEL = 1e-6, 1e-7
 _ROUNDED_M = 1e-6
 """What coordinates in files are rounded by at most, and so walls."""
 _BESIDE_M = SAGITTA_M + _ROUNDED_M
+_SNAP_M = 1e-9
+"""Areas are united on this grid: without one, some of them may be lost among corners that differ by rounding."""
 _ABOVE_M = 2e-5
 """So far above a face nothing of the part is."""
 _COARSE = 0.09
@@ -97,7 +99,7 @@ def _check_flat(face: Face, sides: _Sides, place: str) -> None:
     )
     owner = np.searchsorted(sides.first, np.flatnonzero(on), side="right") - 1
     below = [_shadow(sides.pieces[k], side, to_plane) for k, side in zip(owner, sides.planes[on], strict=True)]
-    bare = stated.difference(shapely.unary_union(below).buffer(_BESIDE_M))
+    bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
     if not bare.is_empty:
         at = bare.representative_point()
         x, y, z = 1e3 * (to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0]) * n)

@@ -1,0 +1,92 @@
+"""Whether a surface crosses itself: a tree of boxes finds triangles that may meet, their edges say which do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.cad.raw import Mesh
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+
+_MOST_PAIRS, _AT_ONCE = 12_000_000, 200_000
+_INSIDE = 1e-6
+"""Crossings nearer to an edge than this part of a triangle are touches."""
+
+
+def crossing(mesh: Mesh) -> Array | None:
+    """A point, (3,), at which two triangles without a common corner cross; None if none do."""
+    pairs = _near(mesh)
+    tolerance = 1e-6 * mesh.extent
+    for first in range(0, len(pairs), _AT_ONCE):
+        a, b = mesh.triangles[pairs[first : first + _AT_ONCE].T]
+        apart = (a[:, :, None] != b[:, None, :]).all(axis=(1, 2))
+        for one, other in ((a[apart], b[apart]), (b[apart], a[apart])):
+            found = _through(mesh.corners[one], mesh.corners[other], tolerance)
+            if found is not None:
+                return found
+    return None
+
+
+def _near(mesh: Mesh) -> Any:
+    """Pairs of triangles whose boxes overlap, (p, 2)."""
+    points = mesh.corners[mesh.triangles]
+    low, high = points.min(axis=1), points.max(axis=1)
+    order = _in_space((low + high) / 2.0)
+    levels = int(np.ceil(np.log2(max(len(order), 2))))
+    room = 1 << levels
+    tree = [(np.full((room, 3), np.inf), np.full((room, 3), -np.inf))]
+    tree[0][0][: len(order)], tree[0][1][: len(order)] = low[order], high[order]
+    for _ in range(levels):
+        below = tree[-1]
+        tree.append((np.minimum(below[0][::2], below[0][1::2]), np.maximum(below[1][::2], below[1][1::2])))
+    pairs = np.zeros((1, 2), dtype=np.int64)
+    for lows, highs in tree[-2::-1]:
+        every = np.concatenate([2 * pairs + off for off in ([0, 0], [0, 1], [1, 0], [1, 1])])
+        every = every[every[:, 0] <= every[:, 1]]
+        i, k = every.T
+        pairs = every[((lows[i] <= highs[k]) & (lows[k] <= highs[i])).all(axis=1)]
+        if len(pairs) > _MOST_PAIRS:
+            raise InputError("the triangles lie on each other in too many places; save the part with fewer of them.")
+    return order[pairs[pairs[:, 0] < pairs[:, 1]]]
+
+
+def _in_space(points: Array) -> Any:
+    """The order of points along a curve that keeps neighbours together."""
+    span = np.maximum(np.ptp(points, axis=0), 1e-12)
+    cell = ((points - points.min(axis=0)) / span * 1023.0).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
+def _through(a: Array, b: Array, tolerance: float) -> Array | None:
+    """Where an edge of a triangle goes through the inside of another one; both (p, 3, 3)."""
+    n = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
+    size = np.linalg.norm(n, axis=1)
+    n = n / np.maximum(size, 1e-300)[:, None]
+    height = ((a - b[:, :1]) * n[:, None]).sum(axis=2)
+    may = (height.max(axis=1) > tolerance) & (height.min(axis=1) < -tolerance) & (size > tolerance**2)
+    a, b, n, height, size = a[may], b[may], n[may], height[may], size[may]
+    for i in range(3):
+        k = (i + 1) % 3
+        through = ((height[:, i] > tolerance) & (height[:, k] < -tolerance)) | (
+            (height[:, i] < -tolerance) & (height[:, k] > tolerance)
+        )
+        if not through.any():
+            continue
+        p, q, corners, m, area = a[through, i], a[through, k], b[through], n[through], size[through]
+        share = height[through, i] / (height[through, i] - height[through, k])
+        x = p + share[:, None] * (q - p)
+        inside = np.ones(len(x), dtype=bool)
+        for j in range(3):
+            start, end = corners[:, j], corners[:, (j + 1) % 3]
+            inside &= (np.cross(end - start, x - start) * m).sum(axis=1) > _INSIDE * area + tolerance * np.linalg.norm(
+                end - start, axis=1
+            )
+        if inside.any():
+            return np.asarray(x[inside][0])
+    return None

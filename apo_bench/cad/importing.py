@@ -1,0 +1,166 @@
+"""A CAD file becomes part files: raw solids, names, pieces, faces that can make contacts, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from apo_bench.cad.cutting import Cut, cut
+from apo_bench.cad.matter import matter
+from apo_bench.cad.naming import renamed, with_names
+from apo_bench.cad.raw import RawSolid, Region
+from apo_bench.cad.reading import CadFile, read_meshes
+from apo_bench.cad.regions import regions_of
+from apo_bench.cad.shells import closed_solids
+from apo_bench.cad.stating import flat_face, round_face
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face, Solid
+from apo_bench.parts import load_part
+from apo_bench.parts.agreement import check_faces
+from apo_bench.parts.allowed import MOST_CORNERS_IN_ALL, MOST_FACES, MOST_PIECES
+from apo_bench.parts.making import Body, solid_of, write_part
+
+_RAYS = 720
+_WORD = "_"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """One part that was written."""
+
+    path: Path
+    raw: RawSolid
+    solid: Solid
+    cut: Cut
+    refused: Mapping[str, str]
+    """Faces that can make no contact, with the reason."""
+    free_mm: Mapping[str, float]
+    """Free radius of each hole that is stated, as the pieces leave it."""
+
+
+def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
+    """The solids of a file of triangles, with fitted and named faces.
+
+    Raises:
+        InputError: The file cannot be read, or holds no closed solid.
+    """
+    file = read_meshes(path, unit)
+    found = []
+    for each in closed_solids(path, file.shapes):
+        regions, facets = regions_of(each.mesh)
+        named = with_names(each.mesh, regions)
+        found.append(RawSolid(each.name, each.mesh, named, facets, each.poses, each.said))
+    return file, found
+
+
+def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: float = 1000.0) -> Imported:
+    """Write a raw solid as `NAME.xml` and `NAME.toml` that are read as a part.
+
+    Args:
+        density: [kg/m^3].
+
+    Raises:
+        InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
+    """
+    found = cut(raw)
+    corners = sum(len(piece.corners) for piece in found.pieces)
+    if len(found.pieces) > MOST_PIECES or corners > MOST_CORNERS_IN_ALL:
+        raise InputError(
+            f"{source}: the part takes {len(found.pieces)} convex pieces with {corners:,} corners; {MOST_PIECES} and "
+            f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets."
+        )
+    flats, rounds, refused = _faces(raw)
+    if len(flats) + len(rounds) > MOST_FACES:
+        raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
+    body = Body(found.pieces, tuple(flats), tuple(rounds), matter(raw, found))
+    solid = solid_of(name, body)
+    for face in (*flats, *rounds):
+        reason = _reason(solid, face)
+        if reason:
+            refused[face.name] = reason
+    body = replace(
+        body,
+        flats=tuple(f for f in flats if f.name not in refused),
+        rounds=tuple(f for f in rounds if f.name not in refused),
+    )
+    if not (body.flats or body.rounds):
+        raise InputError(f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is.")
+    path = write_part(name, body, folder, density=density, source=source, licence="as that file")
+    solid = load_part(path)
+    free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
+    return Imported(path, raw, solid, found, refused, free)
+
+
+def with_new_names(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
+    """With other names for some faces."""
+    return replace(raw, regions=renamed(raw.regions, names))
+
+
+def part_name(text: str) -> str:
+    """A name that a part may have, from any text."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c == _WORD) else _WORD for c in text)[:48]
+    return plain if plain[:1].isalpha() else f"part_{plain}"
+
+
+def _faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
+    flats: list[Face] = []
+    rounds: list[RoundFace] = []
+    refused: dict[str, str] = {}
+    for region in raw.regions:
+        if not region.name:
+            continue
+        face = round_face(region) if region.is_round else flat_face(raw, region)
+        if face is None:
+            refused[region.name] = "it is too thin" if region.is_round else "it has more than one outline"
+        elif isinstance(face, Face):
+            flats.append(face)
+        else:
+            rounds.append(face)
+    return flats, rounds, refused
+
+
+def _reason(solid: Solid, face: Face | RoundFace) -> str:
+    """Why a face is not as the pieces are; empty if it is."""
+    flat, wall = ({face.name: face}, {}) if isinstance(face, Face) else ({}, {face.name: face})
+    try:
+        check_faces(replace(solid, faces=flat, rounds=wall), Path("part"))
+    except InputError as error:
+        return str(error).split(": ", 1)[-1].split("; ")[0]
+    return ""
+
+
+def _free_radius(solid: Solid, wall: RoundFace) -> float:
+    """How far the pieces are from the axis of a hole, where it is narrowest, [m]."""
+    angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
+    x, y = wall.frame[:3, 0], wall.frame[:3, 1]
+    out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
+    low, high = sorted(wall.radii)
+    del high
+    share = (0.5,) if wall.kind == "cylinder" else ((0.02,) if wall.radii[0] == low else (0.98,))
+    found = np.inf
+    for s in share:
+        at = wall.point + (wall.span[0] + s * wall.length) * wall.axis
+        for piece in solid.pieces:
+            planes = piece.planes if isinstance(piece, Hull) else None
+            if planes is not None and np.abs(at - piece.center).max() < piece.half.max() + 2.0 * max(wall.radii):
+                found = min(found, _nearest(planes, at, out))
+    return float(found)
+
+
+def _nearest(planes: Array, at: Array, out: Array) -> float:
+    """Where rays from a point first enter a piece; infinite if none does."""
+    rate, room = planes[:, :3] @ out.T, (planes[:, 3] - planes[:, :3] @ at)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cross = room / rate
+    enter = np.where(rate < -1e-12, cross, np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)).max(axis=0)
+    leave = np.where(rate > 1e-12, cross, np.inf).min(axis=0)
+    hit = (enter < leave - 1e-9) & (leave > 0.0)
+    return float(np.maximum(enter[hit], 0.0).min(initial=np.inf))

@@ -1,0 +1,87 @@
+"""Names of faces: from what they are and where, so that one file gives the same ones each time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from apo_bench.cad.raw import Mesh, Region
+from apo_bench.errors import InputError, unknown
+from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_NAME
+
+_GRID = 1e-4
+"""Places that differ by less, in parts of the size, are in the order of the other ones."""
+
+
+def with_names(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
+    """Regions with names: `pz`, the outermost face that looks along +z, `pz2` ..., `flat1`, `hole1`, `shaft1`, `cone1`.
+
+    Of one kind the outermost one comes first, then by place; of round ones the widest. Faces on free surfaces and
+    walls that do not go all the way round have none.
+    """
+    by_stem: dict[str, list[int]] = {}
+    for k, region in enumerate(regions):
+        stem = _stem(region)
+        if stem:
+            by_stem.setdefault(stem, []).append(k)
+    found = list(regions)
+    for stem, members in by_stem.items():
+        members.sort(key=lambda k: _order(mesh, regions[k]))
+        for number, k in enumerate(members, start=1):
+            side = len(stem) == 2
+            name = stem if side and number == 1 else f"{stem}{number}"
+            found[k] = replace(regions[k], name=name)
+    return tuple(found)
+
+
+def renamed(regions: Sequence[Region], names: Mapping[str, str]) -> tuple[Region, ...]:
+    """With other names for some; `+z` stands for `pz`, `-z` for `nz`.
+
+    Raises:
+        InputError: No face has the name, or two would have one.
+    """
+    said = {_plain(old): new for old, new in names.items()}
+    have = [region.name for region in regions if region.name]
+    for old, new in said.items():
+        if old not in have:
+            raise InputError(unknown("face", old, have))
+        if not FACE_OR_PART_NAME.fullmatch(new) or len(new) > LONGEST_NAME or new.startswith("auto_"):
+            raise InputError(
+                f"--name {old}={new} was given; a letter, then letters, digits and underscores, {LONGEST_NAME} in all "
+                "at most, are allowed, and not auto_ at the beginning."
+            )
+    after = [said.get(name, name) for name in have]
+    twice = sorted({name for name in after if after.count(name) > 1})
+    if twice:
+        raise InputError(f"--name gives two faces the name {twice[0]}; give each its own.")
+    return tuple(replace(region, name=said.get(region.name, region.name)) for region in regions)
+
+
+def _plain(name: str) -> str:
+    return {"+": "p", "-": "n"}.get(name[:1], name[:1]) + name[1:]
+
+
+def _stem(region: Region) -> str:
+    if region.kind == "plane":
+        assert region.normal is not None
+        axis = int(np.abs(region.normal).argmax())
+        if abs(region.normal[axis]) < 1.0 - 1e-9:
+            return "flat"
+        return ("p" if region.normal[axis] > 0.0 else "n") + "xyz"[axis]
+    if not region.is_whole:
+        return ""
+    if region.kind == "cone":
+        return "cone"
+    return "hole" if region.hole else "shaft"
+
+
+def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
+    low = mesh.corners[np.unique(mesh.triangles[region.triangles])].min(axis=0)
+    grid = _GRID * mesh.extent
+    place = tuple(float(round(x / grid)) for x in low)
+    if region.kind == "plane":
+        assert region.normal is not None and region.point is not None
+        return (-float(round(region.normal @ region.point / grid)), *place)
+    return (-float(round(max(region.radii) / grid)), *place)
