@@ -44,7 +44,8 @@ def cut(raw: RawSolid) -> Cut:
         whole = whole.simplify(1e-3 * raw.mesh.extent)
     grown, hulls = 0.0, 0
     pieces: list[Array] = []
-    for part, hollow, planes in _convex(whole, raw.mesh.extent, _flats(raw)):
+    shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
+    for part, hollow, planes in _at_shoulders(_convex(whole, raw.mesh.extent, _flats(raw)), shafts, raw.mesh.extent):
         corners = _once(_settled(_corners(part), planes, raw.mesh.extent))
         if len(corners) < 4 or not _is_thick(corners):
             continue
@@ -53,7 +54,6 @@ def cut(raw: RawSolid) -> Cut:
         if hollow or abs(volume - part.volume()) > 1e-3 * part.volume():
             grown, hulls = grown + volume - part.volume(), hulls + 1
         pieces.append(corners)
-    shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
     found: list[Hull] = []
     for corners in pieces:
         found += [Hull("", 1e-3 * each) for each in _bored(_rounded(corners, shafts), bores)]
@@ -115,6 +115,38 @@ def _convex(whole: Any, size: float, flats: Array) -> Iterator[tuple[Any, bool, 
             else:
                 cuts += 1
                 open_ += halves
+
+
+def _at_shoulders(
+    parts: Iterator[tuple[Any, bool, Array]], shafts: Sequence[Region], size: float
+) -> Iterator[tuple[Any, bool, Array]]:
+    """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
+    hair = _HAIR * size
+    for part, hollow, planes in parts:
+        mine = [s for s in shafts if _touches(_corners(part), s)]
+        open_ = [(part, planes)]
+        for shaft in mine if len(mine) > 1 else ():
+            assert shaft.axis is not None
+            assert shaft.point is not None
+            for end in shaft.span:
+                d = float(shaft.point @ shaft.axis) + end
+                halves = []
+                for each, along in open_:
+                    height = _corners(each) @ shaft.axis - d
+                    if height.min() > -10.0 * hair or height.max() < 10.0 * hair:
+                        halves.append((each, along))
+                        continue
+                    used = np.concatenate([along, [[*shaft.axis, d]]])
+                    halves.append((each.trim_by_plane(shaft.axis, d + hair), used))
+                    halves.append((each.trim_by_plane(-shaft.axis, hair - d), used))
+                open_ = halves
+        yield from ((each, hollow, along) for each, along in open_)
+
+
+def _touches(corners: Array, shaft: Region) -> bool:
+    height, distance, _ = shaft.polar(corners)
+    within = (height > shaft.span[0] - _SAME_MM) & (height < shaft.span[1] + _SAME_MM)
+    return int((within & (np.abs(distance - shaft.radius_at(height)) < 1e-3)).sum()) >= 6
 
 
 def _settled(corners: Array, planes: Array, size: float) -> Array:
@@ -203,7 +235,8 @@ def _rounded(corners: Array, shafts: Sequence[Region]) -> Array:
             continue
         step = 2.0 * np.pi / sides_of(1e-3 * max(shaft.radii))
         x, y = shaft.frame()
-        assert shaft.point is not None and shaft.axis is not None
+        assert shaft.point is not None
+        assert shaft.axis is not None
         for h in np.unique(np.round(height[on], 3)):
             ring = np.sort(angle[on & (np.abs(height - h) < 2e-3)])
             exact = float(height[on & (np.abs(height - h) < 2e-3)].mean())
@@ -219,9 +252,7 @@ def _rounded(corners: Array, shafts: Sequence[Region]) -> Array:
             if fresh:
                 a = np.concatenate(fresh)
                 r = shaft.radius_at(exact)
-                added.append(
-                    shaft.point + exact * shaft.axis + r * (np.outer(np.cos(a), x) + np.outer(np.sin(a), y))
-                )
+                added.append(shaft.point + exact * shaft.axis + r * (np.outer(np.cos(a), x) + np.outer(np.sin(a), y)))
     if len(added) == 1:
         return corners
     every = _once(np.concatenate(added))
@@ -238,8 +269,13 @@ def _as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull
             height, distance, _ = shaft.polar(corners)
             low, high = float(height.min()), float(height.max())
             level = (np.minimum(height - low, high - height) < _SAME_MM).all()
-            if level and len(corners) >= 16 and (np.abs(distance - shaft.radii[0]) < 1e-5 * shaft.radii[0] + 1e-5).all():
-                assert shaft.point is not None and shaft.axis is not None
+            if (
+                level
+                and len(corners) >= 16
+                and (np.abs(distance - shaft.radii[0]) < 1e-5 * shaft.radii[0] + 1e-5).all()
+            ):
+                assert shaft.point is not None
+                assert shaft.axis is not None
                 center = 1e-3 * (shaft.point + (low + high) / 2.0 * shaft.axis)
                 piece = cylinder_hull("", Cylinder(center, shaft.axis, 1e-3 * shaft.radii[0], 5e-4 * (high - low)))
                 break
@@ -258,9 +294,7 @@ def _bored(corners: Array, bores: Sequence[Region]) -> list[Array]:
                 half
                 for part in parts
                 for half in (
-                    part.split_by_plane(plane[:3], float(plane[3]))
-                    if _meets(part, a) and _meets(part, b)
-                    else (part,)
+                    part.split_by_plane(plane[:3], float(plane[3])) if _meets(part, a) and _meets(part, b) else (part,)
                 )
             ]
     for bore in bores:
@@ -288,7 +322,10 @@ def _is_thick(points: Array) -> bool:
 
 def _between(a: Region, b: Region) -> Array | None:
     """The plane between two holes side by side, (4,)."""
-    assert a.axis is not None and b.axis is not None and a.point is not None and b.point is not None
+    assert a.axis is not None
+    assert b.axis is not None
+    assert a.point is not None
+    assert b.point is not None
     across = np.cross(a.axis, b.axis)
     if np.linalg.norm(across) > 1e-6:
         return None
@@ -320,7 +357,8 @@ def _meets(part: Any, bore: Region) -> bool:
 
 def _around(part: Any, bore: Region) -> Iterator[Any]:
     """A convex part less a round hole: what is below and above it, and wedges that touch its wall from outside."""
-    assert bore.point is not None and bore.axis is not None
+    assert bore.point is not None
+    assert bore.axis is not None
     axis, x, y = bore.axis, *bore.frame()
     foot = float(bore.point @ axis)
     above, rest = part.split_by_plane(axis, foot + bore.span[1])

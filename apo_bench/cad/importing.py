@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.cad.cutting import Cut, cut
 from apo_bench.cad.matter import matter
 from apo_bench.cad.naming import renamed, with_names
-from apo_bench.cad.raw import RawSolid, Region
+from apo_bench.cad.raw import RawSolid
 from apo_bench.cad.reading import CadFile, read_meshes
 from apo_bench.cad.regions import regions_of
 from apo_bench.cad.shells import closed_solids
@@ -82,7 +82,8 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
         raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
     body = Body(found.pieces, tuple(flats), tuple(rounds), matter(raw, found))
     solid = solid_of(name, body)
-    for face in (*flats, *rounds):
+    faces: list[Face | RoundFace] = [*flats, *rounds]
+    for face in faces:
         reason = _reason(solid, face)
         if reason:
             refused[face.name] = reason
@@ -92,7 +93,9 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
         rounds=tuple(f for f in rounds if f.name not in refused),
     )
     if not (body.flats or body.rounds):
-        raise InputError(f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is.")
+        raise InputError(
+            f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
+        )
     path = write_part(name, body, folder, density=density, source=source, licence="as that file")
     solid = load_part(path)
     free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
@@ -142,9 +145,7 @@ def _free_radius(solid: Solid, wall: RoundFace) -> float:
     angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
     x, y = wall.frame[:3, 0], wall.frame[:3, 1]
     out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
-    low, high = sorted(wall.radii)
-    del high
-    share = (0.5,) if wall.kind == "cylinder" else ((0.02,) if wall.radii[0] == low else (0.98,))
+    share = (0.5,) if wall.kind == "cylinder" else ((0.02,) if wall.radii[0] < wall.radii[1] else (0.98,))
     found = np.inf
     for s in share:
         at = wall.point + (wall.span[0] + s * wall.length) * wall.axis
@@ -160,7 +161,9 @@ def _nearest(planes: Array, at: Array, out: Array) -> float:
     rate, room = planes[:, :3] @ out.T, (planes[:, 3] - planes[:, :3] @ at)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         cross = room / rate
-    enter = np.where(rate < -1e-12, cross, np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)).max(axis=0)
+    enter = np.where(rate < -1e-12, cross, np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)).max(
+        axis=0
+    )
     leave = np.where(rate > 1e-12, cross, np.inf).min(axis=0)
     hit = (enter < leave - 1e-9) & (leave > 0.0)
     return float(np.maximum(enter[hit], 0.0).min(initial=np.inf))

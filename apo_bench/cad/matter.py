@@ -41,15 +41,14 @@ def mesh_moments(mesh: Mesh) -> Moments:
     sizes = (points[:, 0] * np.cross(points[:, 1], points[:, 2])).sum(axis=1) / 6.0
     total = points.sum(axis=1)
     first = sizes @ total / 4.0
-    second = (
-        np.einsum("t,tia,tib->ab", sizes, points, points) + np.einsum("t,ta,tb->ab", sizes, total, total)
-    ) / 20.0
+    second = (np.einsum("t,tia,tib->ab", sizes, points, points) + np.einsum("t,ta,tb->ab", sizes, total, total)) / 20.0
     return Moments(float(sizes.sum()), first, second).moved(np.eye(3), middle)
 
 
 def _behind_strips(raw: RawSolid, region: Region) -> Moments:
     """Between chords and arcs of one round face; negative for a hole."""
     assert region.axis is not None
+    assert region.point is not None
     mesh = raw.mesh
     weight = np.linalg.norm(mesh.across[region.triangles], axis=1) / 2.0
     strips, of = np.unique(raw.facets[region.triangles], return_inverse=True)

@@ -82,6 +82,7 @@ def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
     grid = _GRID * mesh.extent
     place = tuple(float(round(x / grid)) for x in low)
     if region.kind == "plane":
-        assert region.normal is not None and region.point is not None
-        return (-float(round(region.normal @ region.point / grid)), *place)
+        assert region.normal is not None
+        assert region.point is not None
+        return (-float(round(float(region.normal @ region.point) / grid)), *place)
     return (-float(round(max(region.radii) / grid)), *place)

@@ -120,7 +120,8 @@ class Region:
 
     def polar(self, points: Array) -> tuple[Array, Array, Array]:
         """Height along the axis, distance from it, angle around it, of points (k, 3)."""
-        assert self.axis is not None and self.point is not None
+        assert self.axis is not None
+        assert self.point is not None
         x, y = self.frame()
         off = points - self.point
         return off @ self.axis, np.hypot(off @ x, off @ y), np.arctan2(off @ y, off @ x)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -95,8 +95,8 @@ def _by_trimesh(path: Path, raw: bytes, kind: str) -> Mesh:
     import trimesh
 
     try:
-        more = {"skip_materials": True} if kind == "obj" else {}
-        mesh = trimesh.load(BytesIO(raw), file_type=kind, force="mesh", process=False, **more)
+        more: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
+        mesh: Any = trimesh.load(BytesIO(raw), file_type=kind, force="mesh", process=False, **more)
         corners = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     except MemoryError:

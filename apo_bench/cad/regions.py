@@ -242,18 +242,15 @@ def _without_bands(mesh: Mesh, facets: Facets, rounds: list[_Found], count: int)
         widths.append(float(np.ptp(height)) * float(np.hypot(1.0, each.surface.slope)))
         ends.append(_ends(mesh, facets, of, k, each, float(height.min() + height.max()) / 2.0))
         turn = _turn(facets, each)
-        if turn < WHOLE_TURN and ends[k] and widths[k] < turn * float(distance.mean()):
-            dropped.add(k)
-        elif len(ends[k]) == 2 and all(_alike(end, ends[k][0].angle, widths[k]) for end in ends[k]):
+        if (turn < WHOLE_TURN and ends[k] and widths[k] < turn * float(distance.mean())) or (
+            len(ends[k]) == 2 and all(_alike(end, ends[k][0].angle, widths[k]) for end in ends[k])
+        ):
             dropped.add(k)
     more = True
     while more:
         more = False
         for k, found in enumerate(ends):
-            if k not in dropped and any(
-                end.beyond & dropped and _alike(end, end.angle, widths[k])
-                for end in found
-            ):
+            if k not in dropped and any(end.beyond & dropped and _alike(end, end.angle, widths[k]) for end in found):
                 dropped.add(k)
                 more = True
     return [each for k, each in enumerate(rounds) if k not in dropped]

@@ -20,7 +20,8 @@ _THINNEST_MM = 0.05
 
 def round_face(region: Region) -> RoundFace | None:
     """The wall of a region that goes all the way round; None if it is too thin to be stated."""
-    assert region.point is not None and region.axis is not None
+    assert region.point is not None
+    assert region.axis is not None
     if max(region.radii) < _THINNEST_MM:
         return None
     low, high = region.span
@@ -33,14 +34,16 @@ def flat_face(raw: RawSolid, region: Region) -> Face | None:
 
     None if it has no single outline.
     """
-    assert region.normal is not None and region.point is not None
+    assert region.normal is not None
+    assert region.point is not None
     n = region.normal
     u = np.eye(3)[int(np.abs(n).argmin())]
     u = u - (u @ n) * n
     u /= np.linalg.norm(u)
     flat = np.array([u, np.cross(n, u)])
     d = float(n @ region.point)
-    outlines, holes = [], []
+    outlines: list[Array] = []
+    holes: list[Array] = []
     for corners, beside in _loops(raw, region):
         area = _area(raw.mesh.corners[corners] @ flat.T)
         ring = _circle(raw, region, beside, area < 0.0)

@@ -151,7 +151,18 @@ def graph(
 
 
 for commands in (
-    *(cli_correction, cli_eye, cli_noise, cli_part, cli_plan, cli_power, cli_recognition, cli_show, cli_sweep, cli_report),
+    *(
+        cli_correction,
+        cli_eye,
+        cli_noise,
+        cli_part,
+        cli_plan,
+        cli_power,
+        cli_recognition,
+        cli_show,
+        cli_sweep,
+        cli_report,
+    ),
 ):
     commands.register(app)
 

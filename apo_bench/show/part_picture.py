@@ -38,8 +38,6 @@ def _toward(elevation: float, azimuth: float) -> Array:
 
 
 def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
     mesh = raw.mesh
     normals = mesh.across / np.maximum(np.linalg.norm(mesh.across, axis=1), 1e-300)[:, None]
     for region in raw.regions:
@@ -48,15 +46,14 @@ def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None
             continue
         drawn = seen[:: -(-len(seen) // _MOST_DRAWN)]
         color = _color(region, refused)
-        light = 0.55 + 0.45 * np.clip(normals[drawn] @ eye, 0.0, 1.0)
-        rgb = np.array([int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
-        axes.add_collection3d(Poly3DCollection(mesh.corners[mesh.triangles[drawn]], facecolors=np.outer(light, rgb)))
+        axes.plot_trisurf(
+            *mesh.corners.T, triangles=mesh.triangles[drawn], color=color, shade=True, linewidth=0.0, antialiased=False
+        )
         if region.name:
             weight = np.linalg.norm(mesh.across[seen], axis=1)
-            at = weight @ mesh.corners[mesh.triangles[seen]].mean(axis=1) / weight.sum()
-            near = mesh.corners[mesh.triangles[seen]].mean(axis=1)
-            at = near[int(np.linalg.norm(near - at, axis=1).argmin())] if region.is_round else at
-            axes.text(*(at + 0.02 * mesh.extent * eye), region.name, ha="center", fontsize=9, zorder=1000)
+            at = mesh.corners[mesh.triangles[seen[int(weight.argmax())]]].mean(axis=0) + 0.02 * mesh.extent * eye
+            box = {"facecolor": "white", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
+            axes.text(*at, region.name, ha="center", fontsize=9, zorder=1000, bbox=box)
     low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
     middle, half = (low + high) / 2.0, mesh.extent / 2.0
     for name, m in zip("xyz", middle, strict=True):

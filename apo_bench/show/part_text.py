@@ -51,7 +51,7 @@ def import_lines(done: Imported) -> Iterator[str]:
     stated, mesh = 1e9 * done.solid.volume, raw.mesh.volume
     yield f"  volume: {mesh:.6g} mm^3 as tessellated, {stated:.6g} mm^3 with round walls as fitted"
     loss = (
-        f"; {done.cut.hulls} of them stand for hollow or free shapes and are {done.cut.grown:.3g} mm^3 larger or smaller"
+        f"; {done.cut.hulls} of them stand for hollow or free shapes and grow it by {done.cut.grown:.3g} mm^3"
         if done.cut.hulls
         else ""
     )

@@ -42,6 +42,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"replay .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
     r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
     r"eye ": "many depth images; tests/depth_camera runs them",
+    r"part import ": "needs a CAD file; tests/cad runs it",
     r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",
     r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",
 }

@@ -1,0 +1,184 @@
+"""Files that are no parts are refused in one sentence; what can be mended is mended, and said."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.cad.importing import import_part, raw_solids
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+from tests.cad.made import block, rod, write_stl, write_triangles
+
+
+def triangles(mesh: Any) -> Any:
+    raw = mesh.to_mesh()
+    return np.asarray(raw.vert_properties)[:, :3][np.asarray(raw.tri_verts)]
+
+
+def empty(folder: Path) -> Path:
+    (folder / "a.stl").touch()
+    return folder / "a.stl"
+
+
+def garbage(folder: Path) -> Path:
+    path = folder / "a.obj"
+    path.write_bytes(bytes(range(256)) * 40)
+    return path
+
+
+def no_zip(folder: Path) -> Path:
+    path = folder / "a.3mf"
+    path.write_text("no zip")
+    return path
+
+
+def other_kind(folder: Path) -> Path:
+    path = folder / "a.txt"
+    path.write_text("hello")
+    return path
+
+
+def pipe(folder: Path) -> Path:
+    os.mkfifo(folder / "a.stl")
+    return folder / "a.stl"
+
+
+def is_open(folder: Path) -> Path:
+    return write_triangles(triangles(block(20, 20, 20))[:-1], folder / "a.stl")
+
+
+def crossed(folder: Path) -> Path:
+    both = np.concatenate([triangles(block(20, 20, 20)), triangles(block(10, 10, 40, (3, 2, -7)))])
+    return write_triangles(both, folder / "a.stl")
+
+
+def touching(folder: Path) -> Path:
+    both = np.concatenate([triangles(block(20, 20, 20)), triangles(block(20, 20, 20, (20, 0, 0)))])
+    return write_triangles(both, folder / "a.stl")
+
+
+def huge(folder: Path) -> Path:
+    return write_stl(block(30, 30, 30), folder / "a.stl", 1000.0)
+
+
+def in_metres(folder: Path) -> Path:
+    return write_stl(block(30, 30, 30), folder / "a.stl", 1e-3)
+
+
+REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
+    "empty": (empty, "the file is empty"),
+    "garbage": (garbage, "OBJ file that can be read|holds no triangles"),
+    "no 3mf": (no_zip, "no 3MF file that can be read"),
+    "other kind": (other_kind, r"ends in \.stl"),
+    "pipe": (pipe, "a pipe was given"),
+    "open": (is_open, "the shell is open: 3 edges"),
+    "crossed": (crossed, "the surface crosses itself"),
+    "touching": (touching, "more than two triangles"),
+    "huge": (huge, "states no unit, and 3e\\+04 may be"),
+    "metres": (in_metres, "states no unit, and 0.03 may be 0.03 mm"),
+    "missing": (lambda folder: folder / "a.stl", "cannot be read"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_part_is_refused_in_one_sentence(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make, sentence = REFUSED[case]
+    with pytest.raises(InputError, match=sentence) as raised:
+        raw_solids(make(tmp_path), None)
+    assert "\n" not in str(raised.value)
+    assert main(["part", "import", str(tmp_path / "none.stl"), "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_part_of_a_tenth_of_a_millimetre_is_refused(tmp_path: Path) -> None:
+    path = write_stl(block(30, 30, 30), tmp_path / "a.stl", 0.1 / 30)
+    with pytest.raises(InputError, match="parts of 1 mm to 2 m are allowed"):
+        raw_solids(path, "mm")
+
+
+def test_units_are_as_asked(tmp_path: Path) -> None:
+    path = write_stl(block(2, 1, 1), tmp_path / "a.stl")
+    _, (raw,) = raw_solids(path, "in")
+    assert raw.mesh.extent == pytest.approx(50.8)
+
+
+def test_inside_out_is_turned_and_said(tmp_path: Path) -> None:
+    path = write_triangles(triangles(block(20, 20, 20) - rod(4, 20))[:, ::-1], tmp_path / "a.stl")
+    _, (raw,) = raw_solids(path, None)
+    assert raw.mesh.volume > 0.0
+    assert raw.said == ("it was inside out, and was turned",)
+
+
+def test_triangles_turned_the_wrong_way_are_turned_and_said(tmp_path: Path) -> None:
+    given = triangles(block(20, 20, 20))
+    given[::3] = given[::3, ::-1]
+    _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
+    assert raw.mesh.volume == pytest.approx(8000.0)
+    assert "looked the other way" in raw.said[0]
+
+
+def test_solids_of_one_shape_are_one_part_with_places(tmp_path: Path) -> None:
+    a, b = block(30, 20, 10), block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
+    path = write_triangles(
+        np.concatenate([triangles(each) for each in (a, b, rod(5, 20, (0, 60, 0)))]), tmp_path / "a.stl"
+    )
+    _, raws = raw_solids(path, None)
+    assert [len(raw.poses) for raw in raws] == [2, 1]
+    assert raws[0].poses[1][:3, 3] == pytest.approx([50, 0, 0], abs=1e-4)
+
+
+def test_a_3mf_says_its_unit_and_places(tmp_path: Path) -> None:
+    raw = block(2, 1, 1).to_mesh()
+    points = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in np.asarray(raw.vert_properties)[:, :3])
+    index = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in np.asarray(raw.tri_verts))
+    model = (
+        '<model unit="inch" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1" name="brick"><mesh><vertices>{points}</vertices><triangles>{index}</triangles></mesh></object>'
+        '</resources><build><item objectid="1"/>'
+        '<item objectid="1" transform="1 0 0 0 1 0 0 0 1 3 0 0"/></build></model>'
+    )
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    file, (solid,) = raw_solids(tmp_path / "a.3mf", None)
+    assert (file.unit, solid.name, len(solid.poses)) == ("in", "brick", 2)
+    assert solid.mesh.extent == pytest.approx(50.8)
+    assert solid.poses[1][:3, 3] == pytest.approx([76.2, 0, 0], abs=1e-4)
+
+
+def test_a_free_surface_is_geometry_without_contact_and_is_said(tmp_path: Path) -> None:
+    from manifold3d import Manifold
+
+    mesh = block(30, 30, 5, (0, 0, -10)) + Manifold.sphere(10, 32)
+    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    done = import_part(raw, "ball", tmp_path, "a.stl")
+    assert sum(region.kind == "other" for region in raw.regions) == 1
+    assert done.cut.hulls == 1
+    assert done.solid.volume * 1e9 == pytest.approx(mesh.volume(), rel=0.1)
+
+
+def test_the_command_says_what_it_did_and_names_as_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write_stl(block(40, 30, 10) - rod(4, 10, n=32), tmp_path / "lid 1.stl")
+    out = tmp_path / "parts"
+    assert main(["part", "import", str(path), "--name", "hole1=bore", "--name", "+z=top", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    for words in (
+        "unit mm",
+        "40 x 30 x 10 mm",
+        "watertight",
+        "6 flat, 1 cylinder",
+        "bore: hole",
+        "free radius of bore",
+    ):
+        assert words in said
+    assert {each.suffix for each in out.iterdir()} == {".xml", ".toml", ".png"}
+    assert main(["part", "import", str(path), "--name", "hole7=bore", "--out", str(out)]) == 2
+    assert "unknown face 'hole7'" in capsys.readouterr().err
