@@ -17,6 +17,8 @@ _MOST_CUTS, _MOST_TRIANGLES, _FARTHEST = 400, 20_000, 60
 _MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 200
 """Of a piece; of one that has more, the farthest corners are kept in so many directions."""
 _TRIES, _HAIR = 6, 2e-6
+_INSIDE_M = 5e-8
+"""Corners so far inside of a piece are none of it."""
 _SAME_MM = 2e-4
 """Corners of a piece nearer to each other than this are one."""
 _THIN_MM = 0.02
@@ -199,6 +201,12 @@ def _extremes(points: Array) -> Array:
     points = _once(points)
     corners = points[np.sort(ConvexHull(points).vertices)]
     hull = Hull("", 1e-3 * corners)
+    for _ in range(4):
+        inside = (hull.planes[:, 3] - hull.corners @ hull.planes[:, :3].T).min(axis=1) > _INSIDE_M
+        if not inside.any():
+            break
+        corners = corners[~inside]
+        hull = Hull("", 1e-3 * corners)
     if len(corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS:
         return np.asarray(corners)
     k = np.arange(_FARTHEST) + 0.5

@@ -132,4 +132,4 @@ def on_it(mesh: Mesh, facets: Facets, among: Any, found: Round, tolerance: float
 def axis_of(normals: Array, cone: bool) -> Array:
     """The direction to which normals are square, or have one angle."""
     rows = normals - normals.mean(axis=0) if cone else normals
-    return np.asarray(np.linalg.svd(rows, full_matrices=True)[2][2])
+    return np.asarray(np.linalg.svd(rows, full_matrices=len(rows) < 3)[2][2])

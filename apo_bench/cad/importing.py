@@ -97,7 +97,15 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
             f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
         )
     path = write_part(name, body, folder, density=density, source=source, licence="as that file")
-    solid = load_part(path)
+    try:
+        solid = load_part(path)
+    except InputError as error:
+        path.unlink()
+        path.with_suffix(".toml").unlink(missing_ok=True)
+        why = str(error).removeprefix(f"{path}: ").rstrip(".")
+        raise InputError(
+            f"{source}: what the solid was cut into makes no part ({why}); leave out fillets and free surfaces."
+        ) from error
     free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return Imported(path, raw, solid, found, refused, free)
 
