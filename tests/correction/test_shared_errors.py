@@ -51,29 +51,32 @@ def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
 
 @pytest.mark.parametrize("model", ["bias", "bias-view", "correlated"])
 def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str) -> None:
-    """Of 60 draws 95 % regions cover 57 but for chance (binomial, 4 sigma), and p is uniform on average."""
+    """Of 30 draws 95 % regions cover 28.5 but for chance (binomial, 4 sigma), and p is uniform on average.
+
+    `benchmarks/calibration.py` takes 2,000 draws of every model.
+    """
     p, covered = [], []
-    for seed in range(60):
+    for seed in range(30):
         observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed)
         made = correct(observation, "contact")
         assert made.ok
         p.append(made.test.p_value)
         covered.append(contains_truth(observation, made, truth))
-    assert sum(covered) >= 57 - 4 * np.sqrt(60 * 0.95 * 0.05)
-    assert np.mean(p) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 60))
+    assert sum(covered) >= 28.5 - 4 * np.sqrt(30 * 0.95 * 0.05)
+    assert np.mean(p) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 30))
 
 
 @pytest.mark.parametrize("model", ["heavy-tailed", "megapose-tless-inliers"])
 def test_the_test_and_the_regions_are_those_of_the_tails(model: str) -> None:
-    """Of 120 draws, alarms at a nominal 10 % and regions of 95 % as chance makes them (binomial, 4 sigma)."""
+    """Of 50 draws, alarms at a nominal 10 % and regions of 95 % as chance makes them (binomial, 4 sigma)."""
     p, covered = [], []
-    for seed in range(120):
+    for seed in range(50):
         observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5)
         made = correct(observation, "contact")
         p.append(made.test.p_value)
         covered.append(contains_truth(observation, made, truth))
-    assert abs(np.mean(np.array(p) < 0.1) - 0.1) < 4 * np.sqrt(0.09 / 120)
-    assert abs(np.mean(covered) - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 120)
+    assert abs(np.mean(np.array(p) < 0.1) - 0.1) < 4 * np.sqrt(0.09 / 50)
+    assert abs(np.mean(covered) - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 50)
 
 
 def test_a_shared_error_of_none_of_the_size_changes_nothing() -> None:
