@@ -104,7 +104,7 @@ def fitting_plan(
         InputError: The correction did not converge.
     """
     plan, told = correction.plan(observation), observation if told is None else told
-    asked = replace(plan, assembly=told.assembly)
+    asked = plan if told.assembly is plan.assembly else replace(plan, assembly=told.assembly)
     if isinstance(where, Scenario):
         if not predict(asked, where.clearance_mm, where.thresholds, where.attach).fails:
             return FittingPlan(plan)

@@ -11,6 +11,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.solid import extent
 from apo_bench.insertion.surroundings import (
     OVER_M,
@@ -69,6 +70,12 @@ def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
     Args:
         searches: Whether the robot feels for a hole where a motion into it is stopped.
     """
+    return _prepared(plan, scene, searches)
+
+
+@remembered
+def _prepared(plan: Plan, scene: Scene, searches: bool) -> tuple[Move, ...]:
+    """A plan is looked at whether the arm reaches it, and then carried out."""
     believed: Poses = dict(plan.start)
     made = []
     for task in _tasks(plan, scene):
