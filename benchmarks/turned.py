@@ -30,8 +30,9 @@ from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
+from apo_bench.geometry.convex import all_boxes
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.pose_error import goal_errors
@@ -51,17 +52,6 @@ OURS = (
     "least-squares",
     "penalty",
 )
-SCENARIOS = (
-    "block_on_block",
-    "bridge_cycle",
-    "carried_bridge",
-    "fixture_alignment",
-    "pocket_table",
-    "stick_in_tower",
-    "stick_on_castles",
-    "vanished_fixture",
-)
-"""Parts of boxes: whether faces look at each other is asked of flat ones."""
 TURNS = (90.0, 135.0, 180.0)
 SEED = 16
 LEVEL = 1.0
@@ -97,6 +87,12 @@ def faces_oppose(assembly: Assembly, layout: Layout, made: Correction) -> bool:
     return True
 
 
+def of_boxes() -> tuple[str, ...]:
+    """The scenarios whose parts are boxes: whether faces look at each other is asked of flat ones."""
+    parts = {name: scenario_of(name).assembly.solids.values() for name in scenario_names()}
+    return tuple(name for name, solids in parts.items() if all(all_boxes(solid.pieces) for solid in solids))
+
+
 @cache
 def scenario_of(name: str) -> Scenario:
     return load_scenario(name)
@@ -105,7 +101,7 @@ def scenario_of(name: str) -> Scenario:
 def count(draws: int, correctors: tuple[str, ...]) -> dict[str, dict[str, int]]:
     """Draws, what converged, what of that is right, and what looks the same way, of each corrector."""
     found = {name: dict.fromkeys(("draws", "converged", "right", "same way"), 0) for name in correctors}
-    names = SCENARIOS
+    names = of_boxes()
     for i in range(draws):
         scenario, name = scenario_of(names[i % len(names)]), correctors[i // len(names) % len(correctors)]
         layout, seen = turned(scenario, np.random.default_rng([SEED, i]))

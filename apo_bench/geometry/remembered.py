@@ -23,12 +23,12 @@ def remembered(function: Callable[Given, Found]) -> Callable[Given, Found]:
 
     @wraps(function)
     def found(*given: Given.args, **named: Given.kwargs) -> Found:
-        answers = known.setdefault(given[0], {})
-        if given[1:] in answers:
-            return answers[given[1:]]
+        answers, asked = known.setdefault(given[0], {}), (given[1:], *sorted(named.items()))
+        if asked in answers:
+            return answers[asked]
         made = function(*given, **named)
         if len(answers) < _MOST:
-            answers[given[1:]] = made
+            answers[asked] = made
         return made
 
     return found

@@ -83,15 +83,8 @@ def recognise(
     Raises:
         InputError: Something else was given.
     """
-    for given, wanted in ((observation, Observation), (rules, Rules)):
-        if not isinstance(given, wanted):
-            raise InputError(
-                f"{kind(given)} was given to recognise; an Observation is allowed (read_observation reads one from a "
-                "file), and as rules NOISE, FIXED or Rules(...) of apo_bench.recognition.thresholds."
-            )
-    bare = tuple(replace(operation, contacts=()) for operation in observation.assembly.operations)
-    assembly = replace(observation.assembly, operations=bare, gaps={})
-    observation = replace(observation, assembly=assembly)
+    observation = without_contacts(observation, rules, "recognise")
+    assembly, bare = observation.assembly, observation.assembly.operations
     belief, evidence = initial_belief(observation), list[Evidence]()
     as_seen = belief if first_seen is None else replace(belief, goals=first_seen)
     known = set(assembly.fixed)
@@ -104,6 +97,22 @@ def recognise(
     made = [tuple(e.contact for e in evidence if e.made == k) for k in range(len(bare))]
     operations = tuple(replace(operation, contacts=made[k]) for k, operation in enumerate(bare))
     return Recognised(replace(assembly, operations=operations), tuple(evidence))
+
+
+def without_contacts(observation: Observation, rules: Rules, verb: str) -> Observation:
+    """What was seen, with no contact of any operation.
+
+    Raises:
+        InputError: Something else was given to the verb.
+    """
+    for given, wanted in ((observation, Observation), (rules, Rules)):
+        if not isinstance(given, wanted):
+            raise InputError(
+                f"{kind(given)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
+                "file), and as rules RULES_BY_NOISE, FIXED_RULES or Rules(...) of apo_bench.recognition.thresholds."
+            )
+    bare = tuple(replace(operation, contacts=()) for operation in observation.assembly.operations)
+    return replace(observation, assembly=replace(observation.assembly, operations=bare, gaps={}))
 
 
 class _Candidate(NamedTuple):

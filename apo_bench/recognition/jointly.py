@@ -21,9 +21,8 @@ from apo_bench.assembly.facing import face_gap
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.errors import InputError, kind
 from apo_bench.geometry.arrays import Array
-from apo_bench.recognition.contacts import Evidence, Recognised, Rival
+from apo_bench.recognition.contacts import Evidence, Recognised, Rival, without_contacts
 from apo_bench.recognition.estimate import estimate
 from apo_bench.recognition.physics import IMPOSSIBLE, inside, refusal, surprise
 from apo_bench.recognition.situation import Candidate, Situation
@@ -49,16 +48,9 @@ def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -
     Raises:
         InputError: Something else was given.
     """
-    for given, wanted in ((observation, Observation), (rules, Rules)):
-        if not isinstance(given, wanted):
-            raise InputError(
-                f"{kind(given)} was given to recognise_jointly; an Observation is allowed (read_observation reads one "
-                "from a file), and as rules Rules(...) of apo_bench.recognition.thresholds."
-            )
-    bare = tuple(replace(operation, contacts=()) for operation in observation.assembly.operations)
-    seen = replace(observation, assembly=replace(observation.assembly, operations=bare, gaps={}))
+    seen = without_contacts(observation, rules, "recognise_jointly")
     kept, known = [_History()], set(seen.assembly.fixed)
-    for k, operation in enumerate(bare):
+    for k, operation in enumerate(seen.assembly.operations):
         others = tuple(p for p in seen.assembly.solids if p in known - set(operation.moves))
         ended: dict[tuple[frozenset[Contact], ...], _History] = {}
         for history in kept:

@@ -12,7 +12,8 @@ from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.geometry import pose
-from tests.correction.robust.test_robust import SCENARIOS, look, shown
+from tests.correction.robust.test_robust import look, shown
+from tests.shipped import BOXES
 
 TURNS = [[135, 0, 0], [180, 0, 0], [0, 135, 0], [0, 180, 0], [180, 0, 90], [0, 180, 90]]
 
@@ -25,7 +26,7 @@ def turned(name, k, turn, seed=0):
     return replace(observation, goals=goals)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", BOXES)
 def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name):
     scenario, layout, _ = shown(name)
     assembly = scenario.assembly
@@ -43,7 +44,7 @@ def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name
             assert both[1, i] == (cosine > OPPOSING)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", BOXES)
 def test_nothing_converges_where_a_part_was_seen_turned_over(name):
     """Operations and turns in turn; what the solver turns back is right, what it leaves upside down is said."""
     scenario, layout, _ = shown(name)

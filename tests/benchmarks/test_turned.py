@@ -7,7 +7,7 @@ import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
 from apo_bench.records.short_names import CORRECTORS
-from benchmarks.turned import OURS, SCENARIOS, SEED, faces_oppose, scenario_of, turned
+from benchmarks.turned import OURS, SEED, faces_oppose, of_boxes, scenario_of, turned
 
 
 def test_every_corrector_of_the_package_is_asked():
@@ -16,7 +16,7 @@ def test_every_corrector_of_the_package_is_asked():
 
 
 def test_nothing_converges_with_faces_that_look_the_same_way():
-    names = SCENARIOS
+    names = of_boxes()
     ended = []
     for i in range(2 * len(OURS)):
         layout, seen = turned(scenario_of(names[i % len(names)]), np.random.default_rng([SEED, 10_000 + i]))

@@ -18,7 +18,8 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import chain
-from tests.correction.robust.test_robust import SCENARIOS, look, shown
+from tests.correction.robust.test_robust import look, shown
+from tests.shipped import BOXES
 
 PLAY_M = 0.25e-3
 
@@ -40,7 +41,7 @@ def test_each_fit_on_the_way_adds_its_play():
     assert pocket["cube2.py on table.A_py"] == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", BOXES)
 def test_deviations_are_those_of_the_covariance(name):
     assembly = shown(name)[0].assembly
     S, deviation = fit_covariance(assembly, PLAY_M), fit_deviation(assembly, PLAY_M)

@@ -27,8 +27,9 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.show.explain_text import sentences
 from apo_bench.trial.methods import with_simulated
-from tests.correction.robust.test_robust import SCENARIOS, shown
+from tests.correction.robust.test_robust import shown
 from tests.round_contacts import CONTACTS, IN_BORE, LYING, MM, PLATE_AT, scene, seen, tilted, touching
+from tests.shipped import BOXES
 
 KINDS = list(CONTACTS)
 BY_HAND = {
@@ -228,7 +229,7 @@ def test_far_from_the_truth_goals_are_found_and_none_longer_than_it(kind):
 
 
 def test_without_round_contacts_nothing_is_lowered_or_kept():
-    assembly = shown(SCENARIOS[0])[0].assembly
+    assembly = shown(BOXES[0])[0].assembly
     assert lowered(assembly) is assembly
     copy = replace(assembly)
     lowered(copy)

@@ -15,7 +15,8 @@ from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
-from tests.correction.robust.test_robust import SCENARIOS, fixed_error_mm, look, shown
+from tests.correction.robust.test_robust import fixed_error_mm, look, shown
+from tests.shipped import BOXES
 
 UPSIDE_DOWN = ([135, 0, 0], [180, 0, 0], [0, 135, 0], [0, 180, 0])
 
@@ -43,7 +44,7 @@ def test_a_part_seen_upside_down_is_turned_back(name, k, turn):
     assert fixed_error_mm(name, 0, found) < 3.0
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", BOXES)
 def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
     """At 40 mm and degrees half of the corrections that begin with what was seen are, or end nowhere."""
     _, layout, _ = shown(name, 3)
@@ -55,7 +56,7 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
 
 
 def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
-    for name in SCENARIOS:
+    for name in BOXES:
         seen = look(name, 1, 4.0)
         one, other = correct(seen, "contact"), correct(seen, ContactCorrector(elsewhere=False))
         assert one.goals.tolist() == other.goals.tolist()

@@ -64,18 +64,15 @@ class _Task(NamedTuple):
     target: Array
 
 
+@remembered
 def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part is believed to stay with it.
+
+    Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
 
     Args:
         searches: Whether the robot feels for a hole where a motion into it is stopped.
     """
-    return _prepared(plan, scene, searches)
-
-
-@remembered
-def _prepared(plan: Plan, scene: Scene, searches: bool) -> tuple[Move, ...]:
-    """A plan is looked at whether the arm reaches it, and then carried out."""
     believed: Poses = dict(plan.start)
     made = []
     for task in _tasks(plan, scene):
@@ -100,7 +97,7 @@ def unreachable(scene: Scene, transfer: Transfer) -> str:
 
 def in_reach(plan: Plan, scene: Scene) -> bool:
     """Whether the arm reaches both ends of every transfer of a plan."""
-    return not any(unreachable(scene, move.transfer) for move in moves(plan, scene))
+    return not any(unreachable(scene, move.transfer) for move in moves(plan, scene, False))
 
 
 def _tasks(plan: Plan, scene: Scene) -> list[_Task]:

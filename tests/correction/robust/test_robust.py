@@ -34,17 +34,7 @@ from apo_bench.observation.relations import culprit, make_relations, with_relati
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.pose_error import goal_errors
-
-SCENARIOS = (
-    "block_on_block",
-    "bridge_cycle",
-    "carried_bridge",
-    "fixture_alignment",
-    "pocket_table",
-    "stick_in_tower",
-    "stick_on_castles",
-    "vanished_fixture",
-)
+from tests.shipped import BOXES
 
 
 @cache
@@ -58,7 +48,7 @@ def shown(name, seed=0):
 
 def look(name, seed, level=1.0):
     _, _, demonstration = shown(name, seed)
-    rng = np.random.default_rng([seed, SCENARIOS.index(name)])
+    rng = np.random.default_rng([seed, BOXES.index(name)])
     return make_noise("isotropic", Level(level, level))(demonstration.assembly, demonstration, rng)
 
 
@@ -75,7 +65,7 @@ def fixed_error_mm(name, seed, correction):
     return goal_errors(scenario.assembly, layout.start, layout.goals, correction.goals)[0]
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", BOXES)
 def test_without_outliers_it_is_contact(name):
     observation = look(name, 1)
     plain, robust = correct(observation, "contact"), correct(observation, "contact-robust")
@@ -252,7 +242,7 @@ def test_sets_are_scored_as_if_each_were_looked_at_alone(name):
 
 
 def test_what_faces_cover_is_the_area_of_their_overlap():
-    for name in SCENARIOS:
+    for name in BOXES:
         observation = look(name, 1)
         at = placements(observation.assembly, observation.start, observation.goals)[-1]
         for m, e in (contact for operation in observation.assembly.operations for contact in operation.contacts):
