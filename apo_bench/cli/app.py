@@ -26,6 +26,7 @@ from apo_bench.cli import power as cli_power
 from apo_bench.cli import recognition as cli_recognition
 from apo_bench.cli import replay_command as cli_replay
 from apo_bench.cli import report as cli_report
+from apo_bench.cli import scenario as cli_scenario
 from apo_bench.cli import show as cli_show
 from apo_bench.cli import sweep_command as cli_sweep
 from apo_bench.cli.arguments import NO_RESULT, check_writable
@@ -100,21 +101,6 @@ def _options(
 
 
 @app.command()
-def scenarios(
-    scenario: Annotated[str | None, typer.Argument(help="Print the task card of this one; a name or a file.")] = None,
-) -> None:
-    """List the scenarios that come with the package, or print the task card of one."""
-    from apo_bench.cli.terminal import print_scenarios
-    from apo_bench.scenario.file import load_scenario, scenario_names
-    from apo_bench.show.card import scenario_card
-
-    if scenario is None:
-        print_scenarios([load_scenario(name) for name in scenario_names()])
-    else:
-        typer.echo(scenario_card(load_scenario(scenario)), nl=False)
-
-
-@app.command()
 def graph(
     scenario: ScenarioArgument,
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
@@ -159,6 +145,7 @@ for commands in (
         cli_plan,
         cli_power,
         cli_recognition,
+        cli_scenario,
         cli_show,
         cli_sweep,
         cli_report,

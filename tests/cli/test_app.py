@@ -33,8 +33,9 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
 
 
 def test_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(capsys, "scenarios")
+    code, out, err = run(capsys, "scenario", "list")
     assert (code, err) == (0, "")
+    assert run(capsys, "scenarios") == run(capsys, "scenario") == (0, out, "")
     assert [line.split()[0] for line in out.splitlines()[1:]] == list(scenario_names())
 
 
@@ -44,6 +45,7 @@ def test_the_card_of_a_scenario_is_printed(capsys: pytest.CaptureFixture[str], t
 
     loaded = load_scenario("vanished_fixture")
     assert run(capsys, "scenarios", "vanished_fixture") == (0, scenario_card(loaded), "")
+    assert run(capsys, "scenario", "card", "vanished_fixture") == (0, scenario_card(loaded), "")
     path = tmp_path / "mine.toml"
     path.write_text((folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8"), encoding="utf-8")
     _, out, _ = run(capsys, "scenarios", str(path))
