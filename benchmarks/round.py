@@ -1,0 +1,193 @@
+"""Keep how often round and tilted parts fit: `python benchmarks/round.py FOLDER [FOLDER ...] [--half HALF ...]`.
+
+Takes sweeps of benchmarks/round.toml, whole or not, and of the same with half the time step, and writes
+results/round.csv, one line for each cell, and docs/results/round.md: success with Wilson's 95 % intervals, contacts
+that were recognised, and how many verdicts half the step changes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+from apo_bench.records.row import Row
+from apo_bench.records.run.run_folder import read_rows
+from apo_bench.statistics.rates import wilson
+
+ROOT = Path(__file__).parents[1]
+KEPT, PAGE = ROOT / "benchmarks" / "results" / "round.csv", ROOT / "docs" / "results" / "round.md"
+METHODS = ("oracle", "none", "search", "paper", "contact")
+RECOGNISED = "recognised"
+SHOWN = "0.25"
+"""Play of the scenarios, in mm."""
+
+
+class Place(NamedTuple):
+    """One cell."""
+
+    scenario: str
+    clearance_mm: float
+    careless: float
+    level: float
+    relations: str
+    method: str
+
+
+class Cell(NamedTuple):
+    trials: int
+    successes: int
+    all_contacts_right: int | None
+    error_mm: float
+    """Median of how far corners of parts were planned wrong, along what contacts fix."""
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("folders", nargs="+", type=Path)
+    asked.add_argument("--half", nargs="*", default=[], type=Path, help="sweeps with half the time step")
+    given = asked.parse_args()
+    rows, half = judged(given.folders), judged(given.half)
+    cells = {place: cell_of(each) for place, each in grouped(rows).items()}
+    with KEPT.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*Place._fields, *Cell._fields])
+        writer.writerows([*place, *cell] for place, cell in sorted(cells.items()))
+    PAGE.write_text("\n".join(page(cells, rows, half)) + "\n", encoding="utf-8")
+    print(f"Wrote {KEPT} and {PAGE}")
+
+
+def judged(folders: Iterable[Path]) -> list[Row]:
+    return [row for folder in folders for row in read_rows(folder) if row["success"] is not None]
+
+
+def grouped(rows: Iterable[Row]) -> dict[Place, list[Row]]:
+    found: dict[Place, list[Row]] = defaultdict(list)
+    for row in rows:
+        found[place_of(row)].append(row)
+    return found
+
+
+def place_of(row: Row) -> Place:
+    numbers = (float(row[name] or 0.0) for name in ("clearance_mm", "careless", "level"))  # type: ignore[literal-required]
+    return Place(str(row["scenario"]), *numbers, str(row["relations"]), str(row["method"]))
+
+
+def cell_of(rows: list[Row]) -> Cell:
+    errors = [row["planned_error_fixed_mm"] for row in rows if row["planned_error_fixed_mm"] is not None]
+    right = None
+    if rows[0]["relations"] == RECOGNISED:
+        right = sum(row["contacts_missed"] == 0 and row["contacts_false"] == 0 for row in rows)
+    return Cell(len(rows), sum(bool(row["success"]) for row in rows), right, round(median(errors or [0.0]), 3))
+
+
+def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[str]:
+    return [
+        "# Round and tilted faces",
+        "",
+        "Written by `python benchmarks/round.py` from sweeps of `benchmarks/round.toml`; counts in "
+        "`benchmarks/results/round.csv`. Success: the finished assembly is right; Wilson's 95 % intervals; friction "
+        "grasp, the same seeds for every method. A level of L is a standard deviation of L mm and L degrees per axis. "
+        "`oracle` is told the true poses, so that neither human nor level changes what it does. Planned wrong by: how "
+        "far, in the median, `none` and `contact` planned parts from where they belong, along what contacts fix.",
+        "",
+        f"## Success at a play of {SHOWN} mm",
+        "",
+        *success_table(cells),
+        "",
+        "## Less play",
+        "",
+        *play_table(cells),
+        "",
+        "## Contacts found in the seen poses",
+        "",
+        "At level 0.5, `--relations recognised`: trials in which every contact was found and no other, and success of "
+        "`contact` with what was found.",
+        "",
+        *recognition_table(cells),
+        "",
+        "## Half the time step",
+        "",
+        "The same trials with 1 ms and with 0.5 ms, seed by seed.",
+        "",
+        *half_table(rows, half),
+    ]
+
+
+def success_table(cells: Mapping[Place, Cell]) -> list[str]:
+    plain = {p: c for p, c in cells.items() if p.clearance_mm == float(SHOWN) and p.relations == "given"}
+    lines = sorted({(p.scenario, p.careless, p.level) for p in plain if p.method != "oracle"})
+    made = [
+        "| scenario | human | level | `none` | `search` | `paper` | `contact` | planned wrong by, mm |",
+        "|---|" + "---|" * 7,
+    ]
+    for scenario in sorted({p.scenario for p in plain}):
+        told = [c for p, c in plain.items() if p.scenario == scenario and p.method == "oracle"]
+        made.append(f"| {scenario} | `oracle` | | {rate(sum_of(told))} | | | | |")
+        for _, careless, level in (line for line in lines if line[0] == scenario):
+            each = {m: plain.get(Place(scenario, float(SHOWN), careless, level, "given", m)) for m in METHODS}
+            said = " | ".join(rate(each[m]) for m in METHODS[1:])
+            wrong = ", ".join(f"{found.error_mm:.2f}" for m in ("none", "contact") if (found := each[m]))
+            made.append(f"| {scenario} | {human(careless)} | {level:g} | {said} | {wrong} |")
+    return made
+
+
+def play_table(cells: Mapping[Place, Cell]) -> list[str]:
+    made = [
+        "| scenario | play, mm | level | `oracle` | `none` | `search` | `contact` |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    less = {p: c for p, c in cells.items() if p.clearance_mm < float(SHOWN) and p.relations == "given"}
+    for scenario, play, level in sorted({(p.scenario, p.clearance_mm, p.level) for p in less}):
+        each = (Place(scenario, play, 0.0, level, "given", method) for method in METHODS if method != "paper")
+        made.append(f"| {scenario} | {play:g} | {level:g} | {' | '.join(rate(less.get(place)) for place in each)} |")
+    return made
+
+
+def recognition_table(cells: Mapping[Place, Cell]) -> list[str]:
+    made = ["| scenario | human | every contact right | success |", "|---|---|---|---|"]
+    for place, cell in sorted(cells.items()):
+        if cell.all_contacts_right is not None:
+            right = rate(Cell(cell.trials, cell.all_contacts_right, None, 0.0))
+            made.append(f"| {place.scenario} | {human(place.careless)} | {right} | {rate(cell)} |")
+    return made
+
+
+def half_table(rows: list[Row], half: list[Row]) -> list[str]:
+    ends = {(place_of(row), row["seed"]): bool(row["success"]) for row in rows}
+    pairs: dict[str, list[bool]] = defaultdict(list)
+    for row in half:
+        if (key := (place_of(row), row["seed"])) in ends:
+            pairs[key[0].scenario].append(ends[key] != bool(row["success"]))
+    pairs["all"] = [differs for each in pairs.values() for differs in each]
+    return [
+        "| scenario | trials | verdicts that differ |",
+        "|---|---|---|",
+        *(
+            f"| {name} | {len(each)} | {sum(each)} ({100 * sum(each) / max(1, len(each)):.1f} %) |"
+            for name, each in pairs.items()
+        ),
+    ]
+
+
+def sum_of(cells: list[Cell]) -> Cell | None:
+    return Cell(sum(c.trials for c in cells), sum(c.successes for c in cells), None, 0.0) if cells else None
+
+
+def rate(cell: Cell | None) -> str:
+    if cell is None:
+        return ""
+    low, high = wilson(cell.successes, cell.trials)
+    return f"{cell.successes} of {cell.trials} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def human(careless: float) -> str:
+    return "careless" if careless else "careful"
+
+
+if __name__ == "__main__":
+    main()
