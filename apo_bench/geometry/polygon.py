@@ -11,8 +11,12 @@ _STRAIGHT_M = 1e-9
 
 
 def straightened(ring: Array) -> Array:
-    """The corners of a closed ring (k, 2), each once, [m]: points in the middle of straight edges are dropped."""
+    """The corners of a closed ring (k, 2), each once, [m]: points in the middle of straight edges are dropped.
+
+    A sliver, such as a disc seen nearly edge-on, keeps its points where no three corners would be left.
+    """
     before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
     across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     chord = np.maximum(np.linalg.norm(before + after, axis=1), _STRAIGHT_M)
-    return ring[np.abs(across) > _STRAIGHT_M * chord]
+    corners = ring[np.abs(across) > _STRAIGHT_M * chord]
+    return corners if len(corners) > 2 else ring
