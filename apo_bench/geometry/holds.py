@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.solid import Piece, Solid, extent
 
@@ -25,6 +26,7 @@ _PALM_M, _OVER_M = 0.060, 0.0115
 """A part reaches at most so far up beside the tips, which are at least so high above what it stands on."""
 _RAY_M, _FLAT_M, _LINE_M = 0.003, 1e-4, 0.003
 """Rays are so far apart; surfaces so deep behind the outermost one are pressed, too; and so long at least."""
+_ROUNDING_M = 1e-6
 _LEVEL = 1e-3
 _HEIGHT = 0.65
 """Height of the tips over the part's lowest point that is best, as a part of its height."""
@@ -167,22 +169,45 @@ def _lines(low: float, high: float, also: Sequence[float]) -> Array:
 
 
 def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
-    """Send rays along a direction through all places of a grid."""
+    """Send rays along a direction through all places of a grid, each way in rising order."""
     along = np.cross(up, across)
-    T, H = (grid.ravel() for grid in np.meshgrid(t, h))
-    start = T[:, None] * along + H[:, None] * up
-    low, high = np.empty((len(T), len(pieces))), np.empty((len(T), len(pieces)))
-    for k, piece in enumerate(pieces):
-        planes = _sides(piece)
-        rate, room = planes[:, :3] @ across, planes[:, 3] - start @ planes[:, :3].T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            at = room / rate
-        flat = np.abs(rate) < 1e-12
-        low[:, k] = np.where(rate < 0.0, at, -np.inf)[:, ~flat].max(axis=1, initial=-np.inf)
-        high[:, k] = np.where(rate > 0.0, at, np.inf)[:, ~flat].min(axis=1, initial=np.inf)
-        missed = (room[:, flat] < 0.0).any(axis=1) | (low[:, k] >= high[:, k])
-        low[missed, k], high[missed, k] = np.inf, -np.inf
-    return _Rays(across, along, up, T, H, low, high)
+    corners, first = _corners(pieces)
+    (t0, t1), (h0, h1) = (_over(places, corners @ axis, first) for places, axis in ((t, along), (h, up)))
+    met = np.flatnonzero((t0 < t1) & (h0 < h1))
+    T, H = np.meshgrid(t, h)
+    start = T[..., None] * along + H[..., None] * up
+    low, high = np.full((*T.shape, len(met)), np.inf), np.full((*T.shape, len(met)), -np.inf)
+    for k, i in enumerate(met):
+        here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
+        ends = _ends(pieces[i], across, start[here].reshape(-1, 3))
+        low[(*here, k)], high[(*here, k)] = (end.reshape(T[here].shape) for end in ends)
+    return _Rays(across, along, up, T.ravel(), H.ravel(), *(end.reshape(T.size, len(met)) for end in (low, high)))
+
+
+@lru_cache(maxsize=64)
+def _corners(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
+    """The corners of all pieces, (k, 3), and where those of each begin."""
+    corners = [piece_corners(piece) for piece in pieces]
+    return np.concatenate(corners), np.cumsum([0, *map(len, corners[:-1])])
+
+
+def _over(places: Array, at: Array, first: Array) -> tuple[Array, Array]:
+    """Of rising places, the first in the shadow of each piece and the one behind its last."""
+    low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
+    return np.searchsorted(places, low - _ROUNDING_M), np.searchsorted(places, high + _ROUNDING_M)
+
+
+def _ends(piece: Piece, across: Array, start: Array) -> tuple[Array, Array]:
+    """Where rays from (r, 3) enter and leave a piece, (r,) each; infinite where they miss it."""
+    planes = _sides(piece)
+    rate, room = planes[:, :3] @ across, planes[:, 3] - start @ planes[:, :3].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = room / rate
+    flat = np.abs(rate) < 1e-12
+    low = np.where(rate < 0.0, at, -np.inf)[:, ~flat].max(axis=1, initial=-np.inf)
+    high = np.where(rate > 0.0, at, np.inf)[:, ~flat].min(axis=1, initial=np.inf)
+    missed = (room[:, flat] < 0.0).any(axis=1) | (low >= high)
+    return np.where(missed, np.inf, low), np.where(missed, -np.inf, high)
 
 
 def _sides(piece: Piece) -> Array:
@@ -196,14 +221,14 @@ def _sides(piece: Piece) -> Array:
 def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """From where to where there is something, [m], one after the other; gaps that no finger fits into do not count."""
     low, high = rays.low[within], rays.high[within]
-    order = np.argsort(low[np.isfinite(low)])
-    spans: list[tuple[float, float]] = []
-    for a, b in zip(low[np.isfinite(low)][order], high[np.isfinite(low)][order], strict=True):
-        if spans and a < spans[-1][1] + _FINGER_M + _ROOM_M:
-            spans[-1] = spans[-1][0], max(spans[-1][1], float(b))
-        else:
-            spans.append((float(a), float(b)))
-    return spans
+    there = np.isfinite(low)
+    if not there.any():
+        return []
+    order = np.argsort(low[there])
+    low, reached = low[there][order], np.maximum.accumulate(high[there][order])
+    apart = low[1:] >= reached[:-1] + _FINGER_M + _ROOM_M
+    begins, ends = np.append(low[0], low[1:][apart]), np.append(reached[:-1][apart], reached[-1])
+    return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
 def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple[float, float, bool]]:

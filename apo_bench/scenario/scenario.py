@@ -28,6 +28,8 @@ class Grasp:
     """Centre between the fingertips, (3,), part frame, [m]."""
     across: Array
     """Unit vector along which the fingers close, (3,), part frame, horizontal when the part stands at its start."""
+    half_width: float | None = None
+    """Of what is held there, [m], where that is known."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", frozen(self.point, 3))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import NamedTuple
 
@@ -124,6 +124,11 @@ def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     return own
 
 
+def _known_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
+    """As found with the grasp; those of a hundred candidates would take seconds."""
+    return half_width(pieces, grasp, T) if grasp.half_width is None else grasp.half_width
+
+
 def _upwards(T: Array) -> Array:
     """The vertical in the frame of a part at T; one of its axes where it is near to it."""
     up = T[2, :3]
@@ -153,7 +158,7 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
         if all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
     found = holds(solid, up, scene.arm.opening_m)
-    return [Grasp(hold.point, hold.across) for hold in found]
+    return [Grasp(*hold) for hold in found]
 
 
 def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
@@ -175,25 +180,29 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
 
 def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart]) -> Grasp | None:
     """The first of those around which there is most room at every place, or None."""
-    for margin in _MARGINS_M:
-        clear = _clear(scene, part, grasps, places, margin)
-        if clear:
-            return clear[0]
-    return None
+    found = (_clear_ones(scene, part, grasps, places, margin) for margin in _MARGINS_M)
+    return next((grasp for clear in found for grasp in clear), None)
 
 
 def _clear(
     scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
 ) -> list[Grasp]:
     """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place."""
-    kept, pieces, T = [], scene.scenario.assembly.solids[part].pieces, places[0].T
+    return list(_clear_ones(scene, part, grasps, places, margin))
+
+
+def _clear_ones(
+    scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
+) -> Iterator[Grasp]:
+    """Those grasps one after the other, worked out as they are asked for."""
+    pieces, T = scene.scenario.assembly.solids[part].pieces, places[0].T
 
     def kind(grasp: Grasp) -> tuple[float, ...]:
-        return (*map(float, grasp.across), round(half_width(pieces, grasp, T), 6))
+        return (*map(float, grasp.across), round(_known_width(pieces, grasp, T), 6))
 
     for (*across, _), those in groupby(grasps, key=kind):
         same = list(those)
-        width = half_width(pieces, same[0], T)
+        width = _known_width(pieces, same[0], T)
         opening = min(width + _STAND_OFF_M, scene.arm.opening_m)
         points = np.array([grasp.point for grasp in same])
         struck = np.zeros(len(same), dtype=np.bool_)
@@ -201,13 +210,12 @@ def _clear(
             R = (place.T @ tip_frame(Grasp(np.zeros(3), np.array(across)), place.T))[:3, :3]
             at = points @ place.T[:3, :3].T + place.T[:3, 3]
             struck |= _depth(scene, opening, R, at, place.around, margin) > 0.0
-        kept += [grasp for grasp, hit in zip(same, struck, strict=True) if not hit]
-    return kept
+        yield from (grasp for grasp, hit in zip(same, struck, strict=True) if not hit)
 
 
 def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
-    width = half_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
+    width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
     lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way
