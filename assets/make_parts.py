@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.parts.making import Body, bore, extrude, join, polygon, rectangle, shaft, write_part
+from apo_bench.parts.making import Body, Bore, Step, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
 
 SOURCE, LICENCE, DENSITY = "assets/make_parts.py of apo_bench", "Apache-2.0", 700.0
 SIDES = ("ny", "px", "py", "nx")
@@ -50,6 +50,24 @@ def rod() -> Body:
     length = shaft(8, 0, 130, "side", chamfer_high=1, top="tip")
     head = extrude(rectangle(16, 16), -24, 0, bottom="end")
     return join(head, length).moved(turn_deg=(0, 90, 0))
+
+
+def housing() -> Body:
+    """60 x 60 x 45 mm with a blind bore of 32 mm, 35 mm deep."""
+    hole = Bore((0, 0), (Step(10, 45, 16, name="bore", fit=True),), {10: "floor"})
+    return extrude(rectangle(60, 60, names=SIDES), 0, 45, bores=[hole], bottom="bottom", top="top")
+
+
+def bush() -> Body:
+    """32 mm thick, 60 mm long, with a bore of 16 mm."""
+    return turned(
+        [Step(0, 60, 16, name="outer")], [Step(0, 60, 8, name="bore", fit=True)], flats={0: "low", 60: "high"}
+    )
+
+
+def spindle() -> Body:
+    """16 mm thick, 80 mm long."""
+    return shaft(8, 0, 80, "side", bottom="tip", top="head")
 
 
 def dovetail_base() -> Body:
@@ -97,6 +115,9 @@ PARTS: Mapping[str, Body] = {
     "peg": peg(),
     "bracket": bracket(),
     "rod": rod(),
+    "housing": housing(),
+    "bush": bush(),
+    "spindle": spindle(),
     "dovetail_base": dovetail_base(),
     "dovetail_slide": dovetail_slide(),
     "pin_plate": pin_plate(),

@@ -12,4 +12,4 @@ BOXES = (
 )
 """The figures and examples of the paper."""
 TILTED = ("dovetail",)
-ROUND = ("l_bracket_on_plate", "peg_in_hole", "shaft_through_brackets")
+ROUND = ("l_bracket_on_plate", "nested_bushings", "peg_in_hole", "shaft_through_brackets")

@@ -64,6 +64,7 @@ TABLE = {
     ],
     "dovetail": [("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
     "l_bracket_on_plate": [("S -> A", [DOWN]), ("S -> H", INTO)],
+    "nested_bushings": [("S -> A", [DOWN]), ("S -> H", INTO), ("S -> H", INTO)],
     "peg_in_hole": [("S -> A", [DOWN]), ("S -> H", INTO)],
     "shaft_through_brackets": [("S -> A", [DOWN]), ("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
 }
@@ -78,10 +79,13 @@ LENGTHS_MM = {
     ("vanished_fixture", 5): 10.0,
     ("dovetail", 2): 75.0,
     ("l_bracket_on_plate", 2): 18.516,
+    ("nested_bushings", 2): 35.0,
+    ("nested_bushings", 3): 60.0,
     ("peg_in_hole", 2): 20.0,
     ("shaft_through_brackets", 3): 123.016,
 }
 TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 3): (2, 0, 4)}
+TURNING |= {("nested_bushings", 2): (1, 1, 4), ("nested_bushings", 3): (1, 1, 4)}
 """Of shafts, which turn in their bores, where the faces of the letter alone leave no turn."""
 SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "H": (0, 1, 5)}
 
