@@ -185,13 +185,13 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
 
 
 @lru_cache(maxsize=64)
-def _corners(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
+def _corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
     """The corners of all pieces, (k, 3), and where those of each begin."""
     corners = [piece_corners(piece) for piece in pieces]
     return np.concatenate(corners), np.cumsum([0, *map(len, corners[:-1])])
 
 
-def _over(places: Array, at: Array, first: Array) -> tuple[Array, Array]:
+def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Of rising places, the first in the shadow of each piece and the one behind its last."""
     low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
     return np.searchsorted(places, low - _ROUNDING_M), np.searchsorted(places, high + _ROUNDING_M)
