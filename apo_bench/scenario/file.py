@@ -5,7 +5,9 @@ Lengths in mm, angles in degrees, operations numbered from 1; `scenarios/stick_i
 
 from __future__ import annotations
 
+import os
 from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +38,8 @@ def scenario_names() -> tuple[str, ...]:
 def load_scenario(given: str | Path | Scenario) -> Scenario:
     """The scenario of a short name, of a TOML file anywhere, or the object itself.
 
-    Part files in it are short names, or paths relative to the scenario file.
+    Part files in it are short names, or paths relative to the scenario file. Of a short name it is one object for as
+    long as the files of the package stay as they are.
 
     Raises:
         InputError: No such scenario, or the file breaks a rule; one sentence with file, key, what was given, what is
@@ -45,6 +48,22 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     if isinstance(given, Scenario):
         return given
     path = _path(given)
+    return _kept(path, _stamps()) if path.stem == given else _read(path)
+
+
+def _stamps() -> tuple[tuple[str, int, int], ...]:
+    """Name, time and size of every file that scenarios of the package are made of."""
+    folders = (folder("scenarios"), folder("assets") / "parts")
+    found = [(each.path, each.stat(follow_symlinks=False)) for place in folders for each in os.scandir(place)]
+    return tuple(sorted((path, stat.st_mtime_ns, stat.st_size) for path, stat in found))
+
+
+@lru_cache(maxsize=64)
+def _kept(path: Path, stamps: tuple[tuple[str, int, int], ...]) -> Scenario:
+    return _read(path)
+
+
+def _read(path: Path) -> Scenario:
     document = read_toml(path, "scenario file")
     if UNSHOWN.search(path.stem):
         raise InputError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from dataclasses import fields
 from pathlib import Path
 
@@ -248,6 +249,18 @@ def test_the_names_of_the_package():
     assert {"stick_in_tower", "stick_on_castles"} <= set(scenario_names())
     for name in scenario_names():
         assert load_scenario(name).name == name
+
+
+def test_a_short_name_is_one_object_until_a_file_of_the_package_changes(tmp_path: Path, monkeypatch):
+    for name in ("scenarios", "assets/parts"):
+        shutil.copytree(folder("scenarios").parent / name, tmp_path / name)
+    monkeypatch.setattr("apo_bench.scenario.file.folder", lambda name: tmp_path / name)
+    path = tmp_path / "scenarios" / "stick_in_tower.toml"
+    first = load_scenario("stick_in_tower")
+    assert load_scenario("stick_in_tower") is first
+    assert load_scenario(path) is not first
+    path.write_text(TOWER.replace('title = "A', 'title = "Some'))
+    assert load_scenario("stick_in_tower").title.startswith("Some stick")
 
 
 def test_what_the_tower_says():
