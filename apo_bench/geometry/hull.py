@@ -65,12 +65,12 @@ class Hull:
         from scipy.spatial import ConvexHull
 
         found = ConvexHull(self.corners).equations * [1.0, 1.0, 1.0, -1.0]
-        return frozen(found[_first_of_each(found[:, :3], signed=True)], None, 4)
+        return frozen(found[first_of_each(found[:, :3], signed=True)], None, 4)
 
     @cached_property
     def normals(self) -> Array:
         """Directions across its sides, (s, 3), each once up to its sign."""
-        return frozen(self.planes[_first_of_each(self.planes[:, :3]), :3], None, 3)
+        return frozen(self.planes[first_of_each(self.planes[:, :3]), :3], None, 3)
 
     @cached_property
     def edges(self) -> Array:
@@ -81,7 +81,7 @@ class Hull:
         pairs = np.argwhere(np.triu(both >= 2, k=1))
         along = np.cross(n[pairs[:, 0]], n[pairs[:, 1]])
         along /= np.linalg.norm(along, axis=1)[:, None]
-        return frozen(along[_first_of_each(along)], None, 3)
+        return frozen(along[first_of_each(along)], None, 3)
 
 
 def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
@@ -97,11 +97,14 @@ def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
     return Hull(name, np.concatenate(ends), cylinder)
 
 
-def _first_of_each(directions: Array, signed: bool = False) -> Array:
+def first_of_each(directions: Array, signed: bool = False) -> Array:
     """Row numbers of unit vectors, (k, 3), none of which is another one of them, or its opposite."""
+    cosine = directions @ directions.T
+    alike = (cosine if signed else np.abs(cosine)) > 1.0 - _FLAT
     kept: list[int] = []
-    for i, n in enumerate(directions):
-        cosine = directions[kept] @ n if kept else np.zeros(0)
-        if not ((cosine if signed else np.abs(cosine)) > 1.0 - _FLAT).any():
+    known = np.zeros(len(directions), dtype=np.bool_)
+    for i, like in enumerate(alike):
+        if not known[i]:
             kept.append(i)
+            known |= like
     return np.array(kept, dtype=np.intp)

@@ -33,9 +33,11 @@ def receded_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
         return hull
     planes = np.array(hull.planes)
     planes[on, 3] -= clearance_m
-    inside, radius = _middle(planes)
-    if radius < _THINNEST_M:
-        raise _swallowed(solid, hull, clearance_m)
+    inside = hull.corners.mean(axis=0)
+    if (planes[:, 3] - planes[:, :3] @ inside).min() < _THINNEST_M:
+        inside, radius = _middle(planes)
+        if radius < _THINNEST_M:
+            raise _swallowed(solid, hull, clearance_m)
     from scipy.spatial import HalfspaceIntersection
 
     corners = HalfspaceIntersection(planes * [1.0, 1.0, 1.0, -1.0], inside).intersections

@@ -1,6 +1,6 @@
 """Part files become solids with named faces; needs no simulator."""
 
 from apo_bench.parts.load import load_part, part_names, part_path
-from apo_bench.parts.mjcf import read_part
+from apo_bench.parts.mjcf import PartFile, read_part
 
-__all__ = ["load_part", "part_names", "part_path", "read_part"]
+__all__ = ["PartFile", "load_part", "part_names", "part_path", "read_part"]

@@ -41,7 +41,7 @@ def corners_in(world: World, data: mujoco.MjData, geom: str) -> np.ndarray:
 def made_of(scene: Scene, part: str) -> list[Piece]:
     c = 1e-3 * scene.clearance_mm
     solid = scene.scenario.assembly.solids[part]
-    return [p for several in simulated_pieces(solid, physical_pieces(solid, c), c).values() for p in several]
+    return [p for several in simulated_pieces(solid, c).values() for p in several]
 
 
 def test_meshes_collide_where_the_part_has_its_corners(scene: Scene):
@@ -94,7 +94,7 @@ def test_parts_of_boxes_are_simulated_as_their_file_says_them():
 def test_walls_and_what_is_behind_them_are_the_same_part(clearance_m: float):
     solid = solid_of("plate", PLATE)
     whole = physical_pieces(solid, clearance_m)
-    cut = [p for several in simulated_pieces(solid, whole, clearance_m).values() for p in several]
+    cut = [p for several in simulated_pieces(solid, clearance_m).values() for p in several]
     corners = [
         p.corners if isinstance(p, Hull) else p.center + p.half * np.array([[1, 1, 1], [-1, -1, -1]]) for p in cut
     ]

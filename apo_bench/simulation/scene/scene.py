@@ -14,7 +14,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.solid import Piece
-from apo_bench.parts import read_part
+from apo_bench.parts import PartFile, read_part
 from apo_bench.records.settings import check
 from apo_bench.records.thresholds import Criteria
 from apo_bench.resources import folder
@@ -93,9 +93,8 @@ def build_scene(
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     check_clearance(scenario, clearance)
     found, settings = find_arm(arm), physics(timestep_s)
-    shown = _compiled(scenario, _compose(scenario, clearance, settings, None, grasp))
+    shown, work = (_compiled(scenario, xml) for xml in _compose(scenario, clearance, settings, found, grasp))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
-    work = _compiled(scenario, _compose(scenario, clearance, settings, found, grasp))
     if grasp == "friction":
         check_holdable(scenario, work, found)
     return Scene(
@@ -137,7 +136,8 @@ def _fixed(scenario: Scenario) -> tuple[str, ...]:
     return tuple(part for part in scenario.assembly.solids if part in scenario.assembly.fixed)
 
 
-def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm | None, grasp: str) -> str:
+def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm, grasp: str) -> tuple[str, str]:
+    """Parts and hands, then parts and arm; the parts are put together once for both."""
     mjcf = import_mjcf()
     room = mjcf.from_path(str(folder("assets") / "room.xml"))
     room.model = scenario.name
@@ -145,16 +145,20 @@ def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Ar
         room.size.memory = _MEMORY
     _set_physics(room, settings)
     start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
+    files = {path: read_part(path) for path in dict.fromkeys(scenario.part_files.values())}
     bodies = {
-        part: _add_part(mjcf, room, scenario, part, start[part], clearance_mm, settings)
+        part: _add_part(
+            mjcf, room, scenario, part, files[scenario.part_files[part]], start[part], clearance_mm, settings
+        )
         for part in scenario.assembly.solids
     }
     movable = {part: body for part, body in bodies.items() if part not in scenario.assembly.fixed}
-    if arm is None:
-        _add_hands(room, movable)
-    else:
-        _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
-    return _with_force_sensors(room.to_xml_string(), scenario, arm)
+    hands = _add_hands(room, movable)
+    shown = room.to_xml_string()
+    for element in reversed(hands):
+        element.remove()
+    _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
+    return shown, _with_force_sensors(room.to_xml_string(), scenario)
 
 
 def _set_physics(room: Any, s: Physics) -> None:
@@ -175,17 +179,23 @@ def _set_contact(model: Any, s: Physics) -> None:
 
 
 def _add_part(
-    mjcf: Any, room: Any, scenario: Scenario, part: str, T: Array, clearance_mm: float, settings: Physics
+    mjcf: Any,
+    room: Any,
+    scenario: Scenario,
+    part: str,
+    file: PartFile,
+    T: Array,
+    clearance_mm: float,
+    settings: Physics,
 ) -> Any:
     """Attach a part's file at T, its fit faces receded; returns the body that has the mass (its frame has none)."""
-    file, solid = read_part(scenario.part_files[part]), scenario.assembly.solids[part]
+    solid = scenario.assembly.solids[part]
     if [piece.name for piece in file.pieces] != [piece.name for piece in solid.pieces]:
         raise InputError(f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.")
     model = mjcf.from_xml_string(file.xml)
     model.model = part
     _set_contact(model, settings)
-    made = simulated_pieces(solid, physical_pieces(solid, clearance_mm * 1e-3), clearance_mm * 1e-3)
-    dress(model, solid, made, file.density)
+    dress(model, solid, simulated_pieces(solid, clearance_mm * 1e-3), file.density)
     if part in scenario.colors:
         for geom in model.find_all("geom"):
             geom.rgba = (*scenario.colors[part], 1.0)
@@ -197,12 +207,17 @@ def _add_part(
     return model.worldbody.body[0]
 
 
-def _add_hands(room: Any, movable: Mapping[str, Any]) -> None:
+def _add_hands(room: Any, movable: Mapping[str, Any]) -> list[Any]:
+    """Returns what was added, in its order."""
+    added = []
     for i, hand in enumerate(HANDS):
         mocap = room.worldbody.add("body", name=hand, mocap=True, pos=(0.0, 0.5 + 0.1 * i, 0.3))
         mocap.add("geom", type="sphere", size=(0.012,), contype=0, conaffinity=0, rgba=(0.90, 0.70, 0.60, 0.7))
+        added.append(mocap)
         for part, body in movable.items():
-            room.equality.add("weld", name=f"{hand}_{part}", body1=mocap, body2=body, active=False, **_HAND_WELD)
+            name = f"{hand}_{part}"
+            added.append(room.equality.add("weld", name=name, body1=mocap, body2=body, active=False, **_HAND_WELD))
+    return added
 
 
 def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings: Physics) -> None:
@@ -215,13 +230,11 @@ def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings
         room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **_ARM_WELD)
 
 
-def _with_force_sensors(xml: str, scenario: Scenario, arm: Arm | None) -> str:
+def _with_force_sensors(xml: str, scenario: Scenario) -> str:
     """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
 
     PyMJCF's schema does not know contact sensors, so they are written into the finished text.
     """
-    if arm is None:
-        return xml
     root = ElementTree.fromstring(xml)
     sensors = ElementTree.SubElement(root, "sensor")
     net = {"num": "1", "data": "force", "reduce": "netforce"}

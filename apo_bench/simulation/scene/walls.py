@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import SAGITTA_M, Hull
+from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.hull import SAGITTA_M, Hull, first_of_each
+from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Piece, Solid
 
@@ -34,12 +36,13 @@ class _Wall(NamedTuple):
     """The plane (n, d) that ends the wall: n . x <= d is the wall."""
 
 
-def simulated_pieces(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
+@remembered
+def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
     """The pieces of a part as they are simulated, by the name of the piece that they are cut from.
 
-    Args:
-        pieces: As the part is made, with this clearance.
+    Remembered, since copies of a part, and the worlds of hands and of the arm, have the same.
     """
+    pieces = physical_pieces(solid, clearance_m)
     if not any(face.hole and face.kind != "rim" for face in solid.rounds.values()):
         return {piece.name: (piece,) for piece in pieces}
     return _cut(solid, pieces, clearance_m)
@@ -129,22 +132,26 @@ def _hull_of(name: str, points: Array) -> Hull:
     from scipy.spatial import ConvexHull
 
     around = ConvexHull(points)
-    planes = Hull(name, points[around.vertices]).planes
+    sides = around.equations[first_of_each(around.equations[:, :3], signed=True)]
     corners = points[around.vertices]
-    on = np.abs(corners @ planes[:, :3].T - planes[:, 3]) < 1e-9
+    on = np.abs(corners @ sides[:, :3].T + sides[:, 3]) < 1e-9
     return Hull(name, corners[on.sum(axis=1) >= 3])
 
 
 def _joined(pieces: list[Hull]) -> list[Hull]:
     """Neighbours as one piece where they make a convex one."""
     joined: list[Hull] = []
+    filled = 0.0
     for piece in pieces:
+        volume = _volume(piece)
         if joined:
             both = _hull_of(joined[-1].name, np.concatenate([joined[-1].corners, piece.corners]))
-            if abs(_volume(both) - _volume(joined[-1]) - _volume(piece)) < _SAME_VOLUME * _volume(both):
-                joined[-1] = both
+            whole = _volume(both)
+            if abs(whole - filled - volume) < _SAME_VOLUME * whole:
+                joined[-1], filled = both, whole
                 continue
         joined.append(piece)
+        filled = volume
     return joined
 
 
