@@ -23,6 +23,7 @@ sys.meta_path.append(MovedModules())
 
 _EXPORTS = MappingProxyType(
     {
+        "Arm": "apo_bench.simulation.scene.arm",
         "Assembly": "apo_bench.assembly.topology",
         "ContactCorrector": "apo_bench.correction.contact",
         "Corrected": "apo_bench.envs.corrected",
@@ -52,6 +53,7 @@ _EXPORTS = MappingProxyType(
         "load_scenario": "apo_bench.scenario.file",
         "observe": "apo_bench.observation.observing",
         "picture": "apo_bench.simulation.scene.render",
+        "read_arm": "apo_bench.simulation.arms.building",
         "read_observation": "apo_bench.files.observation",
         "recognise": "apo_bench.recognition.contacts",
         "replay": "apo_bench.simulation.execution.controller",

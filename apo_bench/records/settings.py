@@ -140,9 +140,10 @@ class TrialSettings:
     )
     """`friction`, or `weld` for an ideal gripper."""
     arm: Name = field(
-        default="six_axis", metadata=about("Name of the arm, or package.module:name", shared=True, scene=True)
+        default="six_axis",
+        metadata=about("Name of the arm, FILE.toml, or package.module:name", shared=True, scene=True),
     )
-    """The robot, by name, or `module:name`."""
+    """The robot, by name, as a file, or `module:name`."""
     relations: Name = field(
         default="given",
         metadata=about(

@@ -88,7 +88,7 @@ def _made(
         scenes[key] = scene_of(spec)
     scene = scenes[key]
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
-    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
     if spec_hash(spec, content) == row.get("spec_hash"):
         image = _again(row, spec, scene, content)
         if image is not None:

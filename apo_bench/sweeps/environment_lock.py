@@ -100,7 +100,7 @@ class EnvironmentLock:
                 raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
         arm = find_arm(self.names.arm)
         for given in self.names.scenarios:
-            self.check_content(given, content_hash(load_scenario(given), given, arm.mjcf))
+            self.check_content(given, content_hash(load_scenario(given), given, arm.files))
 
     def check_content(self, given: str, found: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""
@@ -137,14 +137,17 @@ def names_of(grids: Sequence[SweepSettings]) -> Names:
 
 
 def environment_lock(
-    names: Names, loaded: Mapping[str, Scenario], arm_file: Path, corrector_limit_s: float = CORRECTOR_LIMIT_S
+    names: Names,
+    loaded: Mapping[str, Scenario],
+    arm_files: Path | tuple[Path, ...],
+    corrector_limit_s: float = CORRECTOR_LIMIT_S,
 ) -> EnvironmentLock:
     """The lock of a sweep that is started here.
 
     Args:
         loaded: Every scenario by what was given for it.
     """
-    content = {given: content_hash(scenario, given, arm_file) for given, scenario in loaded.items()}
+    content = {given: content_hash(scenario, given, arm_files) for given, scenario in loaded.items()}
     return EnvironmentLock(content, versions(), corrector_limit_s, names, names.hashes())
 
 

@@ -98,7 +98,7 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say) -> Non
 
 def _lost(request: Request, spec: TrialSettings, scenario: Scenario, code: str) -> Row:
     """The row of a trial whose process died or took too long."""
-    content = content_hash(scenario, spec.scenario, find_arm(spec.arm).mjcf)
+    content = content_hash(scenario, spec.scenario, find_arm(spec.arm).files)
     row = lost(spec, content, code)
     if request.observation is None:
         return row
@@ -169,7 +169,7 @@ def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, fil
 
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
-    content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
     return trial_row(spec, scene, recording, content, method=method, watch=film)
 
 

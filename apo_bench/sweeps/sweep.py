@@ -81,7 +81,7 @@ def run_sweep(
     check_grids(grids)
     names = names_of(grids)
     loaded, arm = _checked(names, grids, corrector_limit_s)
-    lock = replace(environment_lock(names, loaded, arm.mjcf, corrector_limit_s), cache=_kept_in(cache))
+    lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=_kept_in(cache))
     files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
@@ -168,6 +168,6 @@ def _content(lock: EnvironmentLock, loaded: Mapping[str, Scenario], arm: Arm) ->
     """What the trials are made of besides the package, piece by piece, so that a change can be named."""
     pieces: dict[str, str] = {}
     for given, scenario in loaded.items():
-        made_of = content_pieces(scenario, given, arm.mjcf)
+        made_of = content_pieces(scenario, given, arm.files)
         pieces |= {f"{scenario.name}, {piece}": hashed for piece, hashed in made_of.items()}
     return {**pieces, **lock.hashes}

@@ -111,7 +111,7 @@ class Worker:
         key = scene_key(spec)
         if key not in self._scenes:
             scene = scene_of(spec)
-            content = content_hash(scene.scenario, spec.scenario, scene.arm.mjcf)
+            content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
             self._lock.check_content(spec.scenario, content)
             self._scenes[key] = (scene, content)
         return self._scenes[key]

@@ -28,7 +28,7 @@ from apo_bench.trial.code_version import code_files
 _SCHEMAS = (ROW, files.DEMONSTRATION, files.OBSERVATION, files.PLAN)
 
 
-def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> str:
+def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:
     """16 hexadecimal digits over all that shapes a trial besides its specification.
 
     The pieces of `content_pieces`, the code of the package, its version and that of every schema.
@@ -36,21 +36,24 @@ def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_file: Pat
     Args:
         given: What `load_scenario` was given.
     """
-    said = [content_pieces(scenario, given, arm_file), dict(code_files()), __version__, _SCHEMAS]
+    said = [content_pieces(scenario, given, arm_files), dict(code_files()), __version__, _SCHEMAS]
     return _hash(json.dumps(said, sort_keys=True).encode())
 
 
-def content_pieces(scenario: Scenario, given: str | Path | Scenario, arm_file: Path) -> dict[str, str]:
+def content_pieces(
+    scenario: Scenario, given: str | Path | Scenario, arm_files: Path | tuple[Path, ...]
+) -> dict[str, str]:
     """What a trial of a scenario is made of -> 16 hexadecimal digits.
 
-    The scenario (its file's bytes, or its numbers if it never was a file), the files of its parts, the arm and the
-    room, the judge's thresholds.
+    The scenario (its file's bytes, or its numbers if it never was a file), the files of its parts, the arm with all
+    that it was made of, the room, the judge's thresholds.
     """
+    arm = arm_files if isinstance(arm_files, tuple) else (arm_files,)
     pieces = {
         "scenario": _scenario_bytes(scenario, given),
         **{f"part {part}": read_bytes(path, "part file") for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml").read_bytes(),
-        "arm": Path(arm_file).read_bytes(),
+        "arm": b"".join(Path(each).read_bytes() for each in arm),
         "thresholds": json.dumps(asdict(scenario.thresholds), sort_keys=True).encode(),
     }
     return {name: _hash(piece) for name, piece in pieces.items()}

@@ -92,7 +92,7 @@ class KeptDemonstrations:
 
 def demonstration_key(settings: TrialSettings, scene: Scene) -> str:
     """64 hexadecimal digits over all that decides a demonstration: code, packages, processor, scenario, settings."""
-    pieces = content_pieces(scene.scenario, settings.scenario, scene.arm.mjcf)
+    pieces = content_pieces(scene.scenario, settings.scenario, scene.arm.files)
     salt = None if settings.salt is None else settings.salt.hash
     chosen = [scene.clearance_mm, scene.physics.timestep_s, settings.careless, settings.seed, salt]
     del pieces["arm"]

@@ -73,7 +73,7 @@ def run_trial(
     """
     scene = scene or scene_of(settings)
     recording = recording or record_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
-    content = content or content_hash(scene.scenario, settings.scenario, scene.arm.mjcf)
+    content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
     asked = head(settings, scene.scenario, spec_hash(settings, content))
     asked |= {"demonstration": recording.demonstration.code}
     if recording.demonstration.code != "ok":
@@ -119,7 +119,7 @@ def run_measured(
             f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use none "
             "or paper."
         )
-    content = content_hash(scene.scenario, settings.scenario, scene.arm.mjcf)
+    content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
     asked = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)
     given = _corrector_input(settings, observation, None)

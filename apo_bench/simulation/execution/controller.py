@@ -102,7 +102,10 @@ def _carry_out(
 ) -> Outcome:
     done, kept = cache.resume(way, robot)
     if kept is None:
-        robot.wait(0.05)
+        try:
+            robot.wait(0.05)
+        except Halt as halt:
+            return _outcome(plan, "pick", halt.code, plan.schedule[0].operation, halt.part)
     else:
         after[:], timeline[:] = kept.after, kept.timeline
     for i, (step, t) in list(enumerate(todo))[done // 2 :]:

@@ -38,8 +38,8 @@ def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: floa
 
 def _opened(model: Any, arm: Arm, opening: float) -> Any:
     data = mujoco.MjData(model)
-    for finger in arm.fingers:
-        data.qpos[model.jnt_qposadr[model.joint(finger).id]] = opening
+    for finger, at in zip(arm.fingers, arm.finger_joints(opening), strict=True):
+        data.qpos[model.jnt_qposadr[model.joint(finger).id]] = at
     mujoco.mj_kinematics(model, data)
     return data
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -13,6 +15,8 @@ _KNOT_M, _KNOT_RAD = 0.03, 0.15
 """Inverse kinematics is solved at least this densely along a line."""
 _SHORT_M, _SHORT_RAD = 0.01, 0.05
 """So short a line has one knot in its middle; any other has two at least."""
+_SPEED_LOOKS = 101
+"""Times at which the speed of joints is looked at."""
 _FAR_M, _FAR_RAD = 0.3, 1.0
 """The spacing of knots where only the joint angles at the end are asked for."""
 
@@ -39,6 +43,27 @@ def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q
     count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, _FAR_M, _FAR_RAD))))
     found = _angles(kinematics, line, np.linspace(begin, end, count), q)
     return None if found is None else np.asarray(found[-1])
+
+
+def within_speed(kinematics: Kinematics, line: Trajectory, q: Array, most: Array | None) -> Trajectory:
+    """The same line, slower where a joint would turn faster than it can.
+
+    Args:
+        q: (joints,), where the line begins, [rad].
+        most: (joints,), the speed limits, [rad/s]; None: there are none.
+    """
+    if most is None:
+        return line
+    count = 1 + max(4, int(np.ceil(_steps(line, _KNOT_M, _KNOT_RAD))))
+    at = np.linspace(0.0, 1.0, count)
+    path = _angles(kinematics, line, at, q)
+    if path is None:
+        return line
+    t = np.linspace(0.0, 1.0, _SPEED_LOOKS)
+    s = line.progress(t)
+    speed = np.abs(np.gradient(CubicSpline(at, path)(s), t, axis=0)) / line.seconds
+    ratio = float((speed / most).max())
+    return line if ratio <= 1.0 else replace(line, seconds=line.seconds * ratio)
 
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:

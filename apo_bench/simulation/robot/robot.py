@@ -19,8 +19,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.robot.fast_forward import fast_forward
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import Moving, clear, near_spans
+from apo_bench.simulation.robot.opening import fingers_of
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
-from apo_bench.simulation.robot.reach import along, at_end
+from apo_bench.simulation.robot.reach import along, at_end, within_speed
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, place, timestep, unfelt
 
@@ -28,8 +29,8 @@ TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
-_FINGERS_M_S, _LONGEST_GRIP_S = 0.28, 0.2
-"""How fast the command of the fingers moves, and how long they may take to rest behind it."""
+_FINGERS_M_S = 0.28
+"""How fast the command of the fingers moves."""
 _REST_RAD_S, _REST_M_S = 2e-3, 3e-3
 """Joints and fingers that move slower than this rest."""
 _CREEP_M = 5e-5
@@ -74,13 +75,14 @@ class Robot:
         self._net, self._felt = np.zeros((3, self.model.nsensordata)), np.zeros(3)
         self.data: Any = initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self.arm.home
-        self.data.qpos[self._fingers] = self.arm.opening_m
+        self._fingers.put(self.data, self.arm.opening_m)
+        self.data.ctrl[:] = 0.0
         mujoco.mj_forward(self.model, self.data)
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
         self._rest = self.T
         self.data.ctrl[self._drives] = self.q
-        self.data.ctrl[self._grip] = self.arm.opening_m
+        self._fingers.command(self.data, self.arm.opening_m)
         self._names = (*scene.work.free, *scene.work.fixed)
         self._forces = self.data.sensordata
         self._on_arm = self._forces.reshape(-1, 3)[len(scene.work.free) :]
@@ -94,6 +96,7 @@ class Robot:
         """
         if np.abs(line.start - line.end).max() < 1e-7:
             return 0.0
+        line = within_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(1, round(line.seconds / self.step_s))
         s, done = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)]), 0
         for begin, end in self._spans(line, s):
@@ -169,32 +172,32 @@ class Robot:
         start = self._nearest_command(to)
         ticks = max(1, round(abs(to - start) / _FINGERS_M_S / TICK_S))
         if self.fidelity == "contact" and not self._held and self._may_open(to):
-            self.data.qpos[self._fingers], self.data.ctrl[self._grip] = to, to
+            self._fingers.put(self.data, to)
             return self._pass(ticks * TICK_S)
-        for i in range(1, ticks + round(_LONGEST_GRIP_S / TICK_S)):
-            self.data.ctrl[self._grip] = start + (to - start) * min(1.0, i / ticks)
+        for i in range(1, ticks + round(self._fingers.longest_s / TICK_S)):
+            self._fingers.command(self.data, start + (to - start) * min(1.0, i / ticks))
             self.wait(TICK_S)
             if self._rests() and (i >= ticks or self._grips_fully()):
                 break
-        self.data.ctrl[self._grip] = to
+        self._fingers.command(self.data, to)
 
     def _nearest_command(self, to: float) -> float:
         """The command nearest to `to` at which the fingers push as they do now, [m]: their force is limited."""
-        command, slack = float(self.data.ctrl[self._grip]), self._slack
+        command, slack = self._fingers.commanded(self.data), self._fingers.slack
         return min(max(command, self.opening() - slack), self.opening() + slack)
 
     def _grips_fully(self) -> bool:
         """Whether the fingers push with all the force that they have."""
-        return abs(float(self.data.ctrl[self._grip]) - self.opening()) >= self._slack
+        return abs(self._fingers.commanded(self.data) - self.opening()) >= self._fingers.slack
 
     def _rests(self) -> bool:
         """Whether the joints and the fingers rest, as far as they feel."""
-        turning, closing = np.abs(self.data.qvel[self._dof]), np.abs(self.data.qvel[self._finger_dof])
-        return bool(turning.max() < _REST_RAD_S and closing.max() < _REST_M_S)
+        turning = np.abs(self.data.qvel[self._dof])
+        return bool(turning.max() < _REST_RAD_S and self._fingers.speed(self.data) < _REST_M_S)
 
     def opening(self) -> float:
         """What the fingers measure, [m] per finger."""
-        return float(self.data.qpos[self._fingers].min())
+        return self._fingers.opening(self.data)
 
     def memory(self) -> tuple[Any, ...]:
         """What the controller knows, apart from the physics; for `remember`."""
@@ -369,11 +372,7 @@ class Robot:
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self.step_s = float(model.opt.timestep)
         self._drives = np.array([model.actuator(f"arm/{name}").id for name in self.arm.joints])
-        self._grip = model.actuator(f"arm/{self.arm.grip}").id
-        limit, stiffness = model.actuator_forcerange[self._grip, 1], model.actuator_gainprm[self._grip, 0]
-        self._slack = float(limit / stiffness) if model.actuator_forcelimited[self._grip] else math.inf
-        self._finger_dof = np.array([model.jnt_dofadr[model.joint(f"arm/{name}").id] for name in self.arm.fingers])
-        self._fingers = np.array([model.jnt_qposadr[model.joint(f"arm/{name}").id] for name in self.arm.fingers])
+        self._fingers = fingers_of(model, self.arm)
         gain, bias = model.actuator_gainprm[self._drives, 0], model.actuator_biasprm[self._drives, 2]
         self._lead = (model.dof_damping[model.jnt_dofadr[joints]] - bias) / gain
         self._every = max(1, round(TICK_S / model.opt.timestep))

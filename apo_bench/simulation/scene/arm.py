@@ -11,30 +11,49 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError, unknown
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.records import copyable
 from apo_bench.resources import folder
+from apo_bench.simulation.arms.hand import Hand
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """What an arm can do; None: nothing is said."""
+
+    payload_kg: float | None = None
+    """Of what is held, without the gripper."""
+    speed_rad_s: Array | None = None
+    """(joints,), the fastest each may turn."""
+    torque_nm: Array | None = None
+    """(joints,), the most each can push; infinite where nothing is said."""
 
 
 @final
 @copyable
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """An arm with a parallel gripper; bring your own as `Arm(mjcf=..., tip=..., ...)`.
+    """An arm with a gripper of two sides, ready to be put into a scene.
 
-    The site `tip` lies between the fingertips: z points ahead, x along the closing direction.
+    `read_arm(FILE.toml)` makes one of the description of any arm: it finds joints, drives and pads, and measures the
+    gripper. Whoever has an MJCF file that is as the fields say may make one directly, without `model` and `hand`. The
+    site `tip` lies between the fingertips: z points ahead, x along the closing direction.
     """
 
     mjcf: Path
+    """The MJCF file of the whole, or the file by which the arm was described."""
     base: tuple[float, float, float]
     """Where its base stands, world, [m]."""
     joints: tuple[str, ...]
     """Each has a position actuator of the same name."""
     tip: str
     fingers: tuple[str, ...]
-    """Slide joints, zero when closed, opening [m] per finger."""
+    """Slide joints, zero when closed, opening [m] per finger; those of the hand, where that was measured."""
     grip: str
-    """The position actuator of the fingers."""
+    """The position actuator of the fingers; empty where the hand was measured."""
     mount: str
     """The body that a part is welded to by the ideal grasp."""
     home: Array
@@ -43,9 +62,25 @@ class Arm:
     """Widest opening per finger."""
     squeeze_m: float = 0.03
     """How far inside the part the fingers are commanded: beyond it the actuator's force limit rules."""
+    turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    """How its base is turned, quaternion (w, x, y, z), world."""
+    model: str | None = None
+    """The whole as MJCF text, where the arm was described by a file."""
+    hand: Hand | None = None
+    """What the gripper does, where that was measured."""
+    limits: Limits = Limits()
+    files: tuple[Path, ...] = ()
+    """All files that it was made of; none: `mjcf` alone."""
+    control: str = "own position actuators"
+    """What moves the joints."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "home", frozen(self.home, len(self.joints)))
+        object.__setattr__(self, "files", self.files or (self.mjcf,))
+
+    def finger_joints(self, opening: float) -> Array:
+        """Where the joints of `fingers` are at an opening of the empty hand, (k,)."""
+        return np.full(len(self.fingers), opening) if self.hand is None else self.hand.state(opening)
 
 
 def six_axis() -> Arm:
@@ -64,12 +99,22 @@ def six_axis() -> Arm:
 
 
 _ARMS = {"six_axis": six_axis}
+DESCRIBED = ("ur5e_primitive", "panda_primitive")
+"""Arms that come with the benchmark as arm files."""
 
 
 def find_arm(given: str | Arm) -> Arm:
     """An arm by short name, `module:name`, or as the object itself."""
     if isinstance(given, Arm):
         return given
+    if given.endswith(".toml"):
+        from apo_bench.simulation.arms.building import read_arm
+
+        return read_arm(given)
+    if given in DESCRIBED:
+        from apo_bench.simulation.arms.building import read_arm
+
+        return read_arm(folder("assets") / "arms" / f"{given}.toml")
     if ":" in given:
         from apo_bench.names import resolve
 
@@ -84,7 +129,8 @@ def find_arm(given: str | Arm) -> Arm:
             raise InputError(f"the arm '{given}' is a {type(made).__name__}; an `Arm`, or a function that returns one.")
         return made
     if given not in _ARMS:
-        raise InputError(unknown("arm", given, _ARMS) + " Or give your own as 'package.module:name'.")
+        known = unknown("arm", given, (*_ARMS, *DESCRIBED))
+        raise InputError(f"{known} Or give your own as FILE.toml, or as 'package.module:name'.")
     return _ARMS[given]()
 
 
@@ -97,10 +143,11 @@ class Kinematics:
     GAIN = 0.95
     """A step takes at most this part of the way to a joint's limit."""
 
-    def __init__(self, arm: Arm) -> None:
-        spec = mujoco.MjSpec.from_file(str(arm.mjcf))
-        spec.worldbody.first_body().pos = arm.base
-        self.model = spec.compile()
+    POSTURE = 2e-4
+    """How much an arm with more than six joints prefers its home, as a cost: the tip is off by some 1e-8 m for it."""
+
+    def __init__(self, arm: Arm, posture: bool = True) -> None:
+        self.model = _alone(arm)
         self.configuration = mink.Configuration(self.model)
         self.adr = np.array([int(self.model.jnt_qposadr[self.model.joint(j).id]) for j in arm.joints])
         self.tip = arm.tip
@@ -110,6 +157,13 @@ class Kinematics:
         self._full = self.model.qpos0.copy()
         limited = self.model.jnt_limited.astype(np.bool_)
         self._range: Array = np.where(limited[:, None], self.model.jnt_range, (-np.inf, np.inf)).T
+        self._ids = [int(self.model.joint(j).id) for j in arm.joints]
+        self._posture = _posture_task(self, arm) if posture and len(arm.joints) > 6 else None
+
+    @property
+    def range_of_joints(self) -> Array:
+        """(2, joints): the lowest and the highest angle of each, [rad]."""
+        return self._range[:, self._ids]
 
     def forward(self, q: Array) -> Array:
         """The pose of the tip, (4, 4), world."""
@@ -146,15 +200,42 @@ class Kinematics:
         Without limits the programme is a linear system. Where its solution keeps them, it is that of the programme too.
         """
         H, c = self._task.compute_qp_objective(self.configuration)
+        if self._posture is not None:
+            more = self._posture.compute_qp_objective(self.configuration)
+            H, c = H + more[0], c + more[1]
         np.einsum("ii->i", H)[:] += self.DAMPING
         step: Array = np.linalg.solve(H, -c)
         low, high = self.GAIN * (self._range - self.configuration.q)
         if (step >= low).all() and (step <= high).all():
             return step
         try:
-            found = mink.solve_ik(
-                self.configuration, [self._task], 1.0, "daqp", damping=self.DAMPING, limits=self._limits
-            )
+            tasks = [self._task] if self._posture is None else [self._task, self._posture]
+            found = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", damping=self.DAMPING, limits=self._limits)
         except mink.exceptions.MinkError:
             return None
         return np.asarray(found)
+
+
+def _alone(arm: Arm) -> Any:
+    """The model of the arm where it stands, and nothing else."""
+    if arm.model is None:
+        spec = mujoco.MjSpec.from_file(str(arm.mjcf))
+        spec.worldbody.first_body().pos = arm.base
+        return spec.compile()
+    spec = mujoco.MjSpec.from_string(arm.model)
+    stand = pose.unpack(np.array([*arm.base, *arm.turn]))
+    for body in spec.worldbody.bodies:
+        T = pose.pack(stand @ pose.unpack(np.array([*body.pos, *body.quat])))
+        body.pos, body.quat = T[:3], T[3:]
+    return spec.compile()
+
+
+def _posture_task(kinematics: Kinematics, arm: Arm) -> Any:
+    """What keeps the elbow where it is at home, (mink's `PostureTask`)."""
+    cost = np.zeros(kinematics.model.nv)
+    cost[[int(kinematics.model.joint(j).dofadr[0]) for j in arm.joints]] = Kinematics.POSTURE
+    task = mink.PostureTask(kinematics.model, cost=cost)
+    q = kinematics.model.qpos0.copy()
+    q[kinematics.adr] = arm.home
+    task.set_target(q)
+    return task

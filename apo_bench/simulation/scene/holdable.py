@@ -40,6 +40,12 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
                 "hold the part elsewhere, across another way, or make it narrower."
             )
         weight = _GRAVITY * sum(float(world.model.body_subtreemass[world.body[part]]) for part in operation.moves)
+        payload = arm.limits.payload_kg
+        if payload is not None and weight > _GRAVITY * payload:
+            raise InputError(
+                f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg; the payload of the arm is {payload:g} kg, so "
+                f"make '{operation.main}' smaller or less dense, or take another arm."
+            )
         most = _most_weight(world.model, arm)
         if weight > most:
             raise InputError(
@@ -51,6 +57,8 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
 
 def _most_weight(model: Any, arm: Arm) -> float:
     """What friction holds safely, [N]; infinite where the force of the fingers has no limit."""
+    if arm.hand is not None:
+        return 2 * arm.hand.force_n * arm.hand.friction / _SAFE
     force = float(model.actuator(f"arm/{arm.grip}").forcerange[1])
     if force <= 0.0:
         return float("inf")

@@ -38,6 +38,8 @@ _DROWSY_M_S = 5e-5
 end within 2 micrometres of where they would."""
 _MEMORY = "64M"
 """For the contacts of many pieces at once: what MuJoCo takes by itself is too little for rings of wedges that fall."""
+_PAD_CONDIM = 4
+"""Of all that an arm touches by: pads resist turning."""
 _ARM_WELD = {"solref": (0.004, 1.0), "solimp": (0.98, 0.999, 0.0005, 0.5, 2.0)}
 
 
@@ -93,8 +95,11 @@ def build_scene(
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     check_clearance(scenario, clearance)
     found, settings = find_arm(arm), physics(timestep_s)
-    shown, work = (_compiled(scenario, xml) for xml in _compose(scenario, clearance, settings, found, grasp))
+    with_hands, with_arm = _compose(scenario, clearance, settings, found, grasp)
+    shown = _compiled(scenario, with_hands)
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
+    described = found.model is not None
+    work = _with_described_arm(scenario, with_arm, found, settings) if described else _compiled(scenario, with_arm)
     if grasp == "friction":
         check_holdable(scenario, work, found)
     return Scene(
@@ -124,8 +129,23 @@ def scene_xml(
 
 def _compiled(scenario: Scenario, xml: str) -> World:
     model = mujoco.MjModel.from_xml_string(xml)
+    return _world(scenario, model, xml)
+
+
+def _world(scenario: Scenario, model: Any, xml: str) -> World:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return world(model, xml, _movable(scenario), _fixed(scenario))
+
+
+def _with_described_arm(scenario: Scenario, room: str, arm: Arm, settings: Physics) -> World:
+    """Put an arm that was described by a file into a finished room, which names it already."""
+    spec, own = mujoco.MjSpec.from_string(room), mujoco.MjSpec.from_string(arm.model)
+    for geom in own.geoms:
+        geom.solref[:2], geom.solimp, geom.condim = settings.solref, settings.solimp, _PAD_CONDIM
+        geom.priority = 1
+    stand = spec.worldbody.add_body(name="arm/", pos=arm.base, quat=arm.turn)
+    spec.attach(own, frame=stand.add_frame(), prefix="arm/")
+    return _world(scenario, spec.compile(), spec.to_xml())
 
 
 def _movable(scenario: Scenario) -> tuple[str, ...]:
@@ -157,8 +177,10 @@ def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Ar
     shown = room.to_xml_string()
     for element in reversed(hands):
         element.remove()
-    _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
-    return shown, _with_force_sensors(room.to_xml_string(), scenario)
+    if arm.model is None:
+        _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
+    text = _with_force_sensors(room.to_xml_string(), scenario)
+    return shown, text if arm.model is None or grasp != "weld" else _with_welds(text, arm, movable)
 
 
 def _set_physics(room: Any, s: Physics) -> None:
@@ -230,7 +252,22 @@ def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings
         room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **_ARM_WELD)
 
 
+<<<<<<< HEAD
 def _with_force_sensors(xml: str, scenario: Scenario) -> str:
+=======
+def _with_welds(xml: str, arm: Arm, welded: Mapping[str, Any]) -> str:
+    """The ideal grasp of an arm that is put into the room later."""
+    root = ElementTree.fromstring(xml)
+    equality = root.find("equality")
+    equality = ElementTree.SubElement(root, "equality") if equality is None else equality
+    soft = {key: " ".join(map(str, value)) for key, value in _ARM_WELD.items()}
+    for part, body in welded.items():
+        bodies = {"body1": f"arm/{arm.mount}", "body2": body.full_identifier}
+        ElementTree.SubElement(equality, "weld", {"name": f"grasp_{part}", "active": "false", **bodies, **soft})
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _with_force_sensors(xml: str, scenario: Scenario, arm: Arm | None) -> str:
     """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
 
     PyMJCF's schema does not know contact sensors, so they are written into the finished text.

@@ -28,7 +28,8 @@ def runtime_files(names: Names) -> dict[str, Path]:
     files = [Path(name) for name in names.scenarios if name not in scenario_names()]
     files += [part for name in names.scenarios for part in load_scenario(name).part_files.values()]
     files += [path for name in names.noises if (path := noise_path(name)) is not None]
-    files += _with_named(find_arm(names.arm).mjcf)
+    arm = find_arm(names.arm)
+    files += _with_named(arm.mjcf) if arm.model is None else arm.files
     files += [Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))]
     files += [path for name in brought if (path := Path(name)).is_file()]
     here = Path.cwd()

@@ -1,0 +1,292 @@
+"""From the description of an arm to an `Arm`: its model put together, its joints driven, its gripper measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.description import ArmDescription, read_description
+from apo_bench.simulation.arms.home import find_home
+from apo_bench.simulation.arms.loading import compiled, files_of, load_model
+from apo_bench.simulation.arms.measuring import PROBE, Measured, measure
+from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.scene.arm import Arm, Limits
+
+_TIP = "tip"
+_GRIPPER = "gripper/"
+_USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment")
+_FINGER_ARMATURE, _FINGER_DAMPING = 1e-4, 0.02
+"""Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
+_MOST_JOINTS = 8
+
+
+def read_arm(path: str | Path) -> Arm:
+    """The arm of an arm file, built and measured.
+
+    Raises:
+        InputError: Anything that is wrong in the file or in the models that it names.
+    """
+    path = Path(path)
+    said = read_description(path)
+    files = [path, *files_of(said.mjcf), *(files_of(said.gripper.mjcf) if said.gripper.mjcf else ())]
+    times = tuple((str(each), each.stat().st_mtime_ns) for each in files if each.is_file())
+    return _built(path, times)
+
+
+@lru_cache(maxsize=8)
+def _built(path: Path, times: tuple[tuple[str, int], ...]) -> Arm:
+    """Remembered until one of the files changes."""
+    return build_arm(read_description(path))
+
+
+def build_arm(said: ArmDescription) -> Arm:
+    """Put an arm together.
+
+    Raises:
+        InputError: Its models do not fit the description, or cannot be used; what to do is said.
+    """
+    spec = load_model(said.mjcf, "arm")
+    model = compiled(spec, said.mjcf)
+    flange, T_flange = _flange(model, said)
+    joints = _joints(model, flange, said)
+    if said.gripper.mjcf is not None:
+        hand = load_model(said.gripper.mjcf, "gripper")
+        T = T_flange @ said.gripper.mount
+        frame = spec.body(model.body(flange).name).add_frame(pos=T[:3, 3], quat=_quaternion(T))
+        spec.attach(hand, frame=frame, prefix=_GRIPPER)
+    elif said.gripper.mount is not None and not np.array_equal(said.gripper.mount, np.eye(4)):
+        raise InputError(
+            f"{said.file}, gripper: 'mount' needs 'mjcf'; a gripper that is part of the arm has its place."
+        )
+    last = model.body(flange).name
+    _make_passive(spec, joints)
+    whole = compiled(spec, said.mjcf)
+    drives = drives_of(whole, joints)
+    usual = _usual_home(model, joints)
+    rig = _measuring_model(spec, said)
+    start = said.home if said.home is not None else usual
+    if len(start) != len(joints):
+        raise InputError(f"{said.file}: 'home_deg' has {len(start)} numbers; the arm has {len(joints)} joints.")
+    names = said.gripper.actuators
+    if names is not None and said.gripper.mjcf is not None:
+        gripper = replace(said.gripper, actuators=tuple(_prefixed(rig, "actuator", name) for name in names))
+    else:
+        gripper = said.gripper
+    if gripper.pads is not None and gripper.mjcf is not None:
+        a, b = (name if _known(rig, name) else _GRIPPER + name for name in gripper.pads)
+        gripper = replace(gripper, pads=(a, b))
+    found = measure(rig, said.gripper.mjcf or said.mjcf, joints, start, rig.body(last).id, gripper)
+    own = _drive(spec, whole, joints, start, drives, found, said)
+    text = _text(spec, found)
+    arm = Arm(
+        mjcf=said.file,
+        base=tuple(said.base[:3, 3].tolist()),
+        turn=tuple(_quaternion(said.base).tolist()),
+        joints=tuple(joints),
+        tip=_TIP,
+        fingers=found.hand.joints,
+        grip="",
+        mount=found.mount,
+        home=start,
+        opening_m=float(found.hand.opening[-1]),
+        model=text,
+        hand=found.hand,
+        limits=_limits(said, joints, drives),
+        files=_files(said),
+        control="own position actuators" if own else "position servos made from the model",
+    )
+    return arm if said.home is not None else replace(arm, home=find_home(arm))
+
+
+def _flange(model: Any, said: ArmDescription) -> tuple[int, Array]:
+    """The body at the end of the arm, and the frame of the flange in it."""
+    sites = {model.site(i).name: i for i in range(model.nsite)}
+    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
+    name = said.flange
+    if name is None:
+        name = next((each for each in _USUAL_FLANGES if each in sites or each in bodies), None)
+    if name is None:
+        if said.gripper.mjcf is not None:
+            raise InputError(
+                f"{said.file}: where the gripper is mounted is not known; state 'flange', a site or body of the arm "
+                f"({', '.join((*sites, *bodies))})."
+            )
+        return _last_link(model, said), np.eye(4)
+    if name in sites:
+        site, T = sites[name], np.eye(4)
+        R = np.zeros(9)
+        mujoco.mju_quat2Mat(R, model.site_quat[site])
+        T[:3, :3], T[:3, 3] = R.reshape(3, 3), model.site_pos[site]
+        return int(model.site_bodyid[site]), T
+    if name not in bodies:
+        raise InputError(f"{said.file}: {unknown('flange', name, (*sites, *bodies))}")
+    return bodies[name], np.eye(4)
+
+
+def _last_link(model: Any, said: ArmDescription) -> int:
+    """The body of the last joint that is named, or of the last hinge from which the model branches."""
+    if said.joints is not None:
+        known = [model.joint(j).name for j in range(model.njnt)]
+        if said.joints[-1] in known:
+            return int(model.jnt_bodyid[model.joint(said.joints[-1]).id])
+    body = 0
+    while True:
+        moving = [b for b in range(1, model.nbody) if int(model.body_parentid[b]) == body and _moves(model, b)]
+        if len(moving) != 1:
+            break
+        body = moving[0]
+    while body and not model.body_jntnum[body]:
+        body = int(model.body_parentid[body])
+    if not body:
+        raise InputError(f"{said.mjcf}: the arm has no joints; give the MJCF file of an arm.")
+    return body
+
+
+def _moves(model: Any, body: int) -> bool:
+    """Whether a joint is at a body or behind it."""
+    if model.body_jntnum[body]:
+        return True
+    return any(_moves(model, b) for b in range(body + 1, model.nbody) if int(model.body_parentid[b]) == body)
+
+
+def _joints(model: Any, flange: int, said: ArmDescription) -> list[str]:
+    """The hinges between the base and the flange, in this order."""
+    chain: list[int] = []
+    body = flange
+    while body:
+        at = int(model.body_jntadr[body])
+        chain = [*range(at, at + int(model.body_jntnum[body])), *chain]
+        body = int(model.body_parentid[body])
+    names = [model.joint(j).name for j in chain]
+    for j, name in zip(chain, names, strict=True):
+        if int(model.jnt_type[j]) != int(mujoco.mjtJoint.mjJNT_HINGE):
+            raise InputError(f"{said.mjcf}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.")
+    if said.joints is not None:
+        if sorted(said.joints) != sorted(names):
+            raise InputError(
+                f"{said.file}: 'joints' are {', '.join(said.joints)}; between base and flange lie "
+                f"{', '.join(names) or 'none'}."
+            )
+        names = [name for name in names if name in said.joints]
+    if not 6 <= len(names) <= _MOST_JOINTS:
+        raise InputError(
+            f"{said.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); 6 to "
+            f"{_MOST_JOINTS} are needed, so check 'flange'."
+        )
+    return names
+
+
+def _make_passive(spec: Any, joints: Sequence[str]) -> None:
+    """Nothing falls, nothing of the arm touches itself or what it stands on, and light finger links do not rattle."""
+    for body in spec.bodies[1:]:
+        body.gravcomp = 1.0
+    for geom in spec.geoms:
+        if geom.contype or geom.conaffinity:
+            geom.contype, geom.conaffinity = 1, 0
+    standing = spec.joint(joints[0]).parent
+    for body in spec.bodies:
+        if body.name == standing.name or not _turns(body, joints):
+            for geom in body.geoms:
+                geom.contype = 0
+    for joint in spec.joints:
+        if joint.name not in joints and joint.armature == 0.0 and not np.any(joint.damping):
+            joint.armature = _FINGER_ARMATURE
+            joint.damping[0] = _FINGER_DAMPING
+
+
+def _turns(body: Any, joints: Sequence[str]) -> bool:
+    """Whether a joint of the arm moves a body."""
+    while body is not None and body.name != "world":
+        if any(joint.name in joints for joint in body.joints):
+            return True
+        body = body.parent
+    return False
+
+
+def _measuring_model(spec: Any, said: ArmDescription) -> Any:
+    """The arm with a part to push on, which waits far away."""
+    rig = spec.copy()
+    probe = rig.worldbody.add_body(name=PROBE, mocap=True, pos=(0.0, 0.0, -1.0))
+    probe.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.01, 0.01, 0.01), contype=0, conaffinity=1)
+    return compiled(rig, said.mjcf)
+
+
+def _drive(
+    spec: Any, model: Any, joints: Sequence[str], home: Array, drives: Any, found: Measured, said: ArmDescription
+) -> bool:
+    """Keep the arm's own position actuators where each is stiff and named like its joint, else make servos."""
+    inertia = felt_inertia(model, joints, home)
+    limits = said.torque_nm
+    if limits is not None:
+        if len(limits) not in (1, len(joints)):
+            raise InputError(f"{said.file}: 'torque_nm' has {len(limits)} numbers; the arm has {len(joints)} joints.")
+        each = np.broadcast_to(limits, len(joints))
+        drives.update({name: drives[name]._replace(torque=float(x)) for name, x in zip(joints, each, strict=True)})
+    names = [actuator.name for actuator in spec.actuators]
+    stiff = all(not is_soft(drives[name].stiffness, felt) for name, felt in zip(joints, inertia, strict=True))
+    if stiff and limits is None and all(name in names for name in joints):
+        return True
+    for actuator in list(spec.actuators):
+        if actuator.name not in found.hand.actuators:
+            spec.delete(actuator)
+    add_servos(spec, joints, inertia, drives)
+    return False
+
+
+def _text(spec: Any, found: Measured) -> str:
+    """The whole as MJCF, with the site of the tip."""
+    for site in list(spec.sites):
+        if site.name == _TIP:
+            site.name = f"{_TIP}_of_the_model"
+    T = found.T_mount_tip
+    spec.body(found.mount).add_site(name=_TIP, pos=T[:3, 3], quat=_quaternion(T), size=(0.003, 0.003, 0.003), group=4)
+    spec.modelname = "arm"
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def _limits(said: ArmDescription, joints: Sequence[str], drives: Any) -> Limits:
+    speed = said.speed_rad_s
+    if speed is not None and len(speed) not in (1, len(joints)):
+        raise InputError(f"{said.file}: 'speed_deg_s' has {len(speed)} numbers; the arm has {len(joints)} joints.")
+    return Limits(
+        payload_kg=said.payload_kg,
+        speed_rad_s=None if speed is None else np.array(np.broadcast_to(speed, len(joints))),
+        torque_nm=np.array([drives[name].torque for name in joints]),
+    )
+
+
+def _files(said: ArmDescription) -> tuple[Path, ...]:
+    gripper = files_of(said.gripper.mjcf) if said.gripper.mjcf is not None else ()
+    own = () if said.file == said.mjcf else (said.file,)
+    return tuple(dict.fromkeys((*own, *files_of(said.mjcf), *gripper)))
+
+
+def _usual_home(model: Any, joints: Sequence[str]) -> Array:
+    """The middle of the range of each joint, or zero."""
+    at = [model.joint(name).id for name in joints]
+    low, high = model.jnt_range[at].T
+    return np.where(model.jnt_limited[at].astype(bool), (low + high) / 2, 0.0)
+
+
+def _known(model: Any, name: str) -> bool:
+    bodies = {model.body(i).name for i in range(model.nbody)}
+    return name in bodies or name in {model.geom(i).name for i in range(model.ngeom)}
+
+
+def _prefixed(model: Any, kind: str, name: str) -> str:
+    known = {getattr(model, kind)(i).name for i in range(model.nu)}
+    return name if name in known else _GRIPPER + name
+
+
+def _quaternion(T: Array) -> Array:
+    return np.asarray(pose.pack(T)[3:])

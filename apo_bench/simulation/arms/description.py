@@ -1,0 +1,133 @@
+"""The file that describes an arm, as TOML: what cannot be seen in its MJCF, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.scenario.keys import read_pose
+
+_SCHEMA = "apo-bench/arm/1"
+_MOST_JOINTS, _MOST_PAYLOAD_KG, _MOST_NM, _MOST_DEG_S = 16, 1000.0, 1e5, 3600.0
+USUAL_BASE = np.array([[1.0, 0, 0, -0.45], [0, 1.0, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 1.0]])
+"""Where a base stands that nothing is said of: behind the middle of the table, (4, 4), world, [m]."""
+USUAL_BASE.flags.writeable = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GripperDescription:
+    """The gripper, and how it is driven; None: found in the model."""
+
+    mjcf: Path | None = None
+    """None: it is part of the arm's file."""
+    mount: Array = field(default_factory=lambda: np.eye(4))
+    """Its frame in the flange, (4, 4), [m]."""
+    actuators: tuple[str, ...] | None = None
+    open: Array | None = None
+    """The command at which it is widest open, one number for each actuator, in their own units."""
+    closed: Array | None = None
+    pads: tuple[str, str] | None = None
+    """A body or geom of each side, whose surface holds a part."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ArmDescription:
+    """An arm as its file says it."""
+
+    file: Path
+    mjcf: Path
+    flange: str | None
+    """A site or a body; None: the last body of the one chain of hinges."""
+    joints: tuple[str, ...] | None
+    home: Array | None
+    """[rad]; None: looked for."""
+    base: Array
+    """Where the base stands, (4, 4), world, [m]."""
+    gripper: GripperDescription
+    payload_kg: float | None = None
+    """Of what is held, without the gripper."""
+    speed_rad_s: Array | None = None
+    """The fastest each joint may turn."""
+    torque_nm: Array | None = None
+    """The most each joint may push; None: as the model says."""
+
+
+def read_description(path: Path) -> ArmDescription:
+    """What stands in an arm file.
+
+    Raises:
+        InputError: Anything that is not as described, naming file and key.
+    """
+    root = read_toml(path, "arm file")
+    if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) != _SCHEMA:
+        root.child(root.value["schema"], "schema").fail(f'"{_SCHEMA}" is needed')
+    optional = ("flange", "joints", "home_deg", "base", "gripper", "payload_kg", "speed_deg_s", "torque_nm")
+    top = root.fields(("schema", "mjcf"), optional)
+    joints = _names(top["joints"]) if "joints" in top else None
+    speed = _each(top, "speed_deg_s", _MOST_DEG_S)
+    return ArmDescription(
+        file=path,
+        mjcf=_beside(path, top["mjcf"]),
+        flange=top["flange"].text() if "flange" in top else None,
+        joints=joints,
+        home=np.radians(_row(top["home_deg"])) if "home_deg" in top else None,
+        base=read_pose(top["base"]) if "base" in top else USUAL_BASE,
+        gripper=_gripper(path, top["gripper"]) if "gripper" in top else GripperDescription(),
+        payload_kg=top["payload_kg"].number(0.0, _MOST_PAYLOAD_KG, above=True) if "payload_kg" in top else None,
+        speed_rad_s=None if speed is None else np.radians(speed),
+        torque_nm=_each(top, "torque_nm", _MOST_NM),
+    )
+
+
+def _gripper(path: Path, node: JsonNode) -> GripperDescription:
+    keys = node.fields((), ("mjcf", "mount", "actuators", "open", "closed", "pads"))
+    if ("open" in keys) != ("closed" in keys):
+        node.fail("'open' and 'closed' are given together, or neither")
+    pads = _names(keys["pads"]) if "pads" in keys else None
+    if pads is not None and (len(pads) != 2 or pads[0] == pads[1]):
+        keys["pads"].fail("two names are needed, a body or geom of each side")
+    return GripperDescription(
+        mjcf=_beside(path, keys["mjcf"]) if "mjcf" in keys else None,
+        mount=read_pose(keys["mount"]) if "mount" in keys else np.eye(4),
+        actuators=_names(keys["actuators"]) if "actuators" in keys else None,
+        open=_row(keys["open"]) if "open" in keys else None,
+        closed=_row(keys["closed"]) if "closed" in keys else None,
+        pads=None if pads is None else (pads[0], pads[1]),
+    )
+
+
+def _beside(path: Path, node: JsonNode) -> Path:
+    """A file that is named beside the one that names it."""
+    return path.parent / node.text()
+
+
+def _names(node: JsonNode) -> tuple[str, ...]:
+    if not isinstance(node.value, list) or not 0 < len(node.value) <= _MOST_JOINTS:
+        node.fail(f"a list of 1 to {_MOST_JOINTS} names is needed")
+    return tuple(each.text() for each in node.items("name"))
+
+
+def _row(node: JsonNode) -> Array:
+    if not isinstance(node.value, list) or not 0 < len(node.value) <= _MOST_JOINTS:
+        node.fail(f"a list of 1 to {_MOST_JOINTS} numbers is needed")
+    return node.numbers(len(node.value))
+
+
+def _each(top: Mapping[str, JsonNode], key: str, most: float) -> Array | None:
+    """A number above zero for each joint, or one for all."""
+    if key not in top:
+        return None
+    node = top[key]
+    found = _row(node) if isinstance(node.value, list) else np.array([node.number(0.0, most, above=True)])
+    if not ((found > 0.0) & (found <= most)).all():
+        node.fail(f"numbers above 0 and up to {most:g} are needed")
+    return found

@@ -1,0 +1,81 @@
+"""Where an arm waits, if nobody says: of the ways to hold the tip over the table the one that has most room."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.scene.arm import Arm, Kinematics
+
+_AT = (-0.05, 0.0, 0.30)
+_TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
+"""Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room."""
+_TURNS = (-1.6, 0.0, 1.6)
+_TRIES, _WIDEST, _SAME_RAD = 40, 3.0, 0.2
+_TABLE_ROOM_M, _NEAR = 0.02, 0.4
+_ENOUGH_RAD = 0.3
+"""More room to a limit than this counts less than links that are high above the table."""
+
+
+def tip_down(at: Array, turn: float = 0.0) -> Array:
+    """A tip that looks down, (4, 4); at turn 0 its fingers close along x."""
+    c, s = np.cos(turn), np.sin(turn)
+    T = np.eye(4)
+    T[:3, :3] = np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, -1.0, -1.0])
+    T[:3, 3] = at
+    return T
+
+
+def find_home(arm: Arm) -> Array:
+    """Joint angles, [rad], from which the tip reaches most of the table with most room to the limits of the joints.
+
+    Raises:
+        InputError: The arm does not reach over the table at all.
+    """
+    kinematics, rng = Kinematics(arm, posture=False), np.random.default_rng(0)
+    low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.range_of_joints)
+    found: list[Array] = []
+    for i in range(_TRIES):
+        start = rng.uniform(low, high)
+        start = start if i % 2 else (low + high) / 2 + _NEAR * (start - (low + high) / 2)
+        q = kinematics.inverse(tip_down(np.array(_AT)), start, 25)
+        if q is None or any(np.abs(q - other).max() < _SAME_RAD for other in found) or _in_table(kinematics, q):
+            continue
+        found.append(q)
+    if not found:
+        at = ", ".join(f"{1e3 * x:g}" for x in _AT)
+        raise InputError(
+            f"{arm.mjcf}: the tip does not reach ({at}) mm looking down; move the 'base', which stands at "
+            f"({', '.join(f'{1e3 * x:g}' for x in arm.base)}) mm."
+        )
+    return max(found, key=lambda q: _worth(kinematics, q))
+
+
+def _worth(kinematics: Kinematics, q: Array) -> tuple[int, float, float]:
+    """Places reached, room to the limits as far as it is needed, height of the joints."""
+    reached, least = room(kinematics, q)
+    kinematics.forward(q)
+    moved = kinematics.model.body_jntnum > 0
+    return reached, round(min(least, _ENOUGH_RAD), 2), float(kinematics.configuration.data.xpos[moved, 2].mean())
+
+
+def room(kinematics: Kinematics, home: Array) -> tuple[int, float]:
+    """How many places on the table are reached from home, and the least distance of a joint from its limit, [rad]."""
+    low, high = kinematics.range_of_joints
+    reached, least = 0, np.inf
+    for turn in _TURNS:
+        for at in _TABLE:
+            q = kinematics.inverse(tip_down(np.array(at), turn), home, 25)
+            if q is not None:
+                reached += 1
+                least = min(least, float(np.minimum(q - low, high - q).min()))
+    return reached, least
+
+
+def _in_table(kinematics: Kinematics, q: Array) -> bool:
+    """Whether the centre of mass of a link lies in the table."""
+    kinematics.forward(q)
+    data, model = kinematics.configuration.data, kinematics.model
+    moved = model.body_jntnum[1:] > 0
+    return bool((data.xipos[1:][moved, 2] < _TABLE_ROOM_M).any())

@@ -1,0 +1,179 @@
+"""Arms that are described by a file: kinematics, drives and grippers are what the file and the model say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.records.settings import TrialSettings
+from apo_bench.resources import folder
+from apo_bench.simulation.arms.building import read_arm
+from apo_bench.simulation.robot.paths import smooth
+from apo_bench.simulation.robot.reach import along, within_speed
+from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
+from apo_bench.trial.trial import run_trial
+
+ARMS = folder("assets") / "arms"
+UR5E = ((0.1625, 0, 90), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, 90), (0.0997, 0, -90), (0.0996, 0, 0))
+"""d [m], a [m], alpha [degrees] of every joint, as Universal Robots publishes them."""
+PANDA = ((0, 0, 0.333), (0, -90, 0), (0, 90, 0.316), (0.0825, 90, 0), (-0.0825, -90, 0.384), (0, 90, 0), (0.088, 90, 0))
+"""a [m], alpha [degrees], d [m], as Franka publishes them; the flange is 0.107 m behind the last."""
+
+
+def about(axis: int, angle: float) -> Array:
+    T, (i, j) = np.eye(4), ((1, 2), (2, 0), (0, 1))[axis]
+    T[i, i] = T[j, j] = np.cos(angle)
+    T[i, j], T[j, i] = -np.sin(angle), np.sin(angle)
+    return T
+
+
+def by(x: float = 0.0, z: float = 0.0) -> Array:
+    T = np.eye(4)
+    T[0, 3], T[2, 3] = x, z
+    return T
+
+
+def flange(name: str, q: Array) -> Array:
+    model = mujoco.MjModel.from_xml_path(str(ARMS / f"{name}.xml"))
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    site, T = data.site("flange"), np.eye(4)
+    T[:3, :3], T[:3, 3] = site.xmat.reshape(3, 3), site.xpos
+    return T
+
+
+def test_the_primitive_arms_have_the_published_kinematics() -> None:
+    q, expected = np.random.default_rng(1).uniform(-2.0, 2.0, 7), np.eye(4)
+    for angle, (d, a, alpha) in zip(q, UR5E, strict=False):
+        expected = expected @ about(2, angle) @ by(x=a, z=d) @ about(0, np.radians(alpha))
+    np.testing.assert_allclose(flange("ur5e_primitive", q[:6]), expected, atol=1e-8)
+    expected = np.eye(4)
+    for angle, (a, alpha, d) in zip(q, PANDA, strict=True):
+        expected = expected @ about(0, np.radians(alpha)) @ by(x=a) @ about(2, angle) @ by(z=d)
+    np.testing.assert_allclose(flange("panda_primitive", q), expected @ by(z=0.107), atol=1e-8)
+
+
+@pytest.fixture(scope="module")
+def six_axis_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Today's arm, as a stranger would describe it."""
+    path = tmp_path_factory.mktemp("arm") / "mine.toml"
+    said = ('schema = "apo-bench/arm/1"', f'mjcf = "{ARMS / "six_axis.xml"}"', 'flange = "gripper"')
+    path.write_text("\n".join((*said, "home_deg = [0, 11.46, 51.57, 0, 26.93, 0]", "base = {at_mm = [-420, 0, 0]}")))
+    return path
+
+
+def test_what_is_measured_of_a_known_gripper_is_what_its_file_says(six_axis_file: Path) -> None:
+    """Slides of 47 mm and 40 N shared by two pads; its own drives are stiff, and kept.
+
+    Fingers at rest stand up to 20 um beside each other, and so does the middle between them.
+    """
+    arm, known = read_arm(six_axis_file), find_arm("six_axis")
+    assert arm.hand is not None
+    assert arm.control == "own position actuators"
+    assert arm.joints == known.joints
+    assert arm.mount == known.mount
+    assert arm.opening_m == pytest.approx(0.047, abs=2e-4)
+    assert arm.hand.force_n == pytest.approx(20.0, rel=0.01)
+    assert arm.hand.friction == 1.2
+    q = np.radians([10, 20, 50, 5, 30, 40])
+    mine, theirs = Kinematics(arm).forward(q), Kinematics(known).forward(q)
+    np.testing.assert_allclose(mine[:3, 3], theirs[:3, 3], atol=4e-5)
+    np.testing.assert_allclose(np.abs(mine[:3, :3]), np.abs(theirs[:3, :3]), atol=1e-5)
+
+
+def test_a_linkage_opens_as_its_geometry_says() -> None:
+    """Half of 85 mm: 30.6 + 57.1 sin(41.2 degrees - q) - 25.4 mm; the command is the angle of its drivers."""
+    hand = find_arm("ur5e_primitive").hand
+    assert hand is not None
+    length, angle = np.hypot(37.6, 43.0), np.arctan2(37.6, 43.0)
+    expected = 30.6 + length * np.sin(angle - hand.commands[:, 0]) - 25.4
+    np.testing.assert_allclose(1e3 * hand.opening, expected, atol=0.1)
+    assert hand.graded
+    for opening in (0.005, 0.02, 0.04):
+        assert hand.of_command(hand.command(opening)) == pytest.approx(opening, abs=1e-9)
+        assert hand.of_state(hand.state(opening)) == pytest.approx(opening, abs=1e-9)
+    assert 1e3 * np.ptp(hand.reach) == pytest.approx(length * (1 - np.cos(angle)), abs=0.5)
+
+
+@pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
+def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) -> None:
+    arm = find_arm(name)
+    kinematics, q = Kinematics(arm), np.array(arm.home)
+    home = kinematics.forward(q)
+    for shift in (0.1, -0.1, 0.0):
+        T = np.array(home)
+        T[1, 3] += shift
+        found = kinematics.inverse(T, q)
+        assert found is not None
+        np.testing.assert_allclose(kinematics.forward(found), T, atol=2e-5)
+        q = found
+    np.testing.assert_allclose(q, arm.home, atol=1e-3)
+
+
+def test_a_line_takes_as_long_as_the_joints_need() -> None:
+    arm = find_arm("ur5e_primitive")
+    kinematics, q = Kinematics(arm), np.array(arm.home)
+    end = kinematics.forward(q)
+    end[:3, 3] += (0.1, 0.2, -0.1)
+    line, most = smooth(kinematics.forward(q), end, 5.0), np.full(6, 0.5)
+    slower = within_speed(kinematics, line, q, most)
+    t = np.linspace(0.0, 1.0, 201)
+    path = along(kinematics, slower, slower.progress(t), q)
+    assert path is not None
+    fastest = np.abs(np.gradient(path, slower.seconds / 200, axis=0)).max()
+    assert fastest == pytest.approx(0.5, rel=0.02)
+    assert within_speed(kinematics, line, q, np.full(6, 50.0)) is line
+
+
+@pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
+def test_the_oracle_succeeds_with_the_arms_that_come_with_the_benchmark(name: str) -> None:
+    spec = TrialSettings("block_on_block", method="oracle", fidelity="contact", arm=name)
+    assert run_trial(spec)["success"]
+
+
+GOOD = 'schema = "apo-bench/arm/1"\nmjcf = "ARMS/ur5e_primitive.xml"\n'
+GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "the key 'schema' is missing"),
+        ('schema = "apo-bench/arm/9"\nmjcf = "a.xml"', "is needed"),
+        (GOOD + "joint = 1", "unknown key 'joint'; did you mean 'joints'"),
+        (GOOD + "payload_kg = -1", "payload_kg"),
+        (GOOD + "speed_deg_s = [0, 1]", "above 0"),
+        (GOOD + "[gripper]\nopen = [1]", "'open' and 'closed' are given together"),
+        ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"', "No such file"),
+        ('schema = "apo-bench/arm/1"\nmjcf = "broken.xml"', "MuJoCo cannot read this MJCF file of the arm"),
+        ('schema = "apo-bench/arm/1"\nmjcf = "meshes.xml"', r"the mesh file .*link.stl of the arm is missing"),
+        (GOOD + 'flange = "flnge"\n' + GRIPPER, "unknown flange 'flnge'; did you mean 'flange'"),
+        (GOOD + 'joints = ["joint1"]\n' + GRIPPER, "between base and flange lie joint1, joint2"),
+        (GOOD + "home_deg = [1, 2]\n" + GRIPPER, "'home_deg' has 2 numbers; the arm has 6 joints"),
+        (GOOD, "the gripper has no joint"),
+        (GOOD + GRIPPER + 'actuators = ["grab"]', "there is no actuator"),
+        (GOOD + GRIPPER + 'pads = ["left_pad", "nothing"]', "nothing that could touch a part is called"),
+        (GOOD + "base = { at_mm = [1900, 0, 0] }\n" + GRIPPER, "the tip does not reach"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "broken.xml").write_text("<mujoco><worldbody><geom/></worldbody>")
+    (tmp_path / "meshes.xml").write_text(
+        '<mujoco><asset><mesh file="link.stl"/></asset><worldbody><geom type="mesh" mesh="link"/></worldbody></mujoco>'
+    )
+    path = tmp_path / "arm.toml"
+    path.write_text(text.replace("ARMS", str(ARMS)))
+    with pytest.raises(InputError, match=words) as found:
+        read_arm(path)
+    assert "\n" not in str(found.value)
+
+
+def test_an_arm_can_be_given_as_a_file(six_axis_file: Path) -> None:
+    assert isinstance(find_arm(str(six_axis_file)), Arm)
+    assert find_arm(str(six_axis_file)).files[0] == six_axis_file
