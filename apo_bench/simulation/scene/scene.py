@@ -252,9 +252,6 @@ def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings
         room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **_ARM_WELD)
 
 
-<<<<<<< HEAD
-def _with_force_sensors(xml: str, scenario: Scenario) -> str:
-=======
 def _with_welds(xml: str, arm: Arm, welded: Mapping[str, Any]) -> str:
     """The ideal grasp of an arm that is put into the room later."""
     root = ElementTree.fromstring(xml)
@@ -267,7 +264,7 @@ def _with_welds(xml: str, arm: Arm, welded: Mapping[str, Any]) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _with_force_sensors(xml: str, scenario: Scenario, arm: Arm | None) -> str:
+def _with_force_sensors(xml: str, scenario: Scenario) -> str:
     """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
 
     PyMJCF's schema does not know contact sensors, so they are written into the finished text.
