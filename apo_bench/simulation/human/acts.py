@@ -41,6 +41,8 @@ class Act:
     """The moved parts that make contacts."""
     over: float
     """How high the part must be lifted so that what moves passes over what stands, [m]."""
+    drags: bool
+    """Whether it comes level, over a floor to which it has no play."""
     late: tuple[str, ...]
     """Parts that are displaced and now brought to their true places by the other hand."""
 
@@ -71,6 +73,7 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
         over=_over(scenario.assembly, operation.main, operation.moves, stages[k]),
+        drags=abs(way[2]) < 0.5 and _on_floor(scenario.assembly, what.after),
         late=late,
     )
 
@@ -86,6 +89,10 @@ def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
     if before.touched and abs(way[2]) < 0.5:
         return np.asarray(-before.line.travel_m * way)
     return _SIDE_M * _off(slide_directions(assembly, before, poses))
+
+
+def _on_floor(assembly: Assembly, found: Arrival) -> bool:
+    return any(each.normal[2] > 0.5 and not assembly.play(each.contact, 1.0) for each in found.touched)
 
 
 def _off(sides: tuple[Array, ...]) -> Array:

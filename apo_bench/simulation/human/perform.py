@@ -35,7 +35,7 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
     T = hands.grab(0, act.part)
     for part in act.carries:
         hands.add(0, part)
-    before, beside, goal = _ends(hands, act, T)
+    before, beside, goal = _ends(hands, act, T, clearance_m)
     if act.out.any():
         T = _free(hands, T, act.out, clearance_m)
     safe = max(_SAFE_M, act.over, before[2, 3])
@@ -61,13 +61,16 @@ def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
     return shifted(raised, out, 1.0)
 
 
-def _ends(hands: Hands, act: Act, T: Array) -> tuple[Array, Array, Array]:
-    """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go."""
-    goal = act.target
+def _ends(hands: Hands, act: Act, T: Array, clearance_m: float) -> tuple[Array, Array, Array]:
+    """Where the last motion begins, where it ends beside the goal, and the pose at which the part is let go.
+
+    Over a floor without play the part is held up by half the clearance, as friction would hold it back.
+    """
+    goal = target = shifted(act.target, UP, clearance_m / 2) if act.drags else act.target
     if act.from_above:
         goal = shifted(act.target, UP, _DROP_M + (_rise(hands, act, T) if act.carries else 0.0))
     beside = shifted(goal, act.aside, 1.0) if act.aside.any() else goal
-    return shifted(shifted(act.target, act.way, -act.travel), act.aside, 1.0), beside, goal
+    return shifted(shifted(target, act.way, -act.travel), act.aside, 1.0), beside, goal
 
 
 def _rise(hands: Hands, act: Act, T: Array) -> float:
