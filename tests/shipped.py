@@ -11,5 +11,5 @@ BOXES = (
     "vanished_fixture",
 )
 """The figures and examples of the paper."""
-TILTED = ("dovetail",)
+TILTED = ("dovetail", "wedge_under_roof")
 ROUND = ("l_bracket_on_plate", "nested_bushings", "peg_in_hole", "shaft_through_brackets")

@@ -67,6 +67,7 @@ TABLE = {
     "nested_bushings": [("S -> A", [DOWN]), ("S -> H", INTO), ("S -> H", INTO)],
     "peg_in_hole": [("S -> A", [DOWN]), ("S -> H", INTO)],
     "shaft_through_brackets": [("S -> A", [DOWN]), ("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
+    "wedge_under_roof": [("S -> A", [DOWN]), ("S -> F", [DOWN, "slide-to-contact +y", "slide-to-contact +x"])],
 }
 """Every operation of every example: state before and after, and the macros, directions in the frame of the assembly."""
 LENGTHS_MM = {
@@ -87,7 +88,7 @@ LENGTHS_MM = {
 TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 3): (2, 0, 4)}
 TURNING |= {("nested_bushings", 2): (1, 1, 4), ("nested_bushings", 3): (1, 1, 4)}
 """Of shafts, which turn in their bores, where the faces of the letter alone leave no turn."""
-SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "H": (0, 1, 5)}
+SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "F": (0, 6, 0), "H": (0, 1, 5)}
 
 
 def nominal(scenario: Scenario) -> Plan:
