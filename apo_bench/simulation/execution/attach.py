@@ -98,8 +98,8 @@ def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -
     """Off the floor by a hair, sideways until it touches, and down again.
 
     Args:
-        touched: Towards sides that it touches already, which it leaves by less: along one that it rubs on friction would
-            pass for the next.
+        touched: Towards sides that it touches already, which it leaves by less: along one that it rubs on friction
+            would pass for the next.
     """
     robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
     if touched:
