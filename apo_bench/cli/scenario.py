@@ -1,14 +1,19 @@
-"""The commands `apo-bench scenario list | card`: the scenarios that there are, and what one asks for."""
+"""The commands `apo-bench scenario list | card | new | check`: what there is, what one asks for, one of your own."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from apo_bench.cli.arguments import NO_RESULT, check_writable, path_given
 from apo_bench.cli.setting_options import ScenarioArgument
+from apo_bench.errors import InputError
 
-scenario = typer.Typer(add_completion=False, rich_markup_mode=None, help="Scenarios: list, task cards.")
+scenario = typer.Typer(
+    add_completion=False, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks."
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -50,3 +55,75 @@ def scenarios(
         list_scenarios()
     else:
         card(scenario)
+
+
+@scenario.command()
+def new(
+    more: Annotated[list[str] | None, typer.Argument(metavar="[PART]...", help="Further parts, after --parts.")] = None,
+    *,
+    out: Annotated[Path, typer.Option(help="The scenario file to write, .toml.", parser=path_given)],
+    poses: Annotated[
+        Path | None, typer.Option(help="Where every part is in the end: a file of [[pose]].", parser=path_given)
+    ] = None,
+    parts: Annotated[
+        list[str] | None, typer.Option(help="Part files; default: as named in --poses, beside it.")
+    ] = None,
+    assembly: Annotated[
+        Path | None,
+        typer.Option(help="A CAD file of several solids, in place of --parts and --poses.", parser=path_given),
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="Of --assembly, as in `part import`.")] = None,
+    up: Annotated[str, typer.Option(help="Which axis of the poses looks up: x, y, z, -x, -y or -z.")] = "z",
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option(help="A part that is never moved; may be given again. Default: the largest of the lowest."),
+    ] = None,
+    clearance: Annotated[float, typer.Option(help="Room per side of faces marked as fit, mm.")] = 0.25,
+) -> None:
+    """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
+    from apo_bench.drafting.assembly_file import import_assembly
+    from apo_bench.drafting.draft import draft
+    from apo_bench.drafting.posed import on_the_table, read_posed
+    from apo_bench.drafting.writing import scenario_text
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.draft_text import draft_lines
+
+    check_writable(out, "--out", (".toml",))
+    if not 0.0 <= clearance <= 5.0:
+        raise InputError(f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
+    named = [*(parts or []), *(more or [])]
+    if assembly is not None:
+        if poses is not None or named:
+            raise InputError("--assembly was given with --parts or --poses; give one or the other.")
+        poses, said = import_assembly(assembly, out.with_name(f"{out.stem}_parts"), unit)
+        typer.echo("\n".join([*said, f"Wrote {poses} and its parts"]))
+    elif poses is None:
+        raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
+    made = draft(on_the_table(read_posed(poses, named), up), fixed or (), clearance)
+    source = str((assembly or poses).name)
+    out.write_text(scenario_text(made, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
+    typer.echo("\n".join(draft_lines(made)))
+    load_scenario(out)
+    typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {out}")
+
+
+@scenario.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="A scenario file.", parser=path_given)],
+    seeds: Annotated[int, typer.Option(help="Trials in which the robot knows the truth.")] = 5,
+    fidelity: Annotated[str, typer.Option(help="Of these trials: full, or contact.")] = "full",
+) -> None:
+    """Say whether human and robot can do a scenario, and which line of its file to change if not."""
+    from apo_bench.drafting.checking import Finding, check_file
+    from apo_bench.records.settings import check as check_setting
+    from apo_bench.show.draft_text import finding_line
+
+    if not 0 <= seeds <= 1000:
+        raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")
+    check_setting("fidelity", fidelity)
+
+    def say(found: Finding) -> None:
+        typer.echo(finding_line(found))
+
+    if not all(found.ok for found in check_file(file, seeds, fidelity, say)):
+        raise typer.Exit(NO_RESULT)

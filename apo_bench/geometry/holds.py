@@ -24,8 +24,9 @@ _FINGER_M, _ROOM_M = 0.012, 0.012
 """How thick a finger is; how far it stands off before it closes."""
 _PALM_M, _OVER_M = 0.060, 0.0115
 """A part reaches at most so far up beside the tips, which are at least so high above what it stands on."""
-_RAY_M, _FLAT_M, _LINE_M = 0.003, 1e-4, 0.003
-"""Rays are so far apart; surfaces so deep behind the outermost one are pressed, too; and so long at least."""
+_RAY_M, _FINE_M, _FLAT_M, _LINE_M = 0.003, 0.001, 1e-4, 0.003
+"""Rays are so far apart, and rows of them so where that finds nothing, as on a thin flange; surfaces so deep behind the
+outermost one are pressed, too; and so long at least."""
 _ROUNDING_M = 1e-6
 _LEVEL = 1e-3
 _HEIGHT = 0.65
@@ -115,6 +116,11 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
 @lru_cache(maxsize=64)
 def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float) -> tuple[Hold, ...]:
     up = np.array(vertical)
+    return _found(solid, up, opening_m, _RAY_M) or _found(solid, up, opening_m, _FINE_M)
+
+
+def _found(solid: Solid, up: Array, opening_m: float, ray_m: float) -> tuple[Hold, ...]:
+    """With rows of rays so far apart, [m]."""
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
     found: list[tuple[float, int, Hold]] = []
@@ -123,7 +129,7 @@ def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float) -> tuple
         low, high = extent(solid.pieces, along)
         t = _lines(low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _LEVEL])
         level = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _LEVEL]
-        rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level))
+        rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level, ray_m))
         tips = _lines(bottom, max(top, best), [best])
         for tip in tips[(tips >= bottom + _OVER_M) & (tips >= top - _PALM_M)]:
             for place in t:
@@ -161,10 +167,10 @@ def _level_axes(up: Array) -> tuple[Array, Array]:
     return x, np.cross(up, x)
 
 
-def _lines(low: float, high: float, also: Sequence[float]) -> Array:
+def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M) -> Array:
     """Places from one end to the other, the middle among them, just inside, and some more."""
     middle, reach = (low + high) / 2, (high - low) / 2 - 1e-6
-    n = max(4, int(np.ceil(reach / _RAY_M)))
+    n = max(4, int(np.ceil(reach / ray_m)))
     return np.unique(np.round(np.append(middle + np.linspace(-reach, reach, 2 * n + 1), also), 9))
 
 

@@ -1,0 +1,51 @@
+"""A CAD file of several solids becomes part files and a file of poses beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.cad.importing import import_part, part_name, raw_solids
+from apo_bench.drafting.posed import free_name
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+POSES = "poses.toml"
+
+
+def import_assembly(file: Path, folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
+    """Write the parts of an assembly, each shape once, and where every copy of them is.
+
+    Returns:
+        The file of poses, and what was imported, one sentence each.
+
+    Raises:
+        InputError: The file cannot be read, a solid makes no part, or there is only one.
+    """
+    _, raws = raw_solids(file, unit)
+    if sum(len(raw.poses) for raw in raws) < 2:
+        raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
+    folder.mkdir(parents=True, exist_ok=True)
+    tables, said, used, copies = list[str](), list[str](), set[str](), set[str]()
+    for raw in raws:
+        called = free_name(part_name(raw.name), used)
+        used.add(called)
+        done = import_part(raw, called, folder, f"{file.name}, {raw.name}")
+        said.append(f"{called}: {len(done.solid.faces)} flat and {len(done.solid.rounds)} round faces")
+        said += [f"{called}.{face} can make no contact: {why}" for face, why in done.refused.items()]
+        for T in raw.poses:
+            name = free_name(called, copies)
+            copies.add(name)
+            tables.append(_table(called, name, T))
+    written = folder / POSES
+    written.write_text(f"# The parts of {file.name}, in its frame.\n" + "".join(tables), encoding="utf-8")
+    return written, tuple(said)
+
+
+def _table(part: str, name: str, T: Array) -> str:
+    """One copy of a part; [mm]."""
+    packed = pose.pack(T)
+    at, turn = (", ".join(f"{x:.12g}" for x in np.asarray(v) + 0.0) for v in (packed[:3], packed[3:]))
+    return f'\n[[pose]]\npart = "{part}"\nname = "{name}"\nat_mm = [{at}]\nquaternion_wxyz = [{turn}]\n'

@@ -1,0 +1,181 @@
+"""In which order parts can be put together: the finished assembly is taken apart in thought, and read backwards.
+
+A part can go if a straight way out of all its contacts is free, also for the hand above it, and if the part, put back,
+would rest on what is left. Where no part can go alone, parts that hold together go as one: they are put together
+beside the assembly first, on the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact, Operation
+from apo_bench.drafting.posed import TABLE
+from apo_bench.drafting.standing import stance
+from apo_bench.drafting.touching import found_contacts
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.drop import drop
+from apo_bench.geometry.solid import Solid, extent
+from apo_bench.insertion.arrival import arrive
+from apo_bench.prediction.stability import BALANCED, imbalance
+
+_FALLS_M = 7e-4
+"""What hangs in a hole falls by its play."""
+_MOST_LOOKS = 4000
+"""Sets of parts that are looked at before the search ends."""
+_LARGEST_GROUP = 4
+
+
+class Placing(NamedTuple):
+    """One operation of the order that was found."""
+
+    moves: tuple[str, ...]
+    """The main part first."""
+    contacts: tuple[Contact, ...]
+    """Of what moves, in this order, on what rests."""
+    at: Array
+    """(4, 4), where the main part goes, frame of the assembly, [m]."""
+    why: str
+    """In words: how it comes, what carries it."""
+
+
+@final
+@dataclass
+class Search:
+    """The search for an order, and what it learned on its way."""
+
+    solids: Mapping[str, Solid]
+    """All of them, the table too."""
+    poses: Poses
+    contacts: tuple[Contact, ...]
+    aside: Array
+    """(3,): where a sub-assembly is put together, from its place in the assembly, level, [m]."""
+    failed: set[frozenset[str]] = field(default_factory=set)
+    stuck: dict[str, str] = field(default_factory=dict)
+    """Part -> why it could not go, the last time that was asked."""
+    looks: int = 0
+
+    def order(self, fixed: frozenset[str]) -> tuple[Placing, ...] | None:
+        """The operations that put all parts where they belong; None if there is no such order."""
+        return self._without(frozenset(self.solids), fixed | {TABLE})
+
+    def _without(self, there: frozenset[str], base: frozenset[str]) -> tuple[Placing, ...] | None:
+        """The order in which `there` comes about, `base` being there already."""
+        if there == base:
+            return ()
+        if there in self.failed or self.looks > _MOST_LOOKS:
+            return None
+        self.looks += 1
+        for placing in self._leaving(there, base):
+            before = self._without(there - set(placing.moves), base)
+            if before is not None:
+                return (*before, *self._together(placing), placing)
+        self.failed.add(there)
+        return None
+
+    def _together(self, placing: Placing) -> tuple[Placing, ...]:
+        return () if len(placing.moves) == 1 else self._beside(placing.moves) or ()
+
+    def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
+        """What can be taken off, what comes straight up from the top first; groups only where no part can."""
+        free = [part for part in self.solids if part in there - base]
+        single = [placing for part in free if (placing := self._leaves((part,), there)) is not None]
+        yield from sorted(single, key=self._late)
+        if single:
+            return
+        for size in range(2, min(_LARGEST_GROUP, len(free)) + 1):
+            for group in combinations(sorted(free, key=lambda part: -self.solids[part].volume), size):
+                if self._hangs_together(group):
+                    placing = self._leaves(group, there)
+                    if placing is not None and self._beside(group) is not None:
+                        yield placing
+
+    def _late(self, placing: Placing) -> tuple[float, ...]:
+        """What is put in last: from above before from the side, the highest first."""
+        part = placing.moves[0]
+        low, _ = extent(self.solids[part].pieces, self.poses[part][2, :3])
+        return (
+            "from above" not in placing.why,
+            -round(low + float(self.poses[part][2, 3]), 4),
+            self.solids[part].volume,
+        )
+
+    def _leaves(self, moves: Sequence[str], there: frozenset[str]) -> Placing | None:
+        """How parts come to their places last of all that are there; None if they cannot."""
+        rest = [part for part in self.solids if part in there and part not in moves]
+        return self._placed(moves, rest, self.poses, self.contacts)
+
+    def _placed(
+        self, moves: Sequence[str], rest: Sequence[str], poses: Poses, contacts: tuple[Contact, ...]
+    ) -> Placing | None:
+        main = moves[0]
+        made = tuple(_from(contact, moves) for contact in contacts if _between(contact, moves, rest))
+        if not made:
+            self.stuck[main] = f"'{main}' touches nothing that would be there before it"
+            return None
+        sub = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
+        falls = min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
+        if falls > _FALLS_M:
+            self.stuck[main] = f"nothing is below '{main}' that would carry it"
+            return None
+        if imbalance(sub, Operation(main, made, tuple(moves[1:])), poses) > BALANCED:
+            self.stuck[main] = f"'{main}' would not keep its balance on what is there before it"
+            return None
+        found = arrive(sub, moves, made, poses)
+        if not found.free:
+            others = ", ".join(dict.fromkeys(of.part for contact in made for of in contact if of.part in rest))
+            self.stuck[main] = f"no straight way leads '{main}' out of {others}"
+            return None
+        way = poses[main][:3, :3] @ found.line.direction
+        words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else f"along ({_said(way)})"
+        on = ", ".join(dict.fromkeys(of.part for contact in made for of in contact if of.part in rest))
+        return Placing(tuple(moves), made, poses[main], f"comes {words}, onto {on}")
+
+    def _beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
+        """How a group is put together beside the assembly, its main part on the table."""
+        main = group[0]
+        stands = stance(self.solids[main], self.poses[main][:3, :3])
+        if not stands.stands or stands.rolls:
+            self.stuck[main] = f"'{main}' does not stand alone, so nothing can be put into it beside the assembly"
+            return None
+        shift = pose.at(self.aside + np.array([0.0, 0.0, stands.height_m - float(self.poses[main][2, 3])]))
+        poses = {part: shift @ self.poses[part] for part in group} | {TABLE: self.poses[TABLE]}
+        solids = {part: self.solids[part] for part in (*group, TABLE)}
+        inner = Search(solids, poses, found_contacts(solids, poses), self.aside)
+        first = inner._placed((main,), (TABLE,), poses, inner.contacts)
+        if first is None:
+            return None
+        rest = inner._without(frozenset(solids), frozenset((main, TABLE)))
+        return None if rest is None else (first, *rest)
+
+    def _hangs_together(self, group: Sequence[str]) -> bool:
+        known = {group[0]}
+        for _ in group:
+            for a, b in (
+                {of.part for of in contact} for contact in self.contacts if len({of.part for of in contact}) == 2
+            ):
+                if {a, b} <= set(group) and known & {a, b}:
+                    known |= {a, b}
+        return known == set(group)
+
+
+def _between(contact: Contact, moves: Sequence[str], rest: Sequence[str]) -> bool:
+    a, b = (of.part for of in contact)
+    return (a in moves and b in rest) or (b in moves and a in rest)
+
+
+def _from(contact: Contact, moves: Sequence[str]) -> Contact:
+    """The contact with the face of what moves first."""
+    a, b = contact
+    return contact if a.part in moves else Contact(b, a)
+
+
+def _said(way: Array) -> str:
+    return ", ".join(f"{x:.3g}" for x in np.round(way, 3) + 0.0)

@@ -1,0 +1,108 @@
+"""Parts at their final poses, read from a file of poses: one table per copy of a part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Solid, world_bounds
+from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.parts import load_part, part_path
+from apo_bench.parts.allowed import FACE_OR_PART_NAME
+
+TABLE = "table"
+_TAKEN = (TABLE, "arm")
+"""What a part of the scenario cannot be called: these are there already."""
+_MOST = 49
+UPS = {"x": (0, 1), "y": (1, 1), "z": (2, 1), "-x": (0, -1), "-y": (1, -1), "-z": (2, -1)}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PosedPart:
+    """One copy of a part, where it is in the finished assembly."""
+
+    name: str
+    file: Path
+    solid: Solid
+    T: Array
+    """(4, 4), in the frame of the assembly, [m]."""
+    color: tuple[float, float, float] | None = None
+
+
+def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
+    """Every copy of a part that a file of poses names.
+
+    Args:
+        files: Part files, or names of parts of the package. What is not among them is looked for beside the poses.
+
+    Raises:
+        InputError: A file cannot be read, a part is missing, or has no pose.
+    """
+    root = read_toml(poses, "file of poses")
+    nodes = root.fields(("pose",))["pose"].items("pose")
+    given = {part_path(file).stem: part_path(file) for file in files}
+    solids: dict[Path, Solid] = {}
+    found: list[PosedPart] = []
+    for node in nodes:
+        found.append(_posed(node, given, poses.parent, solids, {each.name for each in found}))
+    if not 2 <= len(found) <= _MOST:
+        raise InputError(f"{poses}: {len(found)} poses were given; 2 to {_MOST} parts make an assembly.")
+    left = [name for name, file in given.items() if file not in solids]
+    if left:
+        raise InputError(f"{poses}: '{left[0]}' has no pose; add [[pose]] part = \"{left[0]}\", or leave the part out.")
+    return tuple(found)
+
+
+def _posed(
+    node: JsonNode, given: dict[str, Path], folder: Path, solids: dict[Path, Solid], used: set[str]
+) -> PosedPart:
+    keys = node.fields(("part", "at_mm"), ("name", "quaternion_wxyz", "color"))
+    part = keys["part"].text()
+    name = keys["name"].text() if "name" in keys else part
+    file = given.get(part, folder / f"{part}.xml")
+    if file not in solids:
+        solids[file] = load_part(file)
+    name = free_name(name, used)
+    if not FACE_OR_PART_NAME.fullmatch(name):
+        keys.get("name", keys["part"]).fail("a letter, then letters, digits and underscores are needed")
+    T = np.eye(4)
+    if "quaternion_wxyz" in keys:
+        T = pose.unpack(np.concatenate([np.zeros(3), keys["quaternion_wxyz"].quaternion()]))
+    T[:3, 3] = 1e-3 * keys["at_mm"].numbers(3)
+    color = None
+    if "color" in keys:
+        r, g, b = (float(x) for x in np.clip(keys["color"].numbers(3), 0.0, 1.0))
+        color = (r, g, b)
+    return PosedPart(name, file, solids[file], T, color)
+
+
+def free_name(name: str, used: set[str]) -> str:
+    """The name, or one that nothing else has."""
+    free, n = name, 2
+    while free in used or free in _TAKEN:
+        free, n = f"{name}_{n}", n + 1
+    return free
+
+
+def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
+    """The same assembly, upright, its lowest point on the table, the middle of the box around it over the origin.
+
+    Args:
+        up: The axis of the poses that looks up, of `UPS`.
+    """
+    if up not in UPS:
+        raise InputError(f"--up {up} was given; {', '.join(UPS)} are allowed.")
+    axis, sign = UPS[up]
+    turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])
+    low, high = world_bounds([(each.solid, turned @ each.T) for each in parts])
+    shift = pose.at([-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])
+    return tuple(PosedPart(each.name, each.file, each.solid, shift @ turned @ each.T, each.color) for each in parts)

@@ -1,0 +1,179 @@
+"""A draft as the text of a scenario file, with a comment for each choice."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.assembly.topology import Contact
+from apo_bench.drafting.draft import Draft
+from apo_bench.drafting.ordering import Placing
+from apo_bench.drafting.posed import TABLE, PosedPart
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.holds import Hold
+from apo_bench.parts import part_names, part_path
+from apo_bench.records.thresholds import Thresholds
+
+_WIDTH = 118
+_LEVEL = 1e-9
+_JUDGE = {
+    "fit_margin_mm": "gap of parts that fit beyond their play",
+    "support_mm": "gap of other contacts",
+    "overlap_fraction": "share of the true overlap that must be covered",
+    "penetration_mm": "depth of one part in another",
+    "pushed_mm": "displacement of a corner after its part was put down",
+    "rest_mm_s": "speed below which a part is at rest",
+    "rest_deg_s": "turning speed below which a part is at rest",
+    "loose_gap_mm": "gap of the loose verdict",
+    "loose_angle_deg": "angle of the loose verdict",
+}
+"""Thresholds, and what each is of; all as in the scenarios of the package."""
+
+
+def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
+    """The file.
+
+    Args:
+        source: What the poses were read from, in words.
+        folder: Of the file; part files are named relative to it.
+    """
+    lines = [
+        f"# Written by `apo-bench scenario new` from {source}. Every choice may be changed; `scenario check` says what",
+        "# of it human and robot can do. Lengths in mm, angles in degrees. A goal is the pose of the moved part in the",
+        "# frame of the assembly, which [site] puts somewhere on the table; a start is a pose in the world.",
+        *(f"# NOTE: {note}." for note in draft.notes),
+        "schema = 1",
+        f"title = {_quoted(title)}",
+        'human = "Puts the parts together in this order."',
+        'success = "Every part is where the CAD file has it."',
+        f"clearance_mm = {draft.clearance_mm:g}  # room per side of faces that part files mark as fit",
+        "gap_mm = 0.1  # below this gap a contact equation counts as solved",
+        "",
+        f"[parts.{TABLE}]",
+        f'file = "{TABLE}"',
+        "fixed = true",
+    ]
+    for each in draft.parts:
+        lines += ["", *_part(draft, each, folder)]
+    for placing in draft.order:
+        lines += ["", *_operation(draft, placing)]
+    x, y = (1e3 * c for c in draft.site.center_m)
+    a, b = (1e3 * s for s in draft.site.spread_m)
+    lines += [
+        "",
+        "[site]  # each trial puts the assembly elsewhere: in reach, clear of what waits beside it",
+        f"center_mm = [{_n(x)}, {_n(y)}]",
+        f"spread_mm = [{_n(a)}, {_n(b)}]",
+        f"yaw_deg = [{_n(-draft.site.yaw_deg)}, {_n(draft.site.yaw_deg)}]",
+        "",
+        "[judge]  # as in the scenarios of the package",
+        *(f"{name} = {getattr(Thresholds(), name):g}  # {means}" for name, means in _JUDGE.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _part(draft: Draft, each: PosedPart, folder: Path) -> Iterator[str]:
+    yield f"[parts.{each.name}]"
+    yield f"file = {_quoted(_file_key(each.file, folder))}"
+    if each.color is not None:
+        yield "color = [" + ", ".join(f"{c:.3g}" for c in each.color) + "]"
+    if each.name in draft.fixed:
+        yield f"fixed = true  # {draft.why_fixed}"
+        yield "follows_site = true  # it stands where the assembly stands"
+        yield f"start = {_pose(draft.starts[each.name])}"
+        return
+    stands = draft.stances[each.name]
+    why = "stands as in the assembly"
+    if not stands.stands:
+        why = "NEEDS TURNING OVER: it does not stand like this"
+    elif stands.rolls:
+        why = "as in the assembly; it may roll"
+    yield f"start = {_pose(draft.starts[each.name])}  # {why}"
+
+
+def _operation(draft: Draft, placing: Placing) -> Iterator[str]:
+    main = placing.moves[0]
+    yield f"[[operations]]  # {placing.why}"
+    yield f'move = "{main}"'
+    if placing.moves[1:]:
+        yield "carries = [" + ", ".join(f'"{part}"' for part in placing.moves[1:]) + "]  # they hold together"
+    yield f"goal = {_pose(placing.at)}"
+    yield from _contacts(placing.contacts, main)
+    yield from _grasp(draft.grasps[main], main, draft)
+
+
+def _contacts(contacts: Sequence[Contact], main: str) -> Iterator[str]:
+    pairs = [f'["{m.face if m.part == main else m}", "{e}"]' for m, e in contacts]
+    line = f"contacts = [{', '.join(pairs)}]"
+    if len(line) <= _WIDTH:
+        yield line
+        return
+    yield "contacts = ["
+    yield from (f"    {pair}," for pair in pairs)
+    yield "]"
+
+
+def _grasp(hold: Hold | None, main: str, draft: Draft) -> Iterator[str]:
+    solid = next(each.solid for each in draft.parts if each.name == main)
+    low, high = solid.bounds
+    if hold is None:
+        R = draft.starts[main][:3, :3]
+        widths = [float(np.ptp([solid.bounds @ axis for axis in (R.T @ e,)])) for e in np.eye(3)[:2]]
+        across = R.T @ np.eye(3)[int(np.argmin(widths))]
+        at = np.clip(solid.centroid, low, high)
+        yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(across)} }}  # TOO WIDE for the gripper"
+    elif ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
+        yield "# grasp: found from the shape; the tips end above the part, which is flat"
+    else:
+        at = np.clip(hold.point, low, high)
+        wide = f"{2e3 * hold.half_width:.4g} mm"
+        yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(hold.across)} }}  # {wide} between the fingers"
+
+
+def _file_key(file: Path, folder: Path) -> str:
+    """How a scenario in a folder names a part file."""
+    if file.stem in part_names() and part_path(file.stem) == file:
+        return file.stem
+    return Path(os.path.relpath(file, folder)).as_posix()
+
+
+def _pose(T: Array) -> str:
+    turn = turn_deg(T[:3, :3])
+    turned = f", turn_deg = {_list(turn)}" if np.abs(turn).max() > 0.0 else ""
+    return f"{{ at_mm = {_list(1e3 * T[:3, 3])}{turned} }}"
+
+
+def turn_deg(R: Array) -> Array:
+    """The turns about the fixed x, then y, then z axis that make a rotation, (3,), [degrees]."""
+    down = float(np.hypot(R[0, 0], R[1, 0]))
+    y = np.arctan2(-R[2, 0], down)
+    if down > 1e-9:
+        x, z = np.arctan2(R[2, 1], R[2, 2]), np.arctan2(R[1, 0], R[0, 0])
+    else:
+        x, z = np.arctan2(-R[1, 2], R[1, 1]), 0.0
+    found = np.degrees([x, y, z])
+    near = 90.0 * np.round(found / 90.0)
+    return np.where(np.abs(found - near) < 1e-7, near, found) + 0.0
+
+
+def _axis(axis: Array) -> str:
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        if abs(axis @ unit) > 1.0 - 1e-12:
+            return f'"{name}"'
+    return _list(axis)
+
+
+def _list(values: Array) -> str:
+    return "[" + ", ".join(_n(float(x)) for x in values) + "]"
+
+
+def _n(x: float) -> str:
+    """Without digits below a nanometre."""
+    return f"{round(x, 8) + 0.0:.12g}"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -1,0 +1,250 @@
+"""Assemblies of three to eight parts with random dimensions, from parts and poses to success rates without a hand.
+
+`python benchmarks/generated.py FOLDER [--assemblies 10] [--seeds 20]` writes the part files and poses of each, makes a
+scenario, checks it (five trials in which the robot knows the truth), and runs `contact` at 1 mm and 1 degree. Plates,
+pins, bushes, brackets, covers, slots and rings; lengths in mm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.drafting.checking import check_file
+from apo_bench.drafting.draft import draft
+from apo_bench.drafting.posed import on_the_table, read_posed
+from apo_bench.drafting.writing import scenario_text
+from apo_bench.parts.making import Body, Step, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
+from apo_bench.records.settings import TrialSettings
+from apo_bench.trial.scene import scene_of
+from apo_bench.trial.trial import run_trial
+
+DENSITY = 700.0
+
+
+class Place(NamedTuple):
+    """Where a copy of a part is in the end."""
+
+    part: str
+    name: str
+    at_mm: tuple[float, float, float]
+    quaternion_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+class Assembled(NamedTuple):
+    """An assembly as a CAD program would have it."""
+
+    parts: Mapping[str, Body]
+    places: tuple[Place, ...]
+
+
+def generated(seed: int) -> Assembled:
+    """One assembly; the same for the same seed."""
+    rng = np.random.default_rng([seed, 18])
+    return FAMILIES[seed % len(FAMILIES)](lambda low, high: round(float(rng.uniform(low, high)), 1), rng)
+
+
+Between = Callable[[float, float], float]
+
+
+def pinned(between: Between, rng: np.random.Generator) -> Assembled:
+    """A plate, two or three pins through it, a cover over them."""
+    width, depth, thick, r = between(84, 110), between(46, 60), between(14, 20), between(3.5, 5.5)
+    play, cover = between(0.2, 0.4), between(9, 13)
+    length = round(thick + cover + between(14, 22), 1)
+    xs = [-width / 2 + 16, width / 2 - 16] + ([0.0] if rng.uniform() < 0.5 else [])
+    ys = [0.0, 0.0, round(depth / 2 - 14, 1)]
+    at = list(zip(xs, ys, strict=False))
+
+    def plate(w: float, d: float, h: float, radius: float) -> Body:
+        bores = [bore(xy, radius, 0, h, f"bore_{i}") for i, xy in enumerate(at, start=1)]
+        return extrude(rectangle(w, d), 0, h, bores=bores, bottom="bottom", top="top")
+
+    pin = shaft(r, 0, length, "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head")
+    parts = {
+        "plate": plate(width, depth, thick, r + play),
+        "pin": pin,
+        "cover": plate(width - 4, depth - 4, cover, r + play),
+    }
+    pins = [Place("pin", f"pin_{i}", (x, y, 0)) for i, (x, y) in enumerate(at, start=1)]
+    return Assembled(parts, (Place("plate", "plate", (0, 0, 0)), *pins, Place("cover", "cover", (0, 0, thick))))
+
+
+def bushed(between: Between, rng: np.random.Generator) -> Assembled:
+    """A block, two bushes with a flange in it, a pin with a head in each."""
+    width, thick, r = between(90, 110), between(24, 32), between(4, 5.5)
+    outer, play, flange = round(r + between(5, 7), 1), between(0.2, 0.4), between(4, 6)
+    bores = [bore((x, 0), outer + play, 0, thick, f"bore_{i}") for i, x in enumerate((-width / 4, width / 4), start=1)]
+    block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
+    inner = [Step(0, thick + flange, r + play, name="bore")]
+    walls = [Step(0, thick, outer, name="side"), Step(thick, thick + flange, outer + 4, name="rim")]
+    bush = turned(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
+    long, head = thick + flange - 2, between(12, 16)
+    pin = turned(
+        [Step(0, long, r, name="side"), Step(long, long + head, r + 3, name="grip")],
+        flats={0.0: "tip", long: "ledge", long + head: "head"},
+    )
+    places = [Place("block", "block", (0, 0, 0))]
+    for i, x in enumerate((-width / 4, width / 4), start=1):
+        places += [Place("bush", f"bush_{i}", (x, 0, 0)), Place("pin", f"pin_{i}", (x, 0, 2))]
+    return Assembled({"block": block, "bush": bush, "pin": pin}, tuple(places))
+
+
+def bracketed(between: Between, rng: np.random.Generator) -> Assembled:
+    """Two brackets on the pegs of a plate, a shaft through both."""
+    thick, play, far, r = between(12, 16), between(0.2, 0.35), between(30, 40), 2.0 * float(rng.integers(3, 5))
+    high, peg, width = between(34, 42), between(3, 4), between(34, 40)
+    plate = extrude(rectangle(150, width + 20), 0, thick, bottom="bottom", top="top")
+    pegs = [
+        shaft(peg, thick, thick + 12, "peg", chamfer_high=1).moved((x, y, 0)).prefixed(f"p{i}_")
+        for i, (x, y) in enumerate([(s * (far + 20), t * 9.0) for s in (-1, 1) for t in (-1, 1)], start=1)
+    ]
+    holes = [bore((20 - 25, t * 9.0), peg + play, 0, 10, f"hole_{i}") for i, t in enumerate((-1, 1), start=1)]
+    foot = extrude(rectangle(50, width), 0, 10, bores=holes, bottom="bottom", top="tread")
+    wall = extrude(
+        rectangle(high + r + 12 - 10, width, (-(high + r + 12 + 10) / 2, 0)),
+        0,
+        12,
+        bores=[bore((-high, 0), r + play, 0, 12, "bore")],
+        bottom="wx",
+        top="wn",
+    )
+    bracket = join(foot, wall.moved(turn_deg=(0, 90, 0)).moved((-25, 0, 0)))
+    length = round(2 * far + 24 + between(10, 20), 1)
+    head = extrude(rectangle(2 * r, 2 * r), -22, 0, bottom="end")
+    rod = join(head, shaft(r, 0, length, "side", chamfer_high=1, top="tip")).moved(turn_deg=(0, 90, 0))
+    half = (0.0, 0.0, 0.0, 1.0)
+    places = (
+        Place("plate", "plate", (0, 0, 0)),
+        Place("bracket", "bracket_1", (far + 25, 0, thick)),
+        Place("bracket", "bracket_2", (-far - 25, 0, thick), half),
+        Place("rod", "rod", (-far - 14, 0, thick + high)),
+    )
+    return Assembled({"plate": join(plate, *pegs), "bracket": bracket, "rod": rod}, places)
+
+
+def slotted(between: Between, rng: np.random.Generator) -> Assembled:
+    """A base with a slot, a key in it, pins in the key, rings over the pins."""
+    wide, deep, length, r = between(24, 32), between(10, 14), between(70, 90), between(3.5, 5)
+    side, floor, play = between(14, 20), between(10, 14), between(0.2, 0.35)
+    w, out, top = wide / 2, wide / 2 + side, floor + deep
+    section = polygon(
+        (-out, 0), (out, 0), (out, top), (w, top), (w, floor), (-w, floor), (-w, top), (-out, top),
+        names={0: "bottom", 3: "slot_p", 4: "floor", 5: "slot_n"},
+        fit=("slot_p", "floor", "slot_n"),
+    )  # fmt: skip
+    base = extrude(section, -length / 2, length / 2).moved(turn_deg=(90, 0, 90))
+    high = round(deep + between(8, 12), 1)
+    xs = (-length / 4, length / 4)
+    blind = [bore((x, 0), r + play, 0, high, f"bore_{i}") for i, x in enumerate(xs, start=1)]
+    key = extrude(
+        rectangle(length, wide, names=("ny", "px", "py", "nx")), 0, high, bores=blind, bottom="bottom", top="top"
+    )
+    pin = shaft(
+        r, 0, round(high + between(24, 30), 1), "side", chamfer_low=0.5, chamfer_high=1, bottom="tip", top="head"
+    )
+    thick = between(10, 14)
+    ring = turned(
+        [Step(0, thick, r + between(6, 8), name="side")],
+        [Step(0, thick, r + play, name="bore")],
+        flats={0.0: "bottom", thick: "top"},
+    )
+    places = [Place("base", "base", (0, 0, 0)), Place("key", "key", (0, 0, floor))]
+    places += [Place("pin", f"pin_{i}", (x, 0, floor)) for i, x in enumerate(xs, start=1)]
+    places += [Place("ring", f"ring_{i}", (x, 0, floor + high)) for i, x in enumerate(xs, start=1)]
+    return Assembled({"base": base, "key": key, "pin": pin, "ring": ring}, tuple(places[: 4 + int(rng.integers(0, 3))]))
+
+
+def stacked(between: Between, rng: np.random.Generator) -> Assembled:
+    """A foot with a post, rings and plates over it, a cap on top."""
+    r, play, thick = between(7, 9), between(0.2, 0.4), between(12, 16)
+    count, heights = int(rng.integers(2, 4)), [between(12, 18) for _ in range(3)]
+    post = thick + sum(heights[:count]) + 8
+    foot = join(
+        extrude(rectangle(between(90, 110), between(70, 90)), 0, thick, bottom="bottom", top="top"),
+        shaft(r, thick, post, "post", chamfer_high=1.5, top="end"),
+    )
+    parts: dict[str, Body] = {"foot": foot}
+    places, z = [Place("foot", "foot", (0, 0, 0))], thick
+    for i, h in enumerate(heights[:count], start=1):
+        hole = [bore((0, 0), r + play, 0, h, "bore")]
+        parts[f"plate_{i}"] = extrude(
+            rectangle(between(50, 64), between(40, 50)), 0, h, bores=hole, bottom="bottom", top="top"
+        )
+        places.append(Place(f"plate_{i}", f"plate_{i}", (0, 0, round(z, 1))))
+        z += h
+    inner = [Step(0, 10, r + play, name="bore")]
+    parts["cap"] = turned([Step(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"})
+    places.append(Place("cap", "cap", (0, 0, round(z, 1))))
+    return Assembled(parts, tuple(places))
+
+
+FAMILIES = (pinned, bushed, bracketed, slotted, stacked)
+
+
+def write(made: Assembled, folder: Path) -> Path:
+    """Part files and poses; returns the file of poses."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, body in made.parts.items():
+        write_part(name, body, folder, density=DENSITY, source="benchmarks/generated.py", licence="CC0-1.0")
+    tables = [
+        f'[[pose]]\npart = "{p.part}"\nname = "{p.name}"\nat_mm = {list(p.at_mm)}\n'
+        f"quaternion_wxyz = {list(p.quaternion_wxyz)}\n"
+        for p in made.places
+    ]
+    path = folder / "poses.toml"
+    path.write_text("\n".join(tables), encoding="utf-8")
+    return path
+
+
+def scenario_of(seed: int, folder: Path) -> Path:
+    """The scenario file of one assembly, made without a hand."""
+    poses = write(generated(seed), folder)
+    path = folder / f"generated_{seed}.toml"
+    made = draft(on_the_table(read_posed(poses)))
+    path.write_text(scenario_text(made, f"Generated assembly {seed}", poses.name, folder), encoding="utf-8")
+    return path
+
+
+def rate(path: Path, method: str, seeds: int, fidelity: str) -> tuple[int, int]:
+    """How many trials at 1 mm and 1 degree are right, of how many that count."""
+    asked = [TrialSettings(str(path), method=method, seed=seed, fidelity=fidelity) for seed in range(seeds)]
+    scene = scene_of(asked[0]) if asked else None
+    rows = [run_trial(each, scene) for each in asked]
+    counted = [row["success"] for row in rows if row["success"] is not None]
+    return sum(map(bool, counted)), len(counted)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--assemblies", type=int, default=10)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--fidelity", default="full")
+    asked = parser.parse_args()
+    print("| assembly | family | parts | checked | contact at 1 mm | seconds |\n|---|---|---|---|---|---|", flush=True)
+    for seed in range(asked.first, asked.first + asked.assemblies):
+        begun = time.monotonic()
+        path = scenario_of(seed, asked.folder / f"generated_{seed}")
+        found = check_file(path, fidelity=asked.fidelity)
+        wrong = [each.sentence for each in found if not each.ok]
+        right, counted = rate(path, "contact", asked.seeds, asked.fidelity)
+        cells = (
+            seed,
+            FAMILIES[seed % len(FAMILIES)].__name__,
+            len(generated(seed).places),
+            "; ".join(wrong) or found[-1].sentence,
+            f"{right} of {counted}",
+            f"{time.monotonic() - begun:.0f}",
+        )
+        print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,183 @@
+"""Parts at their final poses become a scenario that is loaded, in an order that can be carried out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.cli.app import main
+from apo_bench.drafting.draft import draft
+from apo_bench.drafting.lines import line_of
+from apo_bench.drafting.posed import PosedPart, on_the_table
+from apo_bench.drafting.standing import stance
+from apo_bench.drafting.writing import scenario_text, turn_deg
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.parts import load_part
+from apo_bench.parts.making import Body, bore, extrude, join, rectangle, shaft, write_part
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario import Scenario
+
+
+def made(folder: Path, bodies: dict[str, Body], places: dict[str, tuple[str, np.ndarray]]) -> tuple[PosedPart, ...]:
+    """Part files, and copies of them at poses."""
+    for name, body in bodies.items():
+        write_part(name, body, folder, density=700, source="a test", licence="CC0-1.0")
+    solids = {name: load_part(folder / f"{name}.xml") for name in bodies}
+    return tuple(PosedPart(name, folder / f"{part}.xml", solids[part], T) for name, (part, T) in places.items())
+
+
+def at(x: float, y: float, z: float, *turn: float) -> np.ndarray:
+    return pose.at(1e-3 * np.array([x, y, z]), turn or (0, 0, 0))
+
+
+def plate(thick: float, radius: float) -> Body:
+    bores = [bore((x, 0), radius, 0, thick, f"bore_{i}") for i, x in enumerate((-25, 25), start=1)]
+    return extrude(rectangle(80, 50), 0, thick, bores=bores, bottom="bottom", top="top")
+
+
+PIN = shaft(4, 0, 40, "side", bottom="tip", top="head")
+
+
+def covered(folder: Path, off_mm: float) -> tuple[PosedPart, ...]:
+    """A plate, two pins through it, a cover over both; every part but the plate is off by so much."""
+    T = at(off_mm, -off_mm, off_mm, 0.0, 0.0, off_mm)
+    places = {
+        "cover": ("cover", at(0, 0, 15) @ T),
+        "pin_1": ("pin", at(-25, 0, 0) @ T),
+        "pin_2": ("pin", at(25, 0, 0) @ T),
+        "plate": ("plate", at(0, 0, 0)),
+    }
+    return made(folder, {"plate": plate(15, 4.2), "pin": PIN, "cover": plate(10, 4.3)}, places)
+
+
+def loaded(parts: tuple[PosedPart, ...], folder: Path, *fixed: str) -> Scenario:
+    path = folder / "own.toml"
+    path.write_text(scenario_text(draft(on_the_table(parts), fixed), "own", "a test", folder), encoding="utf-8")
+    return load_scenario(path)
+
+
+def test_contacts_order_and_starts_are_found_and_poses_closed(tmp_path: Path) -> None:
+    scenario = loaded(covered(tmp_path, off_mm=0.02), tmp_path)
+    assert scenario.assembly.fixed == {"table", "plate"}
+    assert scenario.follows_site == {"plate"}
+    moved = [operation.main for operation in scenario.assembly.operations]
+    assert set(moved[:2]) == {"pin_1", "pin_2"}
+    assert moved[2:] == ["cover"]
+    contacts = {str(contact) for contact in scenario.assembly.operations[2].contacts}
+    assert contacts == {
+        "cover.bottom on plate.top",
+        "cover.bore_1 on pin_1.side",
+        "cover.bore_2 on pin_2.side",
+    }
+    assert all(attach.direction @ (0, 0, -1) > 0.99 for attach in scenario.attach)
+    waits = [scenario.start[part][:2, 3] for part in moved]
+    assert min(np.linalg.norm(a - b) for i, a in enumerate(waits) for b in waits[:i]) > 0.06
+
+
+def test_what_is_blocked_where_it_goes_is_put_together_beside_the_assembly(tmp_path: Path) -> None:
+    """A bar in the window of a frame, which stands between two walls that close the window."""
+    window = rectangle(30.5, 16.5, (0, 25), names=("low", "right", "high", "left"))
+    frame = extrude(rectangle(60, 60, (0, 30)), -15, 15, holes=[window]).moved(turn_deg=(90, 0, 0))
+    floor = extrude(rectangle(80, 90), 0, 10, bottom="bottom")
+    walls = [extrude(rectangle(80, 20, (0, 30 * s)), 10, 60) for s in (-1, 1)]
+    bar = extrude(rectangle(30, 28), 0, 16, bottom="bottom", top="top")
+    parts = made(
+        tmp_path,
+        {"channel": join(floor, *walls), "frame": frame, "bar": bar},
+        {
+            "channel": ("channel", at(0, 0, 0)),
+            "frame": ("frame", at(0, 0, 10)),
+            "bar": ("bar", at(0, 0, 10 + 25 - 8.25)),
+        },
+    )
+    scenario = loaded(parts, tmp_path)
+    assert [(operation.main, operation.carries) for operation in scenario.assembly.operations] == [
+        ("frame", ()),
+        ("bar", ()),
+        ("frame", ("bar",)),
+    ]
+    assert abs(scenario.attach[1].direction[2]) < 0.1
+
+
+def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Path) -> None:
+    tight = made(
+        tmp_path,
+        {"plate": plate(15, 4.0), "pin": PIN},
+        {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 0))},
+    )
+    with pytest.raises(RuntimeError, match="a press fit or a thread"):
+        draft(on_the_table(tight))
+    thin = shaft(1.5, 0, 90, "side", bottom="tip", top="head")
+    hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
+    tall = made(
+        tmp_path, {"plate": hole, "thin": thin}, {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
+    )
+    notes = draft(on_the_table(tall)).notes
+    assert any("'thin' needs turning over" in note for note in notes)
+
+
+def test_what_hangs_in_the_air_has_no_order(tmp_path: Path) -> None:
+    beside = made(
+        tmp_path,
+        {"plate": plate(15, 4.2), "pin": PIN},
+        {"plate": ("plate", at(0, 0, 0)), "pin": ("pin", at(25, 0, 8))},
+    )
+    with pytest.raises(RuntimeError, match="nothing is below 'pin'"):
+        draft(on_the_table(beside))
+    with pytest.raises(InputError, match="unknown part 'pn'"):
+        draft(on_the_table(beside), ("pn",))
+
+
+def test_turns_are_those_that_a_scenario_file_reads() -> None:
+    rng = np.random.default_rng(0)
+    for turn in (*rng.uniform(-180, 180, (20, 3)), (10, 90, 30), (0, -90, 0), (90, 0, -90)):
+        R = pose.at(np.zeros(3), turn)[:3, :3]
+        np.testing.assert_allclose(pose.at(np.zeros(3), turn_deg(R))[:3, :3], R, atol=1e-12)
+
+
+def test_what_stands_and_what_rolls(tmp_path: Path) -> None:
+    write_part("pin", PIN, tmp_path, density=700, source="a test", licence="CC0-1.0")
+    pin = load_part(tmp_path / "pin.xml")
+    assert stance(pin, np.eye(3)) == (0.0, True, False)
+    lies = stance(pin, pose.at(np.zeros(3), (90, 0, 0))[:3, :3])
+    assert lies.rolls
+    assert lies.height_m == pytest.approx(0.004, abs=1e-6)
+    assert not stance(pin, pose.at(np.zeros(3), (30, 0, 0))[:3, :3]).stands
+
+
+def test_lines_of_keys_are_found() -> None:
+    text = (
+        'schema = 1\n[parts.a]\nfile = "a"\nstart = 1\n[[operations]]\nmove = "a"\n[[operations]]\ngrasp = 2\n[site]\n'
+    )
+    assert line_of(text, "parts, a, start: it falls") == 4
+    assert line_of(text, "operation 2, grasp: too wide") == 8
+    assert line_of(text, "operation 1, goal: far") == 5
+    assert line_of(text, "site: too far") == 9
+    assert line_of(text, "operation 3, goal: none") is None
+
+
+def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    poses, out = tmp_path / "poses.toml", tmp_path / "pile.toml"
+    poses.write_text(
+        '[[pose]]\npart = "block"\nname = "upper"\nat_mm = [300, 100, 85]\nquaternion_wxyz = [1, 0, 0, 0]\n'
+        '[[pose]]\npart = "block"\nname = "lower"\nat_mm = [300, 100, 35]\ncolor = [0.2, 0.4, 0.6]\n',
+        encoding="utf-8",
+    )
+    asked = ["scenario", "new", "--parts", "block", "--poses", str(poses), "--fixed", "lower", "--out", str(out)]
+    assert main(asked) == 0
+    assert "1. upper comes from above, onto lower: 1 contacts" in capsys.readouterr().out
+    text = out.read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [500, 0]")
+    out.write_text(text, encoding="utf-8")
+    assert main(["scenario", "check", str(out), "--seeds", "0"]) == 1
+    said = capsys.readouterr().out.splitlines()
+    good = [line.split()[:2] for line in said if not line.startswith("wrong")]
+    assert good == [["ok", what] for what in ("file", "parts", "starts", "ways", "play", "gripper")]
+    line = 1 + next(i for i, each in enumerate(text.splitlines()) if each.startswith("[site]"))
+    assert f"line {line}: site: move it nearer to the arm" in said[-1], said
+    out.write_text("schema = 1\n", encoding="utf-8")
+    assert main(["scenario", "check", str(out)]) == 1
+    assert main(["scenario", "check", str(tmp_path / "none.toml")]) == 2
+    assert main(["scenario", "new", "--out", str(out)]) == 2
