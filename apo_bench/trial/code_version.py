@@ -9,7 +9,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from types import MappingProxyType
 
-LEFT_OUT = ("cli", "envs", "report", "show", "statistics", "sweeps/local", "sweeps/ray")
+LEFT_OUT = ("cli", "drafting", "envs", "report", "show", "statistics", "sweeps/local", "sweeps/ray")
 """Rooms that no trial runs through: commands, how work is spread, and all that is made of rows afterwards."""
 
 
