@@ -24,6 +24,7 @@ from apo_bench.cli import part as cli_part
 from apo_bench.cli import plan as cli_plan
 from apo_bench.cli import power as cli_power
 from apo_bench.cli import recognition as cli_recognition
+from apo_bench.cli import recording as cli_recording
 from apo_bench.cli import replay_command as cli_replay
 from apo_bench.cli import report as cli_report
 from apo_bench.cli import scenario as cli_scenario
@@ -146,6 +147,7 @@ for commands in (
         cli_power,
         cli_recognition,
         cli_scenario,
+        cli_recording,
         cli_show,
         cli_sweep,
         cli_report,

@@ -1,0 +1,162 @@
+"""The command `apo-bench recording import`: the log of a tracker becomes an observation file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from apo_bench.cli.arguments import check_writable, numbers, path_given, whole_numbers
+from apo_bench.errors import InputError
+
+recording = typer.Typer(add_completion=False, rich_markup_mode=None, help="Logs of pose trackers.")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    app.add_typer(recording, name="recording")
+
+
+@recording.callback()
+def _group() -> None:
+    """Logs of pose trackers."""
+
+
+LogArgument = Annotated[Path, typer.Argument(help="The log, or a folder of one file an object.", parser=path_given)]
+FormatOption = Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")]
+CameraOption = Annotated[Path, typer.Option(help="How the log is written, and where its camera stands: .toml.")]
+
+
+@recording.command("import")
+def import_log(
+    log: LogArgument,
+    form: FormatOption,
+    camera: CameraOption,
+    objects: Annotated[Path, typer.Option(help="Which id is which part, and where its frame lies: .toml.")],
+    out: Annotated[Path, typer.Option(help="The observation file: .json, or .csv without starts and covariances.")],
+    scenario: Annotated[str | None, typer.Option(help="Of which scenario it is; .json needs one.")] = None,
+    ends: Annotated[
+        str | None, typer.Option(help="When each operation had ended, s with commas, where the log leaves it unclear.")
+    ] = None,
+    unseen: Annotated[str | None, typer.Option(help="Operations that the log does not show, from 1.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw frames, paths and rests into this file: .png.")] = None,
+    paths: Annotated[Path | None, typer.Option(help="Write the paths between rests: .csv.")] = None,
+) -> None:
+    """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
+    from apo_bench.recording.camera_file import read_camera
+    from apo_bench.recording.formats import read_log
+    from apo_bench.recording.objects_file import part_tracks, read_objects
+    from apo_bench.show.recording_text import reading_lines
+
+    for path, option, endings in (
+        (out, "--out", (".json", ".csv")),
+        (picture, "--picture", (".png",)),
+        (paths, "--paths", (".csv",)),
+    ):
+        if path is not None:
+            check_writable(path, option, endings)
+            for given in (log, camera, objects):
+                if path.exists() and given.exists() and path.samefile(given):
+                    raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+    if scenario is None and (out.suffix.lower() == ".json" or ends or unseen or paths):
+        raise InputError(
+            "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone."
+        )
+    stated, named = read_camera(camera), read_objects(objects)
+    read = read_log(log, form, stated.conventions)
+    tracks = part_tracks(read, named)
+    _print(reading_lines(read, named))
+    if scenario is None:
+        _import_bare(read, named, stated, tracks, out, picture)
+    else:
+        _import(read, named, stated, tracks, scenario, (ends, unseen), (out, picture, paths))
+
+
+def _import(
+    log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, said: tuple[str | None, str | None], files: Any
+) -> None:
+    from apo_bench.io.csv_file import write_csv
+    from apo_bench.recording.bare import deviations
+    from apo_bench.recording.importing import import_recording
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.recording_picture import draw_recording
+    from apo_bench.show.recording_text import (
+        PATH_HEAD,
+        camera_lines,
+        imported_lines,
+        observation_table,
+        path_rows,
+        rest_lines,
+    )
+
+    out, picture, paths = files
+    loaded = load_scenario(scenario)
+    found = import_recording(tracks, camera, loaded, _stated(*said, len(loaded.assembly)), log.file)
+    mains = [operation.main for operation in loaded.assembly.operations]
+    rests = [one.rest for one in found.operations]
+    X, times = found.camera.T_world_camera, {part: track.t for part, track in tracks.items()}
+    _print(camera_lines(found.camera))
+    typer.echo("\n" + "\n".join(rest_lines(list(zip(mains, rests, strict=True)), X, times)) + "\n")
+    _print(imported_lines(found))
+    if out.suffix.lower() == ".json":
+        from apo_bench.files.json_forms import observation_form, write_form
+
+        name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
+        write_form(observation_form(found.observation, name), out)
+    else:
+        off = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
+        _write(out, observation_table(mains, found.observation.goals, off, [rest is not None for rest in rests]))
+    typer.echo(f"\nWrote {out}")
+    if paths is not None:
+        write_csv(paths, PATH_HEAD, path_rows(found))
+        typer.echo(f"Wrote {paths}")
+    if picture is not None:
+        ended = [(main, rest.begins) for main, rest in zip(mains, rests, strict=True) if rest is not None]
+        draw_recording(tracks, found.stays, X, picture, ended, loaded.assembly.solids, f"{log.file}, {loaded.name}")
+        typer.echo(f"Wrote {picture}")
+
+
+def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
+    from apo_bench.recording.bare import bare_recording, deviations, goals_of
+    from apo_bench.show.recording_picture import draw_recording
+    from apo_bench.show.recording_text import camera_lines, observation_table, put_lines, rest_lines
+
+    found = bare_recording(tracks, camera, log.file)
+    parts, rests = [put.part for put in found.puts], [put.rest for put in found.puts]
+    X, times = found.camera.T_world_camera, {part: track.t for part, track in tracks.items()}
+    _print(camera_lines(found.camera))
+    typer.echo("\n" + "\n".join([*rest_lines(list(zip(parts, rests, strict=True)), X, times), *put_lines(found)]))
+    _write(
+        out,
+        observation_table(parts, goals_of(found), [deviations(rest, camera) for rest in rests], [True] * len(rests)),
+    )
+    typer.echo(f"\nWrote {out}")
+    if picture is not None:
+        draw_recording(
+            tracks, found.stays, X, picture, [(put.part, put.rest.begins) for put in found.puts], None, log.file
+        )
+        typer.echo(f"Wrote {picture}")
+
+
+def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
+    from apo_bench.recording.importing import Stated
+
+    hidden = whole_numbers(unseen, "--unseen") if unseen else ()
+    if not all(1 <= k <= operations for k in hidden):
+        raise InputError(f"--unseen {unseen} was given; operations from 1 to {operations} are allowed.")
+    if ends and hidden:
+        raise InputError("--ends and --unseen were given; give one of the two.")
+    return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
+
+
+def _print(lines: list[tuple[str, str]]) -> None:
+    width = max(len(name) for name, _ in lines)
+    typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in lines))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"--out {path} cannot be written ({error.strerror}); choose another place.") from error

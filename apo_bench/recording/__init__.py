@@ -1,0 +1,1 @@
+"""A tracker's log becomes an observation: formats, frames, rests, operations."""

@@ -1,0 +1,119 @@
+"""Poses of one rest become one pose: a mean on SE(3) without outliers, and the covariance that they show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+FLOOR = np.repeat([2e-5, 2e-4], 3)
+"""No axis of one frame is surer than this, [m, rad]: what a file with rounded numbers can say."""
+FLOOR.flags.writeable = False
+_FAR = 5.0
+"""A frame that is farther off, in standard deviations of any axis, is an outlier: 1 in 300,000 by chance."""
+_ROUNDS = 12
+_MAD = 1.4826
+_PRIOR = 8.0
+"""What is known of other rests counts like so many frames of this one."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Mean:
+    """The mean of frames."""
+
+    T: Array
+    """(4, 4), [m]."""
+    scatter: Array
+    """(6, 6), covariance of one frame, body twist, [m, rad]."""
+    inlier: NDArray[np.bool_]
+    """(n,), whether each frame counts."""
+    independent: float
+    """Independent frames that say as much as all inliers do, whose errors are alike from frame to frame."""
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), of the mean: as far as errors of frames differ."""
+        return self.scatter / self.independent
+
+
+def average(T: Array) -> Mean:
+    """The mean of poses (n, 4, 4): that about which inliers have no mean twist.
+
+    Outliers are frames that are more than `_FAR` robust standard deviations off along or about an axis.
+    """
+    middle = _middle(T)
+    inlier = np.ones(len(T), dtype=np.bool_)
+    for _ in range(_ROUNDS):
+        xi = pose.log(pose.inverse(middle) @ T)
+        inlier = _near(xi)
+        step = xi[inlier].mean(axis=0)
+        middle = middle @ pose.exp(step)
+        if np.abs(step).max() < 1e-10:
+            break
+    xi = pose.log(pose.inverse(middle) @ T)[inlier]
+    return Mean(middle, _scatter(xi), inlier, _independent(xi))
+
+
+def pooled(mean: Mean, others: Array) -> Mean:
+    """The mean with a covariance that also knows the frames of other rests.
+
+    Args:
+        others: (6, 6), covariance of one frame there, in the axes of the camera, as few frames say little.
+    """
+    n, A = float(mean.inlier.sum()), _axes(mean.T)
+    scatter = ((n - 1.0) * mean.scatter + _PRIOR * A.T @ others @ A) / (n - 1.0 + _PRIOR)
+    return Mean(mean.T, scatter + np.diag(FLOOR**2), mean.inlier, mean.independent)
+
+
+def common_scatter(means: list[Mean]) -> Array:
+    """The covariance of one frame over many rests, (6, 6), in the axes of the camera."""
+    total, frames = np.zeros((6, 6)), 0.0
+    for mean in means:
+        n, A = float(mean.inlier.sum()) - 1.0, _axes(mean.T)
+        total += n * A @ mean.scatter @ A.T
+        frames += n
+    return total / max(frames, 1.0) + np.diag(FLOOR**2)
+
+
+def _axes(T: Array) -> Array:
+    """From axes of the part to those of the camera, at the same origin, (6, 6)."""
+    A = np.zeros((6, 6))
+    A[:3, :3] = A[3:, 3:] = T[:3, :3]
+    return A
+
+
+def _middle(T: Array) -> Array:
+    """The pose of a frame that is near to most: medians of positions, and of turns from that frame."""
+    place = np.median(T[:, :3, 3], axis=0)
+    off = np.linalg.norm(T[:, :3, 3] - place, axis=1)
+    few = T[np.argsort(off)[: min(len(T), 25)]]
+    turns = np.linalg.norm(pose.log(pose.inverse(few)[:, None] @ few[None])[..., 3:], axis=-1)
+    middle = np.array(few[int(np.argmin(np.median(turns, axis=1)))])
+    middle[:3, 3] = place
+    return middle
+
+
+def _near(xi: Array) -> NDArray[np.bool_]:
+    spread = np.maximum(_MAD * np.median(np.abs(xi - np.median(xi, axis=0)), axis=0), FLOOR)
+    return np.asarray((np.abs(xi - np.median(xi, axis=0)) < _FAR * spread).all(axis=1))
+
+
+def _scatter(xi: Array) -> Array:
+    return np.asarray(xi.T @ xi / max(len(xi) - 1, 1))
+
+
+def _independent(xi: Array) -> float:
+    """n (1 - r) / (1 + r), r the correlation of neighbouring frames, averaged over axes; between 1 and n."""
+    n = len(xi)
+    if n < 8:
+        return float(n)
+    power = (xi**2).sum(axis=0)
+    r = (xi[1:] * xi[:-1]).sum(axis=0)[power > 0.0] / power[power > 0.0]
+    mean = float(np.clip(r.mean() if len(r) else 0.0, 0.0, 0.999))
+    return max(1.0, n * (1.0 - mean) / (1.0 + mean))

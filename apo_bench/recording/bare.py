@@ -1,0 +1,99 @@
+"""A recording without a scenario: which part was put where, in order; nothing is known of contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.recording.camera_file import CameraFile
+from apo_bench.recording.camera_pose import CameraPose, solve_camera
+from apo_bench.recording.log import Track
+from apo_bench.recording.rests import Rest, rests_of
+from apo_bench.recording.stays import Stay, stays_of
+
+
+class Put(NamedTuple):
+    """A part was put somewhere, perhaps with others."""
+
+    part: str
+    carries: tuple[str, ...]
+    stay: Stay
+
+    @property
+    def rest(self) -> Rest:
+        return self.stay.rests[-1]
+
+
+class Bare(NamedTuple):
+    """What a log says by itself."""
+
+    camera: CameraPose
+    stays: Mapping[str, tuple[Stay, ...]]
+    puts: tuple[Put, ...]
+
+
+class _Move(NamedTuple):
+    taken: float
+    stay: Stay
+
+
+def bare_recording(tracks: Mapping[str, Track], camera: CameraFile, file: str) -> Bare:
+    """The order of operations, as far as poses alone tell it: parts that move together are one operation.
+
+    Raises:
+        InputError: A known place is not stated by a pose, or nothing moves.
+    """
+    stays = {part: stays_of(part, rests_of(track)) for part, track in tracks.items()}
+    X = _camera_pose(stays, camera)
+    pairs = [pair for known in stays.values() for pair in pairwise(known)]
+    moves = sorted((_Move(before.ends, after) for before, after in pairs), key=lambda move: move.stay.begins)
+    if not moves:
+        raise InputError(f"{file}: no part comes to rest at another place than before, so there is no operation.")
+    groups: list[list[_Move]] = []
+    for move in moves:
+        if groups and any(_together(move, other) for other in groups[-1]):
+            groups[-1].append(move)
+        else:
+            groups.append([move])
+    return Bare(X, stays, tuple(map(_put, groups)))
+
+
+def _camera_pose(stays: Mapping[str, tuple[Stay, ...]], camera: CameraFile) -> CameraPose:
+    if camera.T_world_camera is not None:
+        return CameraPose(camera.T_world_camera)
+    places = {part: T for part, T in camera.known.items() if T is not None and stays.get(part)}
+    if not places:
+        raise InputError(
+            "without --scenario the camera file has to state the pose of the camera, or poses of known parts that "
+            'rest; "start" is a place of a scenario.'
+        )
+    seen = {part: stays[part][0].rests[0].mean for part in places}
+    return solve_camera(places, seen, next(iter(seen.values())).scatter)
+
+
+def _together(one: _Move, other: _Move) -> bool:
+    shared = min(one.stay.begins, other.stay.begins) - max(one.taken, other.taken)
+    shorter = min(one.stay.begins - one.taken, other.stay.begins - other.taken)
+    return one.stay.part != other.stay.part and shared > 0.5 * shorter
+
+
+def _put(moves: Sequence[_Move]) -> Put:
+    """What was taken first is taken for what the hand held."""
+    first, *others = sorted(moves, key=lambda move: move.taken)
+    return Put(first.stay.part, tuple(move.stay.part for move in others), first.stay)
+
+
+def deviations(rest: Rest, camera: CameraFile) -> tuple[float, float]:
+    """Standard deviations per axis of one rest, [m, rad]: of its mean, and of what stays; else that of one frame."""
+    C = rest.mean.covariance + (rest.mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2))
+    return float(np.sqrt(np.trace(C[:3, :3]) / 3.0)), float(np.sqrt(np.trace(C[3:, 3:]) / 3.0))
+
+
+def goals_of(found: Bare) -> Array:
+    """Where parts were put, (n, 4, 4), world, [m]."""
+    return np.array([found.camera.T_world_camera @ put.rest.T for put in found.puts])

@@ -1,0 +1,159 @@
+"""CAMERA.toml: how a log is written, where its camera stands, and what of its error stays while a part rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, final
+
+import numpy as np
+
+from apo_bench.errors import unknown
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.scenario.keys import read_pose, refuse
+
+_SCHEMA = "apo-bench/camera/1"
+LENGTHS = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0})
+ANGLES = MappingProxyType({"deg": np.pi / 180.0, "rad": 1.0})
+TIMES = MappingProxyType({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
+_LARGEST_MM = 1e5
+
+
+@final
+@dataclass(frozen=True)
+class Conventions:
+    """How a log is written, where its columns do not say it."""
+
+    length: str | None = None
+    angle: str | None = None
+    time: str = "s"
+    quaternion: str | None = None
+    """Order of four numbers without names: `wxyz` or `xyzw`."""
+    euler: str | None = None
+    """Axes as SciPy spells them: `xyz` about fixed axes, `XYZ` about moving ones."""
+    rate_hz: float | None = None
+    """Of images that have a number and no time."""
+    scene: int | None = None
+    """Of BOP results, which may hold several."""
+    inverted: bool = False
+    """Whether poses are of the camera in the model."""
+    mirror: Literal["", "x", "y", "z"] = ""
+    """The axis along which a left-handed tracker counts the other way."""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    """Column of the file -> what it is here."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CameraFile:
+    """What a camera file states."""
+
+    conventions: Conventions
+    T_world_camera: Array | None
+    """(4, 4), [m]; None: to be solved."""
+    known: Mapping[str, Array | None]
+    """Part -> where it stands in the world, (4, 4); None: where the scenario starts it."""
+    stays: Array | None
+    """(2,), standard deviation of the error that stays while a part rests, per axis, [m, rad]; None: not stated."""
+
+
+def read_camera(path: str | Path) -> CameraFile:
+    """What a camera file states.
+
+    Raises:
+        InputError: Anything that is not as described, naming file and key.
+    """
+    top = read_toml(path, "camera file").fields(("schema",), ("log", "pose", "known", "noise"))
+    if top["schema"].text() != _SCHEMA:
+        top["schema"].fail(f'"{_SCHEMA}" is needed')
+    if "pose" in top and "known" in top:
+        refuse(top["known"], "the pose of the camera is stated too; state one of the two")
+    return CameraFile(
+        conventions=_conventions(top["log"]) if "log" in top else Conventions(),
+        T_world_camera=any_pose(top["pose"]) if "pose" in top else None,
+        known=_known(top["known"]) if "known" in top else {},
+        stays=_stays(top["noise"]) if "noise" in top else None,
+    )
+
+
+def any_pose(node: JsonNode) -> Array:
+    """`at_mm` with `turn_deg`, `quaternion_wxyz` or `quaternion_xyzw`, as (4, 4), [m]."""
+    keys = node.fields(("at_mm",), ("turn_deg", "quaternion_wxyz", "quaternion_xyzw"))
+    stated = [key for key in keys if key != "at_mm"]
+    if len(stated) > 1:
+        refuse(node, f"{' and '.join(stated)} state the same; keep one")
+    if stated in ([], ["turn_deg"]):
+        return read_pose(node)
+    at = keys["at_mm"].numbers(3)
+    if np.abs(at).max() > _LARGEST_MM:
+        keys["at_mm"].fail(f"lengths of at most {_LARGEST_MM:g} mm are needed")
+    q = keys[stated[0]].quaternion()
+    return pose.unpack(np.concatenate([at * 1e-3, q if stated[0].endswith("wxyz") else np.roll(q, 1)]))
+
+
+def _conventions(node: JsonNode) -> Conventions:
+    texts = {
+        "length": tuple(LENGTHS),
+        "angle": tuple(ANGLES),
+        "time": tuple(TIMES),
+        "quaternion": ("wxyz", "xyzw"),
+        "mirror": ("x", "y", "z"),
+    }
+    keys = node.fields((), (*texts, "euler", "rate_hz", "scene", "inverted", "columns"))
+    found: dict[str, object] = {}
+    for key, allowed in texts.items():
+        if key in keys:
+            if keys[key].text() not in allowed:
+                keys[key].fail(f"{' or '.join(allowed)} is needed")
+            found[key] = keys[key].text()
+    if "euler" in keys:
+        found["euler"] = _euler(keys["euler"])
+    if "rate_hz" in keys:
+        found["rate_hz"] = keys["rate_hz"].number(0.0, 1e6, above=True)
+    if "scene" in keys:
+        found["scene"] = keys["scene"].integer()
+    if "inverted" in keys:
+        found["inverted"] = keys["inverted"].flag()
+    if "columns" in keys:
+        if not isinstance(keys["columns"].value, dict):
+            keys["columns"].fail('a table is needed, such as { id = "body" }')
+        names = keys["columns"].value
+        found["columns"] = {keys["columns"].child(theirs, ours).text().lower(): ours for ours, theirs in names.items()}
+    return Conventions(**found)  # type: ignore[arg-type]
+
+
+def _euler(node: JsonNode) -> str:
+    text = node.text()
+    if (
+        len(text) != 3
+        or not (set(text) <= set("xyz") or set(text) <= set("XYZ"))
+        or text[0] == text[1]
+        or text[1] == text[2]
+    ):
+        node.fail("three axes are needed: small letters about fixed axes, such as xyz, capitals about moving ones")
+    return text
+
+
+def _known(node: JsonNode) -> Mapping[str, Array | None]:
+    if not isinstance(node.value, dict) or not node.value:
+        node.fail('parts that stand still are needed, such as castle1 = "start"')
+    found: dict[str, Array | None] = {}
+    for part, value in node.value.items():
+        child = node.child(value, part)
+        if isinstance(value, str):
+            if value != "start":
+                child.fail(unknown("place", value, ("start",)).rstrip(".") + '; "start" or a pose is needed')
+            found[part] = None
+        else:
+            found[part] = any_pose(child)
+    return found
+
+
+def _stays(node: JsonNode) -> Array:
+    keys = node.fields(("stays_mm", "stays_deg"))
+    return np.array([keys["stays_mm"].number(0.0, 100.0) * 1e-3, np.radians(keys["stays_deg"].number(0.0, 90.0))])

@@ -1,0 +1,182 @@
+"""Columns of numbers become poses: positions, quaternions, rotation vectors, Euler angles, matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.recording.camera_file import ANGLES, LENGTHS, TIMES, Conventions
+
+_UNITS = {**LENGTHS, **ANGLES, **TIMES}
+_SAME = {
+    **dict.fromkeys(("id", "object", "object_id", "part", "name", "track", "track_id", "body", "child_frame_id"), "id"),
+    **dict.fromkeys(("t", "time", "timestamp", "stamp"), "t"),
+    **{f"{letter}{axis}": axis for letter in ("t", "p", "pos_") for axis in "xyz"},
+    **{f"m{i}{j}": f"r{i + 1}{j + 1}" for i in range(3) for j in range(3)},
+    **{f"rot_{axis}": f"r{axis}" for axis in "xyz"},
+    **{f"q_{axis}": f"q{axis}" for axis in "wxyz"},
+    "frame_id": "header frame",
+}
+_POSITION = ("x", "y", "z")
+_MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+_ROTATIONS: Mapping[str, tuple[str, ...]] = {
+    "quaternion": ("qw", "qx", "qy", "qz"),
+    "quaternion by number": ("q0", "q1", "q2", "q3"),
+    "rotation vector": ("rx", "ry", "rz"),
+    "axis and angle": ("ax", "ay", "az", "angle"),
+    "Euler angles": ("roll", "pitch", "yaw"),
+    "Euler angles by number": ("e1", "e2", "e3"),
+    "matrix": _MATRIX,
+}
+KNOWN = {"id", "t", "frame", *_POSITION, *(name for names in _ROTATIONS.values() for name in names)}
+_LENGTH_ONE = 0.02
+"""A quaternion, an axis or a row may differ from length 1 by so much."""
+
+
+class Column(NamedTuple):
+    """What a column is, and the unit in its name."""
+
+    meaning: str
+    unit: str
+
+
+def column(name: str, renamed: Mapping[str, str]) -> Column | None:
+    """What a column of this name is; None if it is nobody's business."""
+    name = name.strip().lower()
+    name = renamed.get(name, name)
+    stem, _, unit = name.rpartition("_")
+    if not stem or unit not in _UNITS:
+        stem, unit = name, ""
+    meaning = _SAME.get(stem, stem)
+    return Column(meaning, unit) if meaning in KNOWN else None
+
+
+def times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:
+    """The time of every row, (n,), [s]."""
+    if "t" in cells:
+        return cells["t"] * TIMES[units["t"] or how.time]
+    if "frame" in cells:
+        if how.rate_hz is None:
+            raise InputError(f"{file}: images are numbered and have no time; state `rate_hz` in the camera file.")
+        return cells["frame"] / how.rate_hz
+    raise InputError(
+        f"{file}: the column of the time is missing, such as t_s; name it in `columns` of the camera file."
+    )
+
+
+def poses(
+    cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str, places: Sequence[str]
+) -> tuple[Array, list[str]]:
+    """Poses (n, 4, 4), [m], and how they were read.
+
+    Args:
+        cells: Meaning -> (n,), as written.
+        units: Meaning -> unit in its name, or empty.
+        places: Where each row stands, for messages.
+    """
+    for name in _POSITION:
+        if name not in cells:
+            raise InputError(f"{file}: the column '{name}_mm' is missing; name it in `columns` of the camera file.")
+    T = np.tile(np.eye(4), (len(cells["x"]), 1, 1))
+    said = set[str]()
+    for i, name in enumerate(_POSITION):
+        unit = _unit(name, units, how.length, "length", file)
+        T[:, i, 3] = cells[name] * LENGTHS[unit]
+        said.add(unit)
+    if len(said) > 1:
+        raise InputError(f"{file}: positions are in {' and '.join(sorted(said))}; give all three in one unit.")
+    T[:, :3, :3], rotation = _rotations(cells, units, how, file, places)
+    return T, [f"lengths in {said.pop()}", rotation]
+
+
+def oriented(T: Array, how: Conventions) -> tuple[Array, list[str]]:
+    """Camera from model, in right-handed axes, and what was done for it."""
+    notes = []
+    if how.mirror:
+        flip = np.ones(4)
+        flip["xyz".index(how.mirror)] = -1.0
+        T, notes = T * np.outer(flip, flip), [f"mirrored along {how.mirror}, as stated"]
+    if how.inverted:
+        T, notes = pose.inverse(T), [*notes, "poses of the camera in the model, as stated, inverted"]
+    return T, notes
+
+
+def _unit(name: str, units: Mapping[str, str], stated: str | None, kind: str, file: str) -> str:
+    unit = units.get(name, "") or stated
+    allowed = LENGTHS if kind == "length" else ANGLES
+    if unit is None:
+        example = " or ".join(f"{name}_{unit}" for unit in ("mm", "m")) if kind == "length" else f"{name}_deg"
+        raise InputError(
+            f"{file}: the unit of the column '{name}' is not known; name it {example}, or state `{kind}` in the camera "
+            "file."
+        )
+    if unit not in allowed:
+        raise InputError(f"{file}: the unit of '{name}_{unit}' is none of a {kind}; {', '.join(allowed)} are allowed.")
+    return unit
+
+
+def _rotations(
+    cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str, places: Sequence[str]
+) -> tuple[Array, str]:
+    from scipy.spatial.transform import Rotation
+
+    given = [kind for kind, names in _ROTATIONS.items() if all(name in cells for name in names)]
+    if len(given) != 1:
+        found = f"{len(given)} ({' and '.join(given)}) are" if given else "none is"
+        raise InputError(
+            f"{file}: columns of one rotation are needed, {found} there: qw to qz, q0 to q3, rx to rz, ax to az with "
+            "angle, roll, pitch and yaw, e1 to e3, or r11 to r33."
+        )
+    kind = given[0]
+    numbers = np.column_stack([cells[name] for name in _ROTATIONS[kind]])
+    if kind.startswith("quaternion"):
+        order = "wxyz" if kind == "quaternion" else how.quaternion
+        if order is None:
+            raise InputError(
+                f'{file}: q0 to q3 do not say their order; state `quaternion = "wxyz"` or "xyzw" in the camera file.'
+            )
+        _check_length(np.linalg.norm(numbers, axis=1), "a quaternion", places)
+        by = "by the names of the columns" if kind == "quaternion" else f"in the order {order}, as stated"
+        return Rotation.from_quat(numbers, scalar_first=order == "wxyz").as_matrix(), f"quaternions {by}"
+    if kind == "matrix":
+        return _matrices(numbers.reshape(-1, 3, 3), places), "rotation matrices, row by row"
+    angular = {"axis and angle": ("angle",)}.get(kind, _ROTATIONS[kind])
+    unit = {_unit(name, units, how.angle, "angle", file) for name in angular}
+    if len(unit) > 1:
+        raise InputError(f"{file}: angles are in {' and '.join(sorted(unit))}; give all in one unit.")
+    (called,) = unit
+    if kind == "axis and angle":
+        _check_length(np.linalg.norm(numbers[:, :3], axis=1), "an axis", places)
+        vectors = numbers[:, :3] * numbers[:, 3:] * ANGLES[called]
+        return Rotation.from_rotvec(vectors).as_matrix(), f"axis and angle in {called}"
+    if kind == "rotation vector":
+        return Rotation.from_rotvec(numbers * ANGLES[called]).as_matrix(), f"rotation vectors in {called}"
+    if how.euler is None:
+        raise InputError(f'{file}: Euler angles do not say their order; state `euler = "xyz"` in the camera file.')
+    about = "fixed" if how.euler.islower() else "moving"
+    R = Rotation.from_euler(how.euler, numbers * ANGLES[called]).as_matrix()
+    return R, f"Euler angles in {called}, {how.euler} about {about} axes, as stated"
+
+
+def _matrices(R: Array, places: Sequence[str]) -> Array:
+    """The nearest rotations."""
+    square = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = (square > _LENGTH_ONE) | (np.linalg.det(R) < 0.0)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > _LENGTH_ONE else "it mirrors"
+        raise InputError(f"{places[k]}: a rotation matrix, row by row, is needed; {fault}.")
+    U, _, Vt = np.linalg.svd(R)
+    return np.asarray(U @ Vt)
+
+
+def _check_length(length: Array, what: str, places: Sequence[str]) -> None:
+    wrong = np.abs(length - 1.0) > _LENGTH_ONE
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(f"{places[k]}: {what} of length 1 is needed, one of length {length[k]:.4g} was given.")

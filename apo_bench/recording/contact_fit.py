@@ -1,0 +1,45 @@
+"""How well the contacts of an operation are closed where parts were seen."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.facing import height
+from apo_bench.assembly.facing_round import measure_round
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry.overlap import face_area
+from apo_bench.geometry.round_face import RoundFace
+
+
+class ContactFit(NamedTuple):
+    """The worst of some contacts."""
+
+    gap_m: float
+    """From the middle of the smaller face to the plane of the other one, or between axes."""
+    angle_rad: float
+    """Between the normal of one and the opposite of the other, or between axes."""
+
+    @property
+    def wrong_mm(self) -> float:
+        """A degree counts like a millimetre."""
+        return 1e3 * self.gap_m + float(np.degrees(self.angle_rad))
+
+
+def contact_fit(assembly: Assembly, k: int, poses: Poses) -> ContactFit:
+    """How far the contacts that operation k makes are open, if it ended with these poses, world, [m]."""
+    found = [_fit(assembly, contact, poses) for contact in assembly.operations[k].contacts]
+    return ContactFit(max((f.gap_m for f in found), default=0.0), max((f.angle_rad for f in found), default=0.0))
+
+
+def _fit(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
+    (a, T_a), (b, T_b) = ((assembly.face_of(of), poses[of.part]) for of in contact)
+    if isinstance(a, RoundFace) or isinstance(b, RoundFace):
+        m = measure_round(a, T_a, b, T_b)
+        return ContactFit(abs(m.gap_m), m.angle_rad)
+    if face_area(a) > face_area(b):
+        (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
+    cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))
+    return ContactFit(abs(height(a, T_a, b, T_b)), float(np.arccos(np.clip(-cosine, -1.0, 1.0))))

@@ -1,0 +1,102 @@
+"""What a tracker wrote: one track per id, poses of its model in the frame of the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.errors import InputError, one_line
+from apo_bench.geometry.arrays import Array
+
+MOST_ROWS = 1_000_000
+LARGEST_BYTES = 200_000_000
+_NEAR_M, _FAR_M = 0.02, 20.0
+"""Models whose median distance to the camera is less or more were given in another unit."""
+
+
+class Track(NamedTuple):
+    """One model over time."""
+
+    t: Array
+    """(n,), [s], from the first pose of the log, increasing."""
+    T: Array
+    """(n, 4, 4), camera from model, [m]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A whole log."""
+
+    file: str
+    tracks: Mapping[str, Track]
+    notes: tuple[str, ...]
+    """How its numbers were read: units, order of the quaternion, direction."""
+
+    @property
+    def seconds(self) -> float:
+        return max(float(track.t[-1]) for track in self.tracks.values())
+
+
+class Rows(NamedTuple):
+    """Poses as they stand in a file, in its order."""
+
+    ids: Sequence[str]
+    t: Array
+    """(n,), [s]."""
+    T: Array
+    """(n, 4, 4), [m]."""
+    places: Sequence[str]
+    """Where each stands: `file, line 3`."""
+
+
+def made_log(file: str, rows: Rows, notes: Sequence[str]) -> Log:
+    """The tracks of a log, each with increasing times.
+
+    Raises:
+        InputError: Nothing stands in it, a time stands twice or runs backwards, or the unit of lengths is another one.
+    """
+    if not len(rows.t):
+        raise InputError(f"{file}: no pose stands in the file; give a log with one row per pose.")
+    first = float(rows.t.min())
+    names, which = np.unique(np.array(rows.ids, dtype=object).astype(str), return_inverse=True)
+    tracks = {}
+    for i, name in enumerate(names.tolist()):
+        at = np.flatnonzero(which == i)
+        _check_times(rows, name, at)
+        tracks[name] = Track(rows.t[at] - first, rows.T[at])
+    _check_unit(file, rows.T)
+    return Log(file, MappingProxyType(tracks), tuple(notes))
+
+
+def _check_times(rows: Rows, name: str, at: NDArray[np.intp]) -> None:
+    steps = np.diff(rows.t[at])
+    if len(steps) and (steps < 0.0).all():
+        raise InputError(
+            f"{rows.places[at[1]]}: the times of '{one_line(name, 60)}' run backwards from the first row to the last; "
+            "give the log in the order in which it was recorded."
+        )
+    wrong = np.flatnonzero(steps <= 0.0)
+    if wrong.size:
+        k = int(wrong[0])
+        what = "stands twice" if steps[k] == 0.0 else f"is {-steps[k]:.6g} s before the one above it"
+        raise InputError(
+            f"{rows.places[at[k + 1]]}: a time of '{one_line(name, 60)}' {what}; give one pose for each time, sorted."
+        )
+
+
+def _check_unit(file: str, T: Array) -> None:
+    """Refuse metres read as millimetres, and the other way round."""
+    distance = float(np.median(np.linalg.norm(T[:, :3, 3], axis=1)))
+    if _NEAR_M <= distance <= _FAR_M:
+        return
+    fault = "metres that were read as mm" if distance < _NEAR_M else "mm that were read as metres"
+    raise InputError(
+        f"{file}: the median distance to the camera is {distance * 1e3:.3g} mm, so these seem to be {fault}; "
+        "state the unit: columns such as x_mm or x_m, or `length` in the camera file."
+    )

@@ -1,0 +1,98 @@
+"""OBJECTS.toml: which id of a tracker is which part, and where the part's frame lies in the tracker's model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.errors import InputError, one_line, unknown
+from apo_bench.geometry.arrays import Array
+from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.strict_toml import read_toml
+from apo_bench.recording.camera_file import any_pose
+from apo_bench.recording.log import Log, Track
+from apo_bench.scenario.keys import refuse
+
+_SCHEMA = "apo-bench/objects/1"
+
+
+class TrackedPart(NamedTuple):
+    """A part as a tracker knows it."""
+
+    id: str
+    T_model_part: Array
+    """(4, 4), [m]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ObjectsFile:
+    """What an objects file states."""
+
+    file: str
+    parts: Mapping[str, TrackedPart]
+    ignored: frozenset[str]
+    """Ids that are no parts."""
+
+
+def read_objects(path: str | Path) -> ObjectsFile:
+    """What an objects file states.
+
+    Raises:
+        InputError: Anything that is not as described, naming file and key.
+    """
+    top = read_toml(path, "objects file").fields(("schema", "objects"), ("ignore",))
+    if top["schema"].text() != _SCHEMA:
+        top["schema"].fail(f'"{_SCHEMA}" is needed')
+    if not isinstance(top["objects"].value, dict) or not top["objects"].value:
+        top["objects"].fail('parts with ids are needed, such as castle1 = { id = "7" }')
+    parts: dict[str, TrackedPart] = {}
+    owner: dict[str, str] = {}
+    for part, value in top["objects"].value.items():
+        node = top["objects"].child(value, part)
+        parts[part] = _tracked(node)
+        if parts[part].id in owner:
+            refuse(
+                node, f"the id '{parts[part].id}' is that of '{owner[parts[part].id]}' already; give each part its own"
+            )
+        owner[parts[part].id] = part
+    ignored = frozenset(_id(node) for node in top["ignore"].items("ignored id")) if "ignore" in top else frozenset()
+    return ObjectsFile(str(path), parts, ignored)
+
+
+def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
+    """The tracks of parts, camera from part.
+
+    Raises:
+        InputError: An id of the log is no part, or a part is not in the log.
+    """
+    known = {one.id for one in objects.parts.values()} | objects.ignored
+    for name in log.tracks:
+        if name not in known:
+            raise InputError(
+                f"{log.file}: the id '{one_line(name, 60)}' is no part; name its part in {objects.file}, "
+                f"or add it to its key `ignore`. Known: {', '.join(sorted(known))}."
+            )
+    found: dict[str, Track] = {}
+    for part, one in objects.parts.items():
+        if one.id not in log.tracks:
+            raise InputError(
+                f"{objects.file}, {part}: {unknown('id', one.id, log.tracks).replace('Known', 'In the log')}"
+            )
+        track = log.tracks[one.id]
+        found[part] = Track(track.t, track.T @ one.T_model_part)
+    return found
+
+
+def _tracked(node: JsonNode) -> TrackedPart:
+    keys = node.fields(("id",), ("frame",))
+    return TrackedPart(_id(keys["id"]), any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
+
+
+def _id(node: JsonNode) -> str:
+    """A text, or a whole number as in BOP files."""
+    return str(node.value) if isinstance(node.value, int) and not isinstance(node.value, bool) else node.text()

@@ -1,0 +1,182 @@
+"""Which stay of which part ends which operation of a scenario.
+
+The last operation that moves a part ends with its last stay. Before, a hand may pause with a part in the air: among all
+choices in the order of the operations, the one is taken whose stays are long and whose contacts are nearly closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.recording.contact_fit import contact_fit
+from apo_bench.recording.stays import Stay, poses_at
+
+_LONG_S, _WIDE_MM = 1.0, 50.0
+"""A stay counts its seconds, up to 1; an open contact counts against it, 1 for each 10 mm or degrees, up to 5."""
+_LEFT_OVER = 5.0
+"""What a stay counts against a choice in which no operation leads to it."""
+_OVERLAP_S = 0.3
+"""A part may be taken so long before the one before it is seen to rest."""
+_CLOSE = 0.3
+"""Two choices whose worth differs by less are not told apart."""
+
+
+class NoOrder(InputError):
+    """The moves of a log are not those of the scenario."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Order:
+    """The stay with which each operation ends; None of one that was not seen."""
+
+    stays: tuple[Stay | None, ...]
+    rival: tuple[Stay | None, ...] | None
+    """Another choice that is nearly as good."""
+
+
+def order_of(
+    assembly: Assembly, stays: Mapping[str, Sequence[Stay]], start: Poses, T_world_camera: Array, unseen: Sequence[int]
+) -> Order:
+    """The best choice.
+
+    Args:
+        stays: Of every tracked part, in the frame of the camera.
+        start: Where parts stand that are not tracked, world, [m].
+        unseen: Operations, counted from 0, that the log does not show.
+
+    Raises:
+        NoOrder: No choice has the order of the operations.
+    """
+    last = {operation.main: k for k, operation in enumerate(assembly.operations) if k not in unseen}
+
+    @cache
+    def worth(k: int, i: int) -> float:
+        stay = stays[assembly.operations[k].main][i]
+        wrong_mm = contact_fit(assembly, k, world_poses(stays, stay.ends, start, T_world_camera)).wrong_mm
+        found = min(stay.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0
+        part = assembly.operations[k].main
+        moved_on = any(part in other.carries for other in assembly.operations[k + 1 :])
+        left = 0 if moved_on or last[part] != k else len(stays[part]) - 1 - i
+        return found - _LEFT_OVER * left
+
+    best = _choices(assembly, stays, worth, unseen)
+    if not best:
+        raise NoOrder(_no_order(assembly, stays))
+    rival = best[1][1] if len(best) > 1 and best[0][0] - best[1][0] < _CLOSE else None
+    picked = [
+        [None if i is None else stays[op.main][i] for op, i in zip(assembly.operations, choice, strict=True)]
+        for choice in (best[0][1], *([] if rival is None else [rival]))
+    ]
+    return Order(tuple(picked[0]), tuple(picked[1]) if rival is not None else None)
+
+
+def stated_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], ends: Sequence[float]) -> Order:
+    """The stays at times that a person stated, one for each operation.
+
+    Raises:
+        InputError: Not one for each operation, or a part does not rest there.
+    """
+    if len(ends) != len(assembly):
+        raise InputError(f"--ends: {len(assembly)} times are needed, one for each operation, {len(ends)} were given.")
+    found = []
+    for k, (operation, t) in enumerate(zip(assembly.operations, ends, strict=True)):
+        there = [stay for stay in stays[operation.main] if stay.begins <= t <= stay.ends]
+        if not there:
+            raise InputError(
+                f"--ends: '{operation.main}' does not rest at {t:g} s, where operation {k + 1} is to have ended; "
+                f"it rests {_spans(stays[operation.main])}."
+            )
+        found.append(there[0])
+    return Order(tuple(found), None)
+
+
+def world_poses(stays: Mapping[str, Sequence[Stay]], t: float, start: Poses, T_world_camera: Array) -> Poses:
+    """Where every part is at a time, in the world."""
+    return {**start, **{part: T_world_camera @ T for part, T in poses_at(stays, t).items()}}
+
+
+def moves_text(stays: Mapping[str, Sequence[Stay]]) -> str:
+    """What moved when, in a sentence."""
+    arrivals = sorted((stay.begins, part) for part, known in stays.items() for stay in known[1:])
+    shown = [f"{part} {t:.1f} s" for t, part in arrivals[:12]]
+    return ", ".join(shown) + (", ..." if len(arrivals) > 12 else "") if shown else "nothing moves"
+
+
+def _choices(
+    assembly: Assembly, stays: Mapping[str, Sequence[Stay]], worth: object, unseen: Sequence[int]
+) -> list[tuple[float, tuple[int | None, ...]]]:
+    """The two best choices of stays whose arrivals have the order of the operations, the best first."""
+    open_ones: list[tuple[float, float, tuple[int | None, ...]]] = [(0.0, -np.inf, ())]
+    for k, operation in enumerate(assembly.operations):
+        if k in unseen:
+            open_ones = [(value, t, (*choice, None)) for value, t, choice in open_ones]
+            continue
+        by_end: dict[int, list[tuple[float, float, tuple[int | None, ...]]]] = {}
+        for value, t, choice in open_ones:
+            for i, stay in enumerate(stays[operation.main]):
+                moved_on = _between(assembly, stays, choice, i) if i and stay.begins > t else None
+                if moved_on is not None:
+                    more = (value + worth(k, i) - _LEFT_OVER * moved_on, stay.begins, (*choice, i))  # type: ignore[operator]
+                    by_end.setdefault(i, []).append(more)
+        open_ones = [one for found in by_end.values() for one in sorted(found, key=lambda x: -x[0])[:2]]
+    return sorted(((value, choice) for value, _, choice in open_ones), key=lambda x: -x[0])[:2]
+
+
+def taken(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], before: Sequence[Stay | None], stay: Stay) -> float:
+    """When the part of an operation was taken: at the end of where an earlier operation had left it, else of its start.
+
+    Args:
+        before: The stays of the operations before it.
+        stay: Where it was put.
+    """
+    part = stay.part
+    own = [k for k, one in enumerate(before) if one is not None and assembly.operations[k].main == part]
+    since = own[-1] + 1 if own else 0
+    carried = any(part in operation.carries for operation in assembly.operations[since : len(before)])
+    if own and not carried:
+        left = before[own[-1]]
+        assert left is not None
+        return left.ends
+    earlier = [other for other in stays[part] if other.begins < stay.begins]
+    return earlier[-1 if carried else 0].ends if earlier else 0.0
+
+
+def _between(
+    assembly: Assembly, stays: Mapping[str, Sequence[Stay]], choice: Sequence[int | None], i: int
+) -> int | None:
+    """How often the part of the last chosen operation still moved before the next part was taken, which goes to stay i.
+
+    None if that was taken before the other was there: what is carried arrives with what carries it.
+    """
+    k = len(choice)
+    before = [None if j is None else stays[assembly.operations[n].main][j] for n, j in enumerate(choice)]
+    last = before[-1] if before else None
+    if last is None:
+        return 0
+    t = taken(assembly, stays, before, stays[assembly.operations[k].main][i])
+    if last.begins > t + _OVERLAP_S:
+        return None
+    return sum(last.begins < other.begins < t - _OVERLAP_S for other in stays[last.part])
+
+
+def _no_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]]) -> str:
+    wanted = ", ".join(operation.main for operation in assembly.operations)
+    return (
+        f"the moves of the log ({moves_text(stays)}) are not the operations of the scenario ({wanted}); check the ids "
+        "in the objects file and that the log begins before the first part is taken, or state --ends, or --unseen for "
+        "operations that the log does not show."
+    )
+
+
+def _spans(stays: Sequence[Stay]) -> str:
+    return ", ".join(f"{stay.begins:.2f} to {stay.ends:.2f}" for stay in stays[:12]) or "never"

@@ -1,0 +1,185 @@
+"""Where a part rests: the frames between two changes of its pose.
+
+A frame is still if the medians of the frames just before and just after it agree within the noise of the track itself;
+a stretch of still frames is a rest. Small shifts that no such window shows, such as those of a part that is adjusted by
+two millimetres, split a rest in two where its two sides differ by more than chance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.recording.averaging import Mean, average, common_scatter, pooled
+from apo_bench.recording.log import Track
+
+REST_S = 0.3
+"""Least duration of a rest."""
+_FEWEST = 4
+"""Frames of a rest."""
+_LEAST = np.repeat([2e-4, 1.7e-3], 3)
+"""Noise per axis below which changes are not looked for: 0.2 mm, 0.1 deg."""
+_LEAST.flags.writeable = False
+_STILL = 5.3
+"""sqrt of the 99.99 % quantile of chi-square with 6 degrees of freedom."""
+_MEDIAN = 1.77
+"""Standard deviation of the difference of two medians of m numbers, times sqrt(m)."""
+_SHIFTED = 60.0
+"""Chi-square with 6 degrees of freedom beyond which a rest is two: no chance, over all frames of a log."""
+_SAME_M, _SAME_RAD = 3e-4, 5e-3
+"""Rests that differ by less are one."""
+_EDGE = 16.8
+"""The 99 % quantile of chi-square with 6 degrees of freedom: frames at the ends of a rest that are farther off move."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A stretch of a track in which the part rests."""
+
+    first: int
+    last: int
+    """Frames of the track."""
+    begins: float
+    ends: float
+    """[s]."""
+    mean: Mean
+
+    @property
+    def seconds(self) -> float:
+        return self.ends - self.begins
+
+    @property
+    def T(self) -> Array:
+        return self.mean.T
+
+
+def rests_of(track: Track, rest_s: float = REST_S) -> tuple[Rest, ...]:
+    """The rests of a track, in order of time."""
+    n = len(track.t)
+    if n < _FEWEST:
+        return ()
+    noise = np.maximum(_noise(track.T), _LEAST)
+    m = _half_window(track.t, rest_s)
+    spans: list[tuple[int, int]] = []
+    for a, b in _still_spans(track, noise, m):
+        a, b = _trimmed(track.T, a, b, noise)
+        if b - a + 1 >= _FEWEST and track.t[b] - track.t[a] >= 0.5 * rest_s:
+            spans += _split(track.T, a, b, noise)
+    spans = _merged(track.T, spans, noise, m)
+    found = [(a, b, average(track.T[a : b + 1])) for a, b in spans if track.t[b] - track.t[a] >= 0.5 * rest_s]
+    common = common_scatter([mean for _, _, mean in found]) if found else np.zeros((6, 6))
+    return tuple(Rest(a, b, float(track.t[a]), float(track.t[b]), pooled(mean, common)) for a, b, mean in found)
+
+
+def _noise(T: Array) -> Array:
+    """Standard deviation of one frame along and about each axis, (6,), from differences of neighbours.
+
+    Parts rest most of the time, so the median of the differences is that of a part that rests.
+    """
+    d = pose.log(pose.inverse(T[:-1]) @ T[1:])
+    return np.asarray(1.4826 * np.median(np.abs(d), axis=0) / np.sqrt(2.0))
+
+
+def _half_window(t: Array, rest_s: float) -> int:
+    """Frames in half of the least rest."""
+    return max(3, round(0.5 * rest_s / max(float(np.median(np.diff(t))), 1e-6)))
+
+
+def _still_spans(track: Track, noise: Array, m: int) -> list[tuple[int, int]]:
+    """First and last frame of each stretch of still frames, with the half windows at its ends."""
+    n = len(track.t)
+    if n <= 2 * m:
+        return [(0, n - 1)]
+    window = np.arange(n - 2 * m)[:, None] + np.arange(2 * m + 1)
+    middle = pose.inverse(track.T[m : n - m])
+    xi = pose.log(middle[:, None] @ track.T[window])
+    change = np.median(xi[:, m + 1 :], axis=1) - np.median(xi[:, :m], axis=1)
+    still = np.linalg.norm(change / noise, axis=1) < _STILL * _MEDIAN / np.sqrt(m)
+    spans: list[tuple[int, int]] = []
+    for a, b in _runs(still):
+        begin, end = a, b + 2 * m
+        if spans and begin <= spans[-1][1]:
+            before, was = spans.pop()
+            half = (begin + was) // 2
+            spans.append((before, half))
+            begin = half + 1
+        spans.append((begin, end))
+    return spans
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _trimmed(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
+    """Without frames at the ends that still move: three in a row of them belong to the rest."""
+    quarter = (b - a + 1) // 4
+    core = average(T[a + quarter : b + 1 - quarter])
+    off = pose.log(pose.inverse(core.T) @ T[a : b + 1])
+    near = ((off / noise) ** 2).sum(axis=1) < _EDGE
+    good = np.convolve(near, np.ones(3), "valid") == 3
+    if not good.any():
+        return a + quarter, b - quarter
+    return a + int(np.argmax(good)), b - int(np.argmax(good[::-1]))
+
+
+def _split(T: Array, a: int, b: int, noise: Array) -> list[tuple[int, int]]:
+    """The stretch, or its parts between small shifts."""
+    n = b - a + 1
+    if n < 2 * _FEWEST:
+        return [(a, b)]
+    mean = average(T[a : b + 1])
+    xi = np.clip(pose.log(pose.inverse(mean.T) @ T[a : b + 1]) / noise, -4.0, 4.0)
+    sums, k = np.cumsum(xi, axis=0), np.arange(1, n)
+    gap = sums[:-1] / k[:, None] - (sums[-1] - sums[:-1]) / (n - k)[:, None]
+    chi = (gap**2).sum(axis=1) * k * (n - k) / n / _alike(xi)
+    chi[: _FEWEST - 1], chi[n - _FEWEST :] = 0.0, 0.0
+    at = int(np.argmax(chi))
+    size = np.abs(gap[at] * noise)
+    if chi[at] < _SHIFTED or (size[:3].max() < _SAME_M and size[3:].max() < _SAME_RAD):
+        return [(a, b)]
+    return _split(T, a, a + at, noise) + _split(T, a + at + 1, b, noise)
+
+
+def _alike(xi: Array) -> float:
+    """How many times the variance of a mean is that of independent frames: errors of neighbours may be alike.
+
+    Told by differences, which a shift of the mean does not touch: their mean square is 2 (1 - r) times the variance.
+    """
+    far = max(1, min(len(xi) // 4, 8))
+    near = float(np.median(np.abs(np.diff(xi, axis=0))))
+    wide = float(np.median(np.abs(xi[far:] - xi[:-far])))
+    r = 1.0 - min(1.0, (near / max(wide, 1e-12)) ** 2)
+    return (1.0 + r) / (1.0 - min(r, 0.99))
+
+
+def _merged(T: Array, spans: list[tuple[int, int]], noise: Array, m: int) -> list[tuple[int, int]]:
+    """Neighbouring stretches of one pose become one, unless the part went away and came back."""
+    found: list[tuple[int, int]] = []
+    for a, b in spans:
+        if found and _one_rest(T, found[-1], (a, b), noise, m):
+            a = found.pop()[0]
+        found.append((a, b))
+    return found
+
+
+def _one_rest(T: Array, before: tuple[int, int], after: tuple[int, int], noise: Array, m: int) -> bool:
+    one, two = (average(T[a : b + 1]) for a, b in (before, after))
+    off = pose.log(pose.inverse(one.T) @ two.T)
+    spread = noise * np.sqrt(1.0 / one.independent + 1.0 / two.independent)
+    apart = float(((off / spread) ** 2).sum())
+    if apart > _SHIFTED and (np.abs(off[:3]).max() > _SAME_M or np.abs(off[3:]).max() > _SAME_RAD):
+        return False
+    between = T[before[1] + 1 : after[0]]
+    if len(between) <= m:
+        return True
+    away = np.abs(np.median(pose.log(pose.inverse(one.T) @ between), axis=0) / noise)
+    return bool((away < 3.0).all())

@@ -1,0 +1,23 @@
+"""Where parts stand before the first operation: as the scenario's do, where they were seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+_HIGH_M, _TILTED_DEG = 0.01, 10.0
+"""A part that was seen so much higher or more tilted stands otherwise."""
+
+
+def standing(planned: Array, seen: Array) -> Array | None:
+    """Place and turn on the table as seen, height and tilt as planned, (4, 4); None if it stood otherwise."""
+    R = seen[:3, :3] @ planned[:3, :3].T
+    turn = float(np.degrees(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
+    made = np.array(pose.at((0.0, 0.0, 0.0), (0.0, 0.0, turn)) @ planned)
+    made[:2, 3], made[2, 3] = seen[:2, 3], planned[2, 3]
+    off = pose.log(pose.inverse(made) @ seen)
+    if abs(seen[2, 3] - planned[2, 3]) > _HIGH_M or np.degrees(np.linalg.norm(off[3:])) > _TILTED_DEG:
+        return None
+    return made

@@ -1,0 +1,71 @@
+"""Where a part stays: rests between which it is only adjusted are one stay, and what it does between two is a move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.recording.rests import Rest
+
+_ADJUSTED_M, _ADJUSTED_RAD = 0.01, np.radians(10.0)
+"""A rest that is nearer to the one before is the same stay."""
+_ADJUSTED_S = 1.5
+"""Longest time of such an adjustment."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Stay:
+    """A part at one place, adjusted or not."""
+
+    part: str
+    rests: tuple[Rest, ...]
+
+    @property
+    def begins(self) -> float:
+        return self.rests[0].begins
+
+    @property
+    def ends(self) -> float:
+        return self.rests[-1].ends
+
+    @property
+    def seconds(self) -> float:
+        return sum(rest.seconds for rest in self.rests)
+
+    def at(self, t: float) -> Rest:
+        """The rest at a time, else the last one before it."""
+        before = [rest for rest in self.rests if rest.begins <= t]
+        return before[-1] if before else self.rests[0]
+
+
+def stays_of(part: str, rests: Sequence[Rest]) -> tuple[Stay, ...]:
+    """The stays of a part, in order of time."""
+    found: list[list[Rest]] = []
+    for rest in rests:
+        if found and _is_adjusted(found[-1][-1], rest):
+            found[-1].append(rest)
+        else:
+            found.append([rest])
+    return tuple(Stay(part, tuple(together)) for together in found)
+
+
+def poses_at(stays: Mapping[str, Sequence[Stay]], t: float) -> Mapping[str, Array]:
+    """Where every part is at a time, in the frame of the camera: of one that moves, where it was last; (4, 4), [m]."""
+    found: dict[str, Array] = {}
+    for part, known in stays.items():
+        before = [stay for stay in known if stay.begins <= t]
+        if before or known:
+            found[part] = (before[-1] if before else known[0]).at(t).T
+    return found
+
+
+def _is_adjusted(before: Rest, after: Rest) -> bool:
+    off = pose.log(pose.inverse(before.T) @ after.T)
+    near = np.linalg.norm(off[:3]) < _ADJUSTED_M and np.linalg.norm(off[3:]) < _ADJUSTED_RAD
+    return bool(near and after.begins - before.ends < _ADJUSTED_S)

@@ -1,0 +1,142 @@
+"""A log reads back as it was written in every format, and what is wrong with one is said in a sentence."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.recording.camera_file import Conventions, read_camera
+from apo_bench.recording.formats import FORMATS, read_log
+from apo_bench.recording.objects_file import part_tracks, read_objects
+from benchmarks.recordings import FORMS, Tracked
+from tests.recorded import CAMERA, RATE_HZ, motion
+
+
+def tracked() -> dict[str, Tracked]:
+    t, T = motion("block_on_block")
+    model = pose.at((0.01, -0.02, 0.03), (20.0, -40.0, 60.0))
+    return {
+        part: Tracked(str(11 + i), model, t + 1.0, pose.inverse(CAMERA) @ x @ pose.inverse(model))
+        for i, (part, x) in enumerate(T.items())
+    }
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_format_gives_the_poses_that_were_written(name: str, tmp_path: Path) -> None:
+    form, written = FORMS[name], tracked()
+    form.write(written, tmp_path / form.file)
+    (tmp_path / "camera.toml").write_text(f'schema = "apo-bench/camera/1"\n[log]\n{form.log}\n', encoding="utf-8")
+    log = read_log(tmp_path / form.file, form.format, read_camera(tmp_path / "camera.toml").conventions)
+    assert form.format in FORMATS
+    for one in written.values():
+        found = log.tracks[f"tracker/{one.id}" if name == "ros-json" else one.id]
+        assert np.abs(found.T - one.T).max() < 1e-5  # files have seven digits, of up to 1500 mm
+        assert np.abs(found.t - (one.t - one.t[0])).max() < 1e-5
+
+
+def test_a_part_is_where_its_frame_lies_in_the_model(tmp_path: Path) -> None:
+    written = tracked()
+    FORMS["tum"].write(written, tmp_path / "log")
+    frame = "at_mm = [10, -20, 30], turn_deg = [20, -40, 60]"
+    parts = "\n".join(f'{part} = {{ id = "{one.id}", frame = {{ {frame} }} }}' for part, one in written.items())
+    (tmp_path / "o.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{parts}\n', encoding="utf-8")
+    tracks = part_tracks(read_log(tmp_path / "log", "tum", Conventions()), read_objects(tmp_path / "o.toml"))
+    for part, T in motion("block_on_block")[1].items():
+        assert np.abs(CAMERA @ tracks[part].T - T).max() < 1e-6
+
+
+HEAD = "t_s,id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"
+ROW = "0.1,a,0,0,900,1,0,0,0\n"
+WRONG: dict[str, tuple[str, str]] = {
+    "empty": ("", "the file is empty"),
+    "no rows": (HEAD, "no pose stands in the file"),
+    "not finite": (HEAD + ROW + "0.2,a,nan,0,900,1,0,0,0\n", "line 3, column x_mm: a finite number is needed, 'nan'"),
+    "time twice": (HEAD + ROW + ROW, "line 3: a time of 'a' stands twice"),
+    "backwards": (HEAD + "0.2,a,0,0,900,1,0,0,0\n0.1,a,0,0,900,1,0,0,0\n", "the times of 'a' run backwards"),
+    "metres": (HEAD + "0.1,a,0,0,0.9,1,0,0,0\n", "these seem to be metres that were read as mm; state the unit"),
+    "length": (HEAD + "0.1,a,0,0,900,1,1,0,0\n", "line 2: a quaternion of length 1 is needed, one of length 1.414"),
+    "order": ("t_s,id,x_mm,y_mm,z_mm,q0,q1,q2,q3\n" + ROW, 'do not say their order; state `quaternion = "wxyz"`'),
+    "unit": ("t_s,id,x,y,z,qw,qx,qy,qz\n" + ROW, "the unit of the column 'x' is not known"),
+    "cells": (HEAD + "0.1,a,0,0\n", "line 2: 9 cells are needed, 4 were given"),
+    "euler": ("t_s,id,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0.1,a,0,0,900,1,0,0\n", "do not say their order"),
+    "no time": ("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,0,0,900,1,0,0,0\n", "the column of the time is missing"),
+    "semicolons": (HEAD.replace(",", ";"), "columns are separated by commas; this file uses ';'"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_wrong_with_a_log_is_one_sentence(what: str, tmp_path: Path) -> None:
+    text, sentence = WRONG[what]
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as found:
+        read_log(tmp_path / "log.csv", "csv", Conventions())
+    assert sentence in str(found.value)
+    assert str(found.value).startswith(str(tmp_path))
+    assert str(found.value).endswith(".")
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_pipe_is_not_waited_for(form: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "log.csv")
+    with pytest.raises(InputError, match="a pipe was given; give a"):
+        read_log(tmp_path / "log.csv", form, Conventions(rate_hz=1.0))
+
+
+def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("apo_bench.recording.csv_log.LARGEST_BYTES", 1000)
+    (tmp_path / "log.csv").write_text(HEAD + "".join(f"{i},a,0,0,900,1,0,0,0\n" for i in range(100)), encoding="utf-8")
+    with pytest.raises(InputError, match=r"larger than 0\.001 MB; cut the log"):
+        read_log(tmp_path / "log.csv", "csv", Conventions())
+
+
+def test_an_id_that_is_no_part_and_a_part_without_its_id_are_named(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
+    log = read_log(tmp_path / "log.csv", "csv", Conventions())
+    for id_, sentence in (("b", "the id 'a' is no part"), ("a", "")):
+        text = f'schema = "apo-bench/objects/1"\n[objects]\npeg = {{ id = "{id_}" }}\n'
+        (tmp_path / "o.toml").write_text(text, encoding="utf-8")
+        if sentence:
+            with pytest.raises(InputError, match=sentence):
+                part_tracks(log, read_objects(tmp_path / "o.toml"))
+    (tmp_path / "o.toml").write_text(text + 'hole = { id = "c" }\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"hole: unknown id 'c'\. In the log: a\."):
+        part_tracks(log, read_objects(tmp_path / "o.toml"))
+
+
+JSON: dict[str, tuple[Callable[[dict], object], str]] = {
+    "no pose": (lambda m: {"header": m["header"]}, "a field `pose` or `transform` is needed"),
+    "text": (lambda m: m | {"pose": m["pose"] | {"position": {"x": "1", "y": 0, "z": 1}}}, "x: a finite number"),
+    "no stamp": (lambda m: {"pose": m["pose"]}, "header.stamp: a finite number is needed"),
+    "length": (lambda m: m | {"pose": m["pose"] | {"orientation": dict.fromkeys("xyzw", 1)}}, "length 2 was given"),
+    "number": (lambda m: 3, "a message with named fields is needed"),
+}
+
+
+@pytest.mark.parametrize("what", JSON)
+def test_what_is_wrong_with_a_message_is_one_sentence(what: str, tmp_path: Path) -> None:
+    change, sentence = JSON[what]
+    turn, stamp = {"x": 0, "y": 0, "z": 0, "w": 1}, {"stamp": {"sec": 1, "nanosec": 5}}
+    message = {"header": stamp, "pose": {"position": {"x": 0, "y": 0, "z": 1}, "orientation": turn}}
+    (tmp_path / "log.json").write_text(json.dumps([message]), encoding="utf-8")
+    assert list(read_log(tmp_path / "log.json", "ros-json", Conventions()).tracks) == ["log"]
+    (tmp_path / "log.json").write_text(json.dumps([change(message)]), encoding="utf-8")
+    with pytest.raises(InputError, match=sentence):
+        read_log(tmp_path / "log.json", "ros-json", Conventions())
+
+
+def test_images_of_bop_are_counted_by_the_rate_and_the_best_estimate_counts(tmp_path: Path) -> None:
+    rows = [f"1,{i},5,{score},1 0 0 0 1 0 0 0 1,0 0 {z},0.1" for i in range(3) for score, z in ((0.2, 800), (0.9, 900))]
+    text = "\n".join(["scene_id,im_id,obj_id,score,R,t,time", *rows])
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    track = read_log(tmp_path / "log.csv", "bop", Conventions(rate_hz=RATE_HZ)).tracks["5"]
+    assert np.allclose(track.T[:, 2, 3], 0.9)
+    assert np.allclose(track.t * RATE_HZ, [0, 1, 2])
+    with pytest.raises(InputError, match="state `rate_hz` in the camera file"):
+        read_log(tmp_path / "log.csv", "bop", Conventions())

@@ -1,0 +1,153 @@
+"""A recording gives the goals that were reached, in their order, and what is wrong with it is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.recording.bare import bare_recording
+from apo_bench.recording.camera_file import CameraFile, Conventions
+from apo_bench.recording.importing import Imported, Stated, import_recording
+from apo_bench.recording.log import Track
+from apo_bench.recording.paths import Path, last_straight
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import layout_at
+from tests.recorded import CAMERA, motion, seen
+
+NOTHING = Stated()
+GIVEN = CameraFile(Conventions(), CAMERA, {}, None)
+NAME = "stick_in_tower"
+KNOWN = replace(GIVEN, T_world_camera=None, known=dict.fromkeys(("castle1", "castle2", "stick")))
+
+
+def imported(
+    tracks: dict[str, Track], camera: CameraFile = GIVEN, name: str = NAME, stated: Stated = NOTHING
+) -> Imported:
+    return import_recording(tracks, camera, load_scenario(name), stated, "log.csv")
+
+
+def goals(name: str) -> np.ndarray:
+    return layout_at(load_scenario(name), 0.1, 0.0, 0.3).goals
+
+
+@pytest.mark.parametrize("name", [NAME, "carried_bridge"])
+@pytest.mark.parametrize("camera", ["given", "solved"])
+def test_goals_are_found_within_the_noise_of_their_means(name: str, camera: str) -> None:
+    tracks = seen(name, 0.5)
+    stated = GIVEN if camera == "given" else replace(KNOWN, known=dict.fromkeys(tracks))
+    found = imported(tracks, stated, name)
+    off = pose.log(pose.inverse(goals(name)) @ found.observation.goals)
+    # 24 frames and more: 0.1 mm and 0.1 deg per axis; five times that, and as much again for a solved camera.
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert np.degrees(np.abs(off[:, 3:]).max()) < 1.0
+    assert found.unclear == ()
+    assert bool(found.observation.shared) == (camera == "solved")
+
+
+def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> None:
+    tracks = seen(NAME, 0.3)
+    rng = np.random.default_rng(1)
+    for part, (t, T) in tracks.items():
+        wrong = T.copy()
+        wrong[::17] = wrong[::17] @ pose.at((0.05, 0.0, 0.0), (0.0, 120.0, 0.0))
+        kept = rng.random(len(t)) > 0.2
+        tracks[part] = Track(t[kept], wrong[kept])
+    found = imported(tracks)
+    off = pose.log(pose.inverse(goals(NAME)) @ found.observation.goals)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert all(not one.rest.mean.inlier.all() for one in found.operations if one.rest is not None)
+
+
+def test_the_covariance_of_a_frame_is_that_of_its_noise() -> None:
+    scatter = [one.rest.mean.scatter for one in imported(seen(NAME, 1.0)).operations if one.rest]
+    deviations = np.sqrt([np.diagonal(S) for S in scatter]) / np.repeat([1e-3, np.radians(1.0)], 3)
+    assert np.abs(deviations - 1.0).max() < 0.6  # 24 frames: 15 % each, eighteen of them
+    assert abs(deviations.mean() - 1.0) < 0.15
+
+
+def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> None:
+    arc = np.linspace(-np.pi / 2, 0.0, 40)
+    bent = np.column_stack([0.1 * np.sin(arc), np.zeros(40), 0.06 + 0.1 * (1 - np.cos(arc))])
+    bent = bent[:, [2, 1, 0]] * [1.0, 1.0, -1.0] + [-0.06, 0.0, 0.06]
+    down = np.column_stack([np.zeros((20, 2)), np.linspace(0.06, 0.001, 20)])
+    noise = 3e-4 * np.random.default_rng(0).standard_normal((60, 3))
+    T = np.tile(np.eye(4), (60, 1, 1))
+    T[:, :3, 3] = np.concatenate([bent, down]) + noise
+    found = last_straight(Path(np.arange(60.0), T), np.eye(4))
+    assert found is not None
+    assert found.direction @ [0.0, 0.0, -1.0] > np.cos(np.radians(5.0))
+    assert 0.05 < found.length_m < 0.09
+
+
+def test_without_a_scenario_the_order_is_found_all_the_same() -> None:
+    puts = bare_recording(seen("carried_bridge", 0.5), GIVEN, "log.csv").puts
+    operations = load_scenario("carried_bridge").assembly.operations
+    assert [(put.part, *put.carries) for put in puts[:4]] == [operation.moves for operation in operations[:4]]
+    assert {puts[4].part, *puts[4].carries} == set(operations[4].moves)
+
+
+def test_times_may_be_stated_and_operations_left_out() -> None:
+    tracks = seen(NAME, 0.5)
+    told = imported(tracks, stated=Stated(ends=(2.2, 4.0, 5.8)))
+    assert np.array_equal(told.observation.goals, imported(tracks).observation.goals)
+    hidden = imported(tracks, stated=Stated(unseen=(1,)))
+    assert hidden.observation.seen.tolist() == [True, False, True]
+    with pytest.raises(InputError, match=r"'castle2' does not rest at 3\.3 s, where operation 2 is to have ended"):
+        imported(tracks, stated=Stated(ends=(2.2, 3.3, 5.8)))
+
+
+FLIP = np.outer(*[np.array([1.0, -1.0, 1.0, 1.0])] * 2)
+
+
+def swapped(T: np.ndarray) -> np.ndarray:
+    packed = pose.pack(T)
+    return pose.unpack(np.concatenate([packed[:, :3], np.roll(packed[:, 3:], 1, axis=1)], axis=1))
+
+
+MISTAKES = {
+    "quaternions": (swapped, "no contact fits .* order wxyz"),
+    "mirrored": (lambda T: T * FLIP, "no contact fits .* mirrored"),
+    "inverted": (pose.inverse, "no contact fits .* camera in the model"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("camera", [GIVEN, KNOWN], ids=["given", "solved"])
+def test_a_usual_mistake_is_named_with_what_mends_it(mistake: str, camera: CameraFile) -> None:
+    change, sentence = MISTAKES[mistake]
+    tracks = {part: Track(t, change(T)) for part, (t, T) in seen(NAME, 0.3).items()}
+    with pytest.raises(InputError, match=sentence) as found:
+        imported(tracks, camera)
+    assert str(found.value).endswith(".")
+    assert "\n" not in str(found.value)
+
+
+def test_time_that_runs_backwards_is_named() -> None:
+    tracks = {part: Track(t[-1] - t[::-1], T[::-1]) for part, (t, T) in seen(NAME, 0.3).items()}
+    with pytest.raises(InputError, match=r"log\.csv: time seems to run backwards"):
+        imported(tracks)
+
+
+def test_parts_that_were_taken_for_each_other_are_no_recording_of_the_scenario() -> None:
+    tracks = seen(NAME, 0.3)
+    tracks["castle1"], tracks["stick"] = tracks["stick"], tracks["castle1"]
+    with pytest.raises(InputError, match=r"the moves of the log \(.*\) are not the operations"):
+        imported(tracks)
+
+
+def test_a_part_that_is_not_tracked_or_not_there_is_named() -> None:
+    tracks = seen(NAME, 0.3)
+    with pytest.raises(InputError, match="'stick', which operation 3 moves, is not tracked"):
+        imported({part: track for part, track in tracks.items() if part != "stick"})
+    with pytest.raises(InputError, match="unknown part 'stik'; did you mean 'stick'"):
+        imported({**tracks, "stik": tracks["stick"]})
+
+
+def test_the_recording_is_what_it_says() -> None:
+    t, T = motion(NAME)
+    assert np.array_equal(T["stick"][-1], goals(NAME)[2])
+    assert (np.diff(t) > 0).all()
