@@ -60,6 +60,24 @@ class Reached:
 
 
 @final
+@dataclass(frozen=True)
+class InHand:
+    """How far a part moved in the hand since it was grasped: flat pads hold a shaft along two lines only.
+
+    A length is that of the point between the pads, an angle any turn: rolling between them and turning about them.
+    """
+
+    operation: int
+    """Counted from 0."""
+    carried_m: float
+    carried_rad: float
+    """When the last motion, to its place, began."""
+    moved_m: float
+    moved_rad: float
+    """When it was let go of, or the replay failed; the larger one where the grip was changed."""
+
+
+@final
 @dataclass(frozen=True, eq=False)
 class ReplayResult:
     """One replay: what was reached and how it went."""
@@ -71,3 +89,5 @@ class ReplayResult:
     sim_seconds: float
     timeline: tuple[tuple[Step, float], ...] = ()
     """Each step that was finished, with the simulated time at which it was over, [s]."""
+    in_hand: tuple[InHand, ...] = ()
+    """Of each operation whose part was grasped; no controller reads it."""

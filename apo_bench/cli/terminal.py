@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from apo_bench.io.plain_text import clean
-from apo_bench.records.row import FreedSet, Predicted, Row
+from apo_bench.records.row import FreedSet, MovedInHand, Predicted, Row
 from apo_bench.records.run import verdicts
 from apo_bench.records.settings import RANGE
 from apo_bench.report.tables.cells import cell_table
@@ -156,7 +156,16 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         lines.append(("test", _test(row)))
     if row["sim_seconds"] is not None:
         lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
+    if row["moved_in_hand"]:
+        lines.append(("in the hand", _in_hand(row["moved_in_hand"], row["failure_operation"])))
     return lines
+
+
+def _in_hand(moved: Sequence[MovedInHand], failed: int | None) -> str:
+    """Of the operation that failed, where its part was held, else of the part that turned most."""
+    one = max(moved, key=lambda each: (each["operation"] == failed, each["deg"]))
+    before = f"{one['carried_mm']:.2f} mm and {one['carried_deg']:.2f} degrees before it was put to its place"
+    return f"the part of operation {one['operation']} moved {before}, {one['mm']:.2f} and {one['deg']:.2f} in all"
 
 
 def _attempt(attempt: FreedSet) -> str:

@@ -55,6 +55,18 @@ class FreeMoved(TypedDict):
     deg: _Size
 
 
+class MovedInHand(TypedDict):
+    """An operation, and how far its part moved in the hand after the grasp, [mm] and [deg]."""
+
+    operation: _Operation
+    carried_mm: _Size
+    carried_deg: _Size
+    """When its last motion, to its place, began."""
+    mm: _Size
+    deg: _Size
+    """When it was let go of, or the replay failed."""
+
+
 class Predicted(TypedDict):
     """What a plan said about itself, and how far off it is then [mm]."""
 
@@ -191,6 +203,8 @@ class Row(TypedDict, total=False):
     """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
     peak_force_n: _Size | None
     """Largest contact force that the gripper met [N]."""
+    moved_in_hand: list[MovedInHand] | None
+    """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
     sim_seconds: _Size | None
     """Simulated time [s]."""
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, cast
 
 import numpy as np
 
 from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.assembly.reached import Snapshot
+from apo_bench.assembly.reached import InHand, Snapshot
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -17,7 +18,7 @@ from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.records.method import knows_relations, knows_truth, parsed
 from apo_bench.records.relations import RECOGNISED
-from apo_bench.records.row import Row, finite
+from apo_bench.records.row import MovedInHand, Row, finite
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
@@ -235,7 +236,18 @@ def _physics(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
         "pose_error_fixed_mm": finite(fixed),
         "pose_error_free_mm": finite(free),
         "peak_force_n": finite(result.peak_force_n),
+        "moved_in_hand": [_moved(each) for each in result.in_hand],
         "sim_seconds": result.sim_seconds,
+    }
+
+
+def _moved(each: InHand) -> MovedInHand:
+    return {
+        "operation": each.operation + 1,
+        "carried_mm": 1e3 * each.carried_m,
+        "carried_deg": math.degrees(each.carried_rad),
+        "mm": 1e3 * each.moved_m,
+        "deg": math.degrees(each.moved_rad),
     }
 
 

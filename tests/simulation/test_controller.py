@@ -84,6 +84,8 @@ def test_the_true_layout_is_assembled(name: str, request: pytest.FixtureRequest)
     assert verdict.success
     assert verdict.loose_success
     assert 1.0 < result.peak_force_n < 60.0
+    assert [each.operation for each in result.in_hand] == list(range(len(scene.scenario.assembly)))
+    assert all(0.0 < each.moved_m < 5e-4 and each.moved_rad < np.radians(0.5) for each in result.in_hand)
 
 
 def test_an_ideal_gripper_assembles_it_too(tower: Scene) -> None:
@@ -158,6 +160,7 @@ def test_a_part_that_is_not_where_it_should_be_is_a_lost_grasp(tower: Scene) -> 
     elsewhere = {**truth.start, "castle1": truth.start["castle1"] @ pose.at((-0.10, 0, 0))}
     result = replay(plan, tower, parts_at=elsewhere)
     assert (result.outcome.stage, result.outcome.code) == ("pick", "lost_grasp")
+    assert [each.operation for each in result.in_hand] == [0]
 
 
 def test_the_same_plan_gives_the_same_bytes_whatever_ran_before(tower: Scene) -> None:
@@ -166,7 +169,7 @@ def test_the_same_plan_gives_the_same_bytes_whatever_ran_before(tower: Scene) ->
     again, _ = run(tower, 2, layout(tower, 2).goals)
     for part, T in first.reached.final.poses.items():
         assert np.array_equal(T, again.reached.final.poses[part])
-    assert first.peak_force_n == again.peak_force_n
+    assert (first.peak_force_n, first.in_hand) == (again.peak_force_n, again.in_hand)
 
 
 def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) -> None:

@@ -28,7 +28,16 @@ NUMBERS: Mapping[str, str] = {
     "sim_seconds": "simulated [s]",
 }
 """Numbers of a row that the page shows, in its order, with what they are called there."""
-_LEFT_OUT = ("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "free_moved", "reached")
+_LEFT_OUT = (
+    "env_id",
+    "thresholds",
+    "as_demonstrated_code",
+    "conditions",
+    "tried",
+    "free_moved",
+    "moved_in_hand",
+    "reached",
+)
 """Not kept of a row; it is read again where it is needed."""
 COLUMNS = tuple(column for column in ROW_FIELDS if column not in _LEFT_OUT)
 """What is kept of a row."""

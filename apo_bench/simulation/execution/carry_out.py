@@ -71,6 +71,7 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.follow(smooth(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
+    robot.hold_watch = robot.hold_watch.carry(robot.in_hand())
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.load() < _LOST_LOAD * t.weight_n:
         raise Halt("carry", "lost_grasp", " or ".join(t.carried))

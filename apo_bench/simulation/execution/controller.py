@@ -14,6 +14,7 @@ from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, moves, unreachable
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
+from apo_bench.simulation.robot.hold_watch import HoldWatch
 from apo_bench.simulation.robot.robot import Halt, Robot, Watch
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import sleeping, snapshot
@@ -71,6 +72,7 @@ def replay(
         peak_force_n=robot.peak_force_n,
         sim_seconds=float(robot.data.time),
         timeline=tuple(timeline),
+        in_hand=robot.hold_watch.finished,
     )
     if way and not refused and outcome.code != "time_limit":
         cache.end(way[-1], result)
@@ -118,8 +120,11 @@ def _carry_out(
             else:
                 grip = kept.grip
             bring(robot, t, grip)
+            _watched(robot, step)
             _until_rest(robot)
         except Halt as halt:
+            if halt.code != "unstable_simulation":
+                _watched(robot, step)
             if halt.code == "force_stop" and not step.undo:
                 after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
             return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
@@ -127,6 +132,14 @@ def _carry_out(
         timeline.append((step, float(robot.data.time)))
         cache.keep(way[2 * i + 1], robot, 0, after, timeline)
     return Outcome("done", "ok", None, sentence("ok"))
+
+
+def _watched(robot: Robot, step: Step) -> None:
+    """Write down how the part moved in the hand; of an operation that is undone nothing."""
+    watch = robot.hold_watch
+    if watch.grasped is not None:
+        watch = watch.release(robot.in_hand())
+    robot.hold_watch = HoldWatch(finished=watch.finished) if step.undo else watch.finish(step.operation)
 
 
 def _until_rest(robot: Robot) -> None:

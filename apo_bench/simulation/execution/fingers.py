@@ -30,11 +30,13 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
         robot.weld(t.part, True)
     else:
         robot.fingers(grip.half_width - robot.arm.squeeze_m)
+    robot.hold_watch = robot.hold_watch.grasp(robot.in_hand())
     check_hold(robot, grip)
 
 
 def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "release"
+    robot.hold_watch = robot.hold_watch.release(robot.in_hand())
     if robot.scene.grasp == "weld":
         robot.weld(t.part, False)
     robot.fingers(min(grip.half_width + _OPEN_TO_RELEASE_M, robot.arm.opening_m))

@@ -18,6 +18,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.robot.fast_forward import fast_forward
 from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.hold_watch import HoldWatch
 from apo_bench.simulation.robot.near import Moving, clear, near_spans
 from apo_bench.simulation.robot.opening import fingers_of
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
@@ -68,6 +69,7 @@ class Robot:
         self.model, self.arm = scene.work.model, scene.arm
         self.stage = "plan"
         self._held: tuple[str, ...] = ()
+        self.hold_watch = HoldWatch()
         self._kept: dict[str, Array] = {}
         self._handled: int | None = None
         self.peak_force_n = 0.0
@@ -201,11 +203,13 @@ class Robot:
 
     def memory(self) -> tuple[Any, ...]:
         """What the controller knows, apart from the physics; for `remember`."""
-        return (self.q, self.T, self.stage, self._held, self._handled, self.peak_force_n, self.left_out_s)
+        felt = (self.peak_force_n, self.left_out_s, self.hold_watch)
+        return (self.q, self.T, self.stage, self._held, self._handled, *felt)
 
     def remember(self, memory: tuple[Any, ...]) -> None:
         """Go on from where a `memory` was made, once the physics are where they were then."""
-        self.q, self.T, self.stage, held, self._handled, self.peak_force_n, self.left_out_s = memory
+        self.q, self.T, self.stage, held, self._handled, *felt = memory
+        self.peak_force_n, self.left_out_s, self.hold_watch = felt
         self.hold(*held)
 
     def load(self) -> float:
@@ -220,6 +224,11 @@ class Robot:
         for i in map(free.index, parts):
             self._net[:, 3 * (len(free) + i) : 3 * (len(free) + i) + 3] += np.eye(3)
             self._net[:, 3 * i : 3 * i + 3] -= np.eye(3)
+
+    def in_hand(self) -> Array:
+        """Where the held part lies in the frame of the tip, (4, 4), for `HoldWatch`: nothing is decided by it."""
+        tip = pose.inverse(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
+        return np.asarray(tip @ part_pose(self.scene.work, self.data, self._held[0]))
 
     def weld(self, part: str, on: bool) -> None:
         """The ideal gripper: hold the part exactly as it now is, or let go."""
