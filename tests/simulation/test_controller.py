@@ -85,7 +85,9 @@ def test_the_true_layout_is_assembled(name: str, request: pytest.FixtureRequest)
     assert verdict.loose_success
     assert 1.0 < result.peak_force_n < 60.0
     assert [each.operation for each in result.in_hand] == list(range(len(scene.scenario.assembly)))
-    assert all(0.0 < each.moved_m < 5e-4 and each.moved_rad < np.radians(0.5) for each in result.in_hand)
+    most = np.max([(each.moved_m, each.moved_rad) for each in result.in_hand], axis=0)
+    assert 0.0 < most[0] < 2e-3, "boxes creep along the pads while they are carried"
+    assert most[1] < np.radians(0.5)
 
 
 def test_an_ideal_gripper_assembles_it_too(tower: Scene) -> None:
