@@ -34,6 +34,8 @@ headline: $(VENV)/.installed
 	    --out $(OUT)
 	$(BIN)/apo-bench report $(OUT)
 
+# bytecode of the package and its tests is kept, as hundreds of processes are started
+test numeric: export PYTHONDONTWRITEBYTECODE :=
 # what needs one core runs beside what needs the other; three processes for two cores, as some tests wait for a process
 # or a limit
 test: $(VENV)/.installed-dev

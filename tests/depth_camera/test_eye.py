@@ -47,8 +47,12 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def watched(name: str, seed: int = 3) -> Recording:
+def _watched(name: str, seed: int) -> Recording:
     return record_demonstration(scene(name), 1.0, seed, "range")
+
+
+def watched(name: str, seed: int = 3) -> Recording:
+    return _watched(name, seed)
 
 
 def observed(name: str, level_mm: float, seed: int = 3) -> Observation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -111,6 +112,7 @@ def test_heavy_tails_are_those_of_student() -> None:
     assert kstest(np.sum((gaussian / sigma) ** 2, axis=1) / 6, f(6, FREEDOM).cdf).pvalue < 1e-6
 
 
+@cache
 def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
     """Errors in units of the level, whether they are outliers by construction, and whether they were seen."""
     sigma, unit, gross, seen = np.repeat([2e-3, np.radians(2.0)], 3), [], [], []

@@ -28,13 +28,21 @@ from apo_bench.trial.trial import run_trial
 
 
 @cache
-def scene(name="stick_in_tower", grasp="friction"):
+def _scene(name, grasp):
     return build_scene(load_scenario(name), grasp=grasp)
 
 
 @cache
-def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
+def _shown(name, grasp, seed, careless):
     return record_demonstration(scene(name, grasp), careless, seed)
+
+
+def scene(name="stick_in_tower", grasp="friction"):
+    return _scene(name, grasp)
+
+
+def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
+    return _shown(name, grasp, seed, careless)
 
 
 def row(method, fidelity, *, grasp="friction", level=1.0, cache=None):

@@ -48,6 +48,7 @@ def foretold(plan: Plan, scene: Scene) -> Prediction:
     return predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
 
 
+@cache
 def planned(name: str, seed: int, corrector: Any = plain) -> tuple[Correction, FittingPlan]:
     correction = correct(seen_at(name, seed), corrector)
     return correction, fitting_plan(correction, seen_at(name, seed), scene_named(name))
