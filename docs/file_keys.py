@@ -256,7 +256,7 @@ def scenario_keys() -> Keys:
     plain = [name for name, files in parts.items() if not any(Path(f).with_suffix(".toml").exists() for f in files)]
     with listening() as heard, tempfile.TemporaryDirectory() as folder:
         for name in plain:
-            load_scenario(name)
+            load_scenario(ROOT / "scenarios" / f"{name}.toml")
         own = Path(folder) / "own.toml"
         own.write_text(example(EXAMPLES[0], "own.toml"), encoding="utf-8")
         load_scenario(own)

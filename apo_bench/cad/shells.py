@@ -16,6 +16,7 @@ from apo_bench.geometry.arrays import Array
 _SAME, _COPY = 1e-7, 2e-6
 """Corners are one, and solids the same, within this part of their size."""
 _MOST_SOLIDS = 200
+_ASKED = 12
 
 
 class Closed(NamedTuple):
@@ -134,8 +135,7 @@ def _apart(path: Path, mesh: Mesh) -> list[tuple[Mesh, bool]]:
         raise InputError(f"{path}: the file holds {count_shells} shells; {_MOST_SOLIDS} are the most, so split it.")
     shells = [mesh.part(np.flatnonzero(owner == shell)) for shell in range(count_shells)]
     inside = [
-        [i for i, outer in enumerate(shells) if i != k and _contains(outer, shell.corners[0])]
-        for k, shell in enumerate(shells)
+        [i for i, outer in enumerate(shells) if i != k and _contains(outer, shell)] for k, shell in enumerate(shells)
     ]
     found = []
     for k, shell in enumerate(shells):
@@ -157,11 +157,18 @@ def _facing(mesh: Mesh, outwards: bool) -> Mesh:
     return mesh if (mesh.volume > 0.0) == outwards else Mesh(mesh.corners, mesh.triangles[:, ::-1])
 
 
-def _contains(shell: Mesh, point: Array) -> bool:
-    """Whether a point is inside of a shell: its solid angle is a whole one."""
+def _contains(shell: Mesh, inner: Mesh) -> bool:
+    """Whether a shell is around another one: the solid angle at corners of that is a whole one.
+
+    At a corner on the surface, where solids touch, it is anything, so several are asked.
+    """
     low, high = shell.corners.min(axis=0), shell.corners.max(axis=0)
-    if (point < low).any() or (point > high).any():
+    if (inner.corners < low).any() or (inner.corners > high).any():
         return False
+    return all(_is_inside(shell, point) for point in inner.corners[:: max(1, len(inner.corners) // _ASKED)])
+
+
+def _is_inside(shell: Mesh, point: Array) -> bool:
     a, b, c = (shell.corners[shell.triangles[:, i]] - point for i in range(3))
     x, y, z = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     above = (a * np.cross(b, c)).sum(axis=1)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from apo_bench.cad.importing import import_part, part_name, raw_solids
+from apo_bench.cad.raw import Mesh, RawSolid, Region
 from apo_bench.drafting.posed import free_name
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -15,33 +17,63 @@ from apo_bench.geometry.arrays import Array
 POSES = "poses.toml"
 
 
-def import_assembly(file: Path, folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
+def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: int = 2) -> tuple[Path, tuple[str, ...]]:
     """Write the parts of an assembly, each shape once, and where every copy of them is.
+
+    Frames of parts lie at the parts, wherever the file has its origin: a pose that is seen turned a little turns a part
+    about its own frame.
+
+    Args:
+        fewest: Solids that the file must hold.
 
     Returns:
         The file of poses, and what was imported, one sentence each.
 
     Raises:
-        InputError: The file cannot be read, a solid makes no part, or there is only one.
+        InputError: The file cannot be read, a solid makes no part, or there are too few.
     """
     _, raws = raw_solids(file, unit)
-    if sum(len(raw.poses) for raw in raws) < 2:
+    if sum(len(raw.poses) for raw in raws) < fewest:
         raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
     folder.mkdir(parents=True, exist_ok=True)
     tables, said, used, copies = list[str](), list[str](), set[str](), set[str]()
     for raw in raws:
         called = free_name(part_name(raw.name), used)
         used.add(called)
-        done = import_part(raw, called, folder, f"{file.name}, {raw.name}")
+        foot = _foot(raw.mesh)
+        done = import_part(_shifted(raw, -foot), called, folder, f"{file.name}, {raw.name}")
         said.append(f"{called}: {len(done.solid.faces)} flat and {len(done.solid.rounds)} round faces")
         said += [f"{called}.{face} can make no contact: {why}" for face, why in done.refused.items()]
         for T in raw.poses:
             name = free_name(called, copies)
             copies.add(name)
-            tables.append(_table(called, name, T))
+            tables.append(_table(called, name, T @ pose.at(foot)))
     written = folder / POSES
     written.write_text(f"# The parts of {file.name}, in its frame.\n" + "".join(tables), encoding="utf-8")
     return written, tuple(said)
+
+
+def _foot(mesh: Mesh) -> Array:
+    """The middle of the lower side of the box around a mesh, (3,), to a micrometre, [mm]."""
+    low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
+    return np.round([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]], 3)
+
+
+def _shifted(raw: RawSolid, by: Array) -> RawSolid:
+    """The same solid elsewhere, [mm]."""
+    mesh = Mesh(raw.mesh.corners + by, raw.mesh.triangles)
+    return replace(raw, mesh=mesh, regions=tuple(_moved(region, by) for region in raw.regions))
+
+
+def _moved(region: Region, by: Array) -> Region:
+    """A plane is known by one of its points, an axis by the foot of the origin on it."""
+    if region.point is None:
+        return region
+    point = region.point + by
+    if region.axis is None:
+        return replace(region, point=point)
+    along = float(point @ region.axis)
+    return replace(region, point=point - along * region.axis, span=(region.span[0] + along, region.span[1] + along))
 
 
 def _table(part: str, name: str, T: Array) -> str:

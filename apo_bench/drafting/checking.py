@@ -161,7 +161,7 @@ def _play(scenario: Scenario) -> Iterator[str]:
 
 def _grasp_named(sentence: str) -> str:
     """`operation 2: the grasp` names the key `grasp`."""
-    return re.sub(r"^(operation \d+)(:| )", r"\1, grasp\2", sentence)
+    return re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", sentence)
 
 
 def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:

@@ -38,11 +38,12 @@ class PosedPart:
     color: tuple[float, float, float] | None = None
 
 
-def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
+def read_posed(poses: Path, files: Sequence[str] = (), fewest: int = 2) -> tuple[PosedPart, ...]:
     """Every copy of a part that a file of poses names.
 
     Args:
         files: Part files, or names of parts of the package. What is not among them is looked for beside the poses.
+        fewest: Poses that are needed.
 
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
@@ -54,8 +55,8 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     found: list[PosedPart] = []
     for node in nodes:
         found.append(_posed(node, given, poses.parent, solids, {each.name for each in found}))
-    if not 2 <= len(found) <= _MOST:
-        raise InputError(f"{poses}: {len(found)} poses were given; 2 to {_MOST} parts make an assembly.")
+    if not fewest <= len(found) <= _MOST:
+        raise InputError(f"{poses}: {len(found)} poses were given; {fewest} to {_MOST} parts make an assembly.")
     left = [name for name, file in given.items() if file not in solids]
     if left:
         raise InputError(f"{poses}: '{left[0]}' has no pose; add [[pose]] part = \"{left[0]}\", or leave the part out.")

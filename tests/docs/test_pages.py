@@ -43,6 +43,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
     r"eye ": "many depth images; tests/depth_camera runs them",
     r"part import ": "needs a CAD file; tests/cad runs it",
+    r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",
     r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",
 }

@@ -1,0 +1,47 @@
+"""A CAD file of several solids: those that touch, one with a cavity, copies; frames at the parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from apo_bench.drafting.assembly_file import import_assembly
+from apo_bench.drafting.posed import read_posed
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from tests.cad.made import block, rod
+
+
+def stl(folder: Path, *solids: object) -> Path:
+    """All solids in one file, whether they touch or not."""
+    meshes = [solid.to_mesh() for solid in solids]  # type: ignore[attr-defined]
+    path = folder / "pile.stl"
+    trimesh.util.concatenate([trimesh.Trimesh(m.vert_properties, m.tri_verts) for m in meshes]).export(path)
+    return path
+
+
+def test_solids_that_touch_are_parts_with_frames_of_their_own(tmp_path: Path) -> None:
+    base = block(60, 40, 10, (100, 0, 0)) - rod(6, 10, (100, 0, 0))
+    lid = block(40, 30, 8, (100, 0, 10))
+    poses, said = import_assembly(stl(tmp_path, base, lid), tmp_path / "parts")
+    assert len(said) == 2
+    parts = {each.name: each for each in read_posed(poses)}
+    places = {each.solid.volume: 1e3 * each.T[:3, 3] for each in parts.values()}
+    small, large = sorted(places)
+    assert small == pytest.approx(40 * 30 * 8e-9, rel=1e-6)
+    np.testing.assert_allclose(places[small], (100, 0, 10), atol=1e-3)
+    np.testing.assert_allclose(places[large], (100, 0, 0), atol=1e-3)
+    for each in parts.values():
+        middle = pose.apply(each.T, each.solid.centroid[None])[0]
+        np.testing.assert_allclose(1e3 * middle[:2], (100, 0), atol=1e-3)
+    wall = next(w for each in parts.values() for w in each.solid.rounds.values())
+    np.testing.assert_allclose(wall.ends[:, :2], 0.0, atol=1e-5)
+    np.testing.assert_allclose(sorted(wall.ends[:, 2]), (0, 0.01), atol=1e-6)
+
+
+def test_a_cavity_is_no_solid(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds one solid"):
+        import_assembly(stl(tmp_path, block(40, 40, 40) - block(20, 20, 20, (0, 0, 10))), tmp_path / "parts")
