@@ -35,10 +35,19 @@ def scenario(
     start: Mapping[str, Array],
     grasps: Sequence[Grasp],
     density: float = 1000.0,
+    friction: float = 0.8,
 ) -> Scenario:
     """Parts are written into the folder; the table is that of the package."""
     files = {
-        name: write_part(name, body, folder, density=density, source="a test", licence="Apache-2.0")
+        name: write_part(
+            name,
+            body,
+            folder,
+            density=density,
+            friction=(friction, 0.005, 0.0001),
+            source="a test",
+            licence="Apache-2.0",
+        )
         for name, body in bodies.items()
     }
     files = {"table": part_path("table"), **files}

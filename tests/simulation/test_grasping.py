@@ -170,11 +170,11 @@ def test_a_wrist_turns_back_instead_of_winding_up() -> None:
 SIDEWAYS = Grasp(np.array([0.018, 0.0, 0.026]), np.array([0.0, 1.0, 0.0]))
 
 
-def one_part(folder: Path, body: Body, grasp: Grasp, density: float = 1000.0) -> Scene:
+def one_part(folder: Path, body: Body, grasp: Grasp, density: float = 1000.0, friction: float = 0.8) -> Scene:
     """A part that is put down elsewhere on the table."""
     operation = Operation("part", contacts("part", "bottom-table.top"))
     start = {"part": pose.at((0, 0.25, 0))}
-    return build_scene(scenario(folder, {"part": body}, [operation], [np.eye(4)], start, [grasp], density))
+    return build_scene(scenario(folder, {"part": body}, [operation], [np.eye(4)], start, [grasp], density, friction))
 
 
 def bracket() -> Body:
@@ -214,3 +214,13 @@ def test_what_cannot_be_held_is_named_before_anything_moves(
 ) -> None:
     with pytest.raises(InputError, match=words):
         one_part(tmp_path, extrude(rectangle(120, width), 0, 60, bottom="bottom"), SIDEWAYS, density)
+
+
+def test_a_part_that_is_too_smooth_is_named_and_one_that_is_not_slips_no_more_than_others(tmp_path: Path) -> None:
+    cube = extrude(rectangle(60, 40), 0, 40, bottom="bottom")
+    with pytest.raises(InputError, match="'part', which is too smooth: with its friction of 0.02 the gripper holds 0.04"):
+        one_part(tmp_path, cube, SIDEWAYS, friction=0.02)
+    scene = one_part(tmp_path, cube, SIDEWAYS, friction=0.2)
+    layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
+    (moved,) = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene).in_hand
+    assert moved.moved_m < 1e-3

@@ -18,6 +18,13 @@ from apo_bench.geometry.solid import Piece, Solid
 
 ROLLING_CONDIM = 6
 """Of contacts of a cylinder: without friction of rolling, one that lies on a box begins to roll by itself."""
+_GRIPPY = 0.8
+"""A part of less sliding friction is smooth; the pads' friction is meant on one of so much."""
+SMOOTH_PRIORITY = 2
+"""Of a smooth part, over that of pads, 1: its own friction counts wherever it touches anything, which otherwise would be
+the pads', or the larger of the two."""
+_PADS_CONDIM = 4
+"""Of contacts with pads: torsional friction, too."""
 MESH_INERTIA = "convex"
 """Corners are all that is said of a mesh."""
 _SHAPE = ("name", "type", "pos", "size", "zaxis", "mesh")
@@ -75,3 +82,13 @@ def dress(model: Any, solid: Solid, pieces: Mapping[str, Iterable[Piece]], densi
             setattr(geom, key, value)
     if inertial := inertial_attributes(solid, density):
         body.add("inertial", **inertial)
+    _let_slide(model)
+
+
+def _let_slide(model: Any) -> None:
+    """Give geoms of a smooth part priority, so that their own friction counts."""
+    usual = model.default.geom.friction
+    for geom in model.find_all("geom"):
+        friction = usual if geom.friction is None else geom.friction
+        if friction is not None and friction[0] < _GRIPPY:
+            geom.priority, geom.condim = SMOOTH_PRIORITY, geom.condim or _PADS_CONDIM

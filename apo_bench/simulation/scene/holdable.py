@@ -11,6 +11,7 @@ from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.holds import held_span
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.scene.geoms import SMOOTH_PRIORITY
 from apo_bench.simulation.scene.world import World
 
 _GRAVITY = 9.81
@@ -21,7 +22,7 @@ _BESIDE_M = 0.002
 
 
 def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
-    """Raise an `InputError` if a part is wider than the gripper opens where it is to be held, or too heavy for it.
+    """Raise an `InputError` if a part is wider than the gripper opens where it is to be held, too heavy or too smooth.
 
     Parts of boxes alone are held across all their width, and a gripper that finds nothing loses them.
     """
@@ -46,22 +47,35 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
                 f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg; the payload of the arm is {payload:g} kg, so "
                 f"make '{operation.main}' smaller or less dense, or take another arm."
             )
-        most = _most_weight(world.model, arm)
+        force, pads = _grip(world.model, arm)
+        own = _smooth_friction(world, operation.main)
+        most = force * (pads if own is None else own) / _SAFE
         if weight > most:
+            lifts, holds = f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg", f"{most / _GRAVITY:.3g} kg"
+            if own is not None and weight <= force * pads / _SAFE:
+                raise InputError(
+                    f"{lifts} by '{operation.main}', which is too smooth: with its friction of {own:g} the gripper "
+                    f"holds {holds} with twofold safety, so make it rougher or lighter, or take the grasp 'weld'."
+                )
             raise InputError(
-                f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg; the friction of the pads holds "
-                f"{most / _GRAVITY:.3g} kg with twofold safety, so make '{operation.main}' smaller or less dense, or "
-                "take the grasp 'weld'."
+                f"{lifts}; the friction of the pads holds {holds} with twofold safety, so make '{operation.main}' "
+                "smaller or less dense, or take the grasp 'weld'."
             )
 
 
-def _most_weight(model: Any, arm: Arm) -> float:
-    """What friction holds safely, [N]; infinite where the force of the fingers has no limit."""
+def _grip(model: Any, arm: Arm) -> tuple[float, float]:
+    """The force of both pads together, [N], infinite where that of the fingers has no limit; and their friction."""
     if arm.hand is not None:
-        return 2 * arm.hand.force_n * arm.hand.friction / _SAFE
+        return 2 * arm.hand.force_n, arm.hand.friction
     force = float(model.actuator(f"arm/{arm.grip}").forcerange[1])
-    if force <= 0.0:
-        return float("inf")
     fingers = {int(model.jnt_bodyid[model.joint(f"arm/{finger}").id]) for finger in arm.fingers}
     pads = [float(model.geom_friction[g, 0]) for g in range(model.ngeom) if int(model.geom_bodyid[g]) in fingers]
-    return force * max(pads) / _SAFE
+    return force if force > 0.0 else float("inf"), max(pads)
+
+
+def _smooth_friction(world: World, part: str) -> float | None:
+    """The friction of a part that counts in place of that of pads; None of one that is not smooth."""
+    model = world.model
+    root = model.body_rootid[world.body[part]]
+    geoms = np.flatnonzero((model.body_rootid[model.geom_bodyid] == root) & (model.geom_priority == SMOOTH_PRIORITY))
+    return float(model.geom_friction[geoms, 0].min()) if len(geoms) else None
