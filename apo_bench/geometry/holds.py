@@ -20,7 +20,7 @@ from apo_bench.geometry.solid import Piece, Solid, extent
 
 PAD_M = (0.016, 0.010, 0.026)
 """How far pads reach from between their tips: to each side, down and up, [m]."""
-_FINGER_M, _ROOM_M = 0.012, 0.012
+_FINGER_M, ROOM_M = 0.012, 0.012
 """How thick a finger is; how far it stands off before it closes."""
 _PALM_M, _OVER_M = 0.060, 0.0115
 """A part reaches at most so far up beside the tips, which are at least so high above what it stands on."""
@@ -232,7 +232,7 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
         return []
     order = np.argsort(low[there])
     low, reached = low[there][order], np.maximum.accumulate(high[there][order])
-    apart = low[1:] >= reached[:-1] + _FINGER_M + _ROOM_M
+    apart = low[1:] >= reached[:-1] + _FINGER_M + ROOM_M
     begins, ends = np.append(low[0], low[1:][apart]), np.append(reached[:-1][apart], reached[-1])
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
@@ -244,7 +244,7 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple
     within = above & (rays.h <= h + over)
     on = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[within]
     for low, high in _clusters(rays, within):
-        if (high - low) / 2 + _ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
+        if (high - low) / 2 + ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
             continue
         own = np.where((rays.low >= low - 1e-9) & (rays.high <= high + 1e-9), 1.0, np.nan)[within]
         with np.errstate(invalid="ignore"):
@@ -260,6 +260,6 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple
 def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) -> bool:
     """Whether a finger, open or on its way down, would strike the part itself."""
     a, b = rays.low[above], rays.high[above]
-    room = _FINGER_M + _ROOM_M
+    room = _FINGER_M + ROOM_M
     struck = [(a < end) & (b > begin) for begin, end in ((low - room, low - 1e-6), (high + 1e-6, high + room))]
     return bool((struck[0] | struck[1]).any())

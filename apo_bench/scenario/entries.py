@@ -14,8 +14,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import all_boxes
-from apo_bench.geometry.holds import holds, holds_whole
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.holds import ROOM_M, holds, holds_whole
+from apo_bench.geometry.solid import Solid, extent
 from apo_bench.insertion.line import Preference
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.parts import load_part, part_path
@@ -32,6 +32,8 @@ _RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
+_MOST_HELD_M = 2 * _OPENING_M - ROOM_M
+"""Width that the arm can hold where the file does not say how: so much room its fingers want before they close."""
 _LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""
 
@@ -210,7 +212,9 @@ def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) 
         across = np.eye(3)[min(level, key=lambda axis: (high - low)[axis])]
     stated = Grasp(point, across) if across is not None else None
     if stated and (keys.keys() == {"at_mm", "across"} or _holds_box(solid, stated, before)):
-        return stated
+        ends = extent(solid.pieces, stated.across)
+        if keys or ends[1] - ends[0] <= _MOST_HELD_M or not holds(solid, np.round(before[2, :3], 9), _OPENING_M):
+            return stated
     return _by_shape(keys, entry, solid, before, point)
 
 
@@ -227,11 +231,12 @@ def _by_shape(keys: Mapping[str, JsonNode], entry: JsonNode, solid: Solid, T: Ar
         across = read_unit_axis(keys["across"])
         found = [grasp for grasp in found if abs(grasp.across @ across) > 1.0 - _LEVEL]
     if not found:
-        size = " x ".join(f"{1e3 * x:g}" for x in solid.bounds[1] - solid.bounds[0])
+        size = " x ".join(f"{round(1e3 * x, 1):g}" for x in solid.bounds[1] - solid.bounds[0])
         refuse(
             entry,
-            f"the part, {size} mm, offers no place to pads from above that open to {2e3 * _OPENING_M:g} mm; say "
-            "grasp = { at_mm = [x, y, z], across = [x, y, z] }, or let it stand otherwise",
+            f"'{entry.value['move']}', {size} mm, has no opposite faces, and no shaft, within {1e3 * _MOST_HELD_M:g} "
+            f"mm of each other that pads from above reach; the gripper opens to {2e3 * _OPENING_M:g} mm, so say "
+            "grasp = { at_mm = [x, y, z], across = [x, y, z] }, give it something to hold, or let it stand otherwise",
         )
     if "at_mm" in keys:
         return Grasp(point, min(found, key=lambda grasp: float(np.linalg.norm(grasp.point - point))).across)

@@ -155,7 +155,7 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
     solid, up = scene.scenario.assembly.solids[part], _upwards(T)
     if all_boxes(solid.pieces):
         around = _around_box(scene, solid, T)
-        if all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
+        if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
     found = holds(solid, up, scene.arm.opening_m)
     return [Grasp(*hold) for hold in found]

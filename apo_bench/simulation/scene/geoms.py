@@ -21,7 +21,7 @@ ROLLING_CONDIM = 6
 _GRIPPY = 0.8
 """A part of less sliding friction is smooth; the pads' friction is meant on one of so much."""
 SMOOTH_PRIORITY = 2
-"""Of a smooth part, over that of pads, 1: its own friction counts wherever it touches anything, which otherwise would be
+"""Of a smooth part, over that of pads, 1: its own friction counts wherever it touches anything. Otherwise it would be
 the pads', or the larger of the two."""
 _PADS_CONDIM = 4
 """Of contacts with pads: torsional friction, too."""
