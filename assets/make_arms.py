@@ -70,6 +70,7 @@ def ur5e() -> ElementTree.Element:
 def panda() -> ElementTree.Element:
     """Seven hinges in the frames of Craig, and the site `flange`."""
     root, body = _begin("panda_primitive", 0.09)
+    _capsules(body, ((0, 0, 0.06), (0, 0, 0.333)), 0.06)
     actuators = ElementTree.SubElement(root, "actuator")
     for i, (a, alpha, d, low, high, torque, mass, radius) in enumerate(PANDA, start=1):
         body = _link(body, actuators, i, _turn_x(alpha) @ _shift(x=a) @ _shift(z=d), (low, high), torque)

@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench import __version__
+from apo_bench.cli import arm as cli_arm
 from apo_bench.cli import correction as cli_correction
 from apo_bench.cli import eye as cli_eye
 from apo_bench.cli import noise as cli_noise
@@ -142,6 +143,7 @@ for commands in (
         cli_correction,
         cli_eye,
         cli_noise,
+        cli_arm,
         cli_part,
         cli_plan,
         cli_power,

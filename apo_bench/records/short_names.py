@@ -44,5 +44,7 @@ RELATIONS = MappingProxyType(
     }
 )
 """Wrong relations that a corrector is told."""
+FOREIGN_ARMS = ("menagerie:", "robosuite:")
+"""How the arms of other collections begin; what follows is looked up there, and never imported."""
 RESIDUALS = "empirical:"
 """Begins the name of a noise that draws from a file of residuals."""

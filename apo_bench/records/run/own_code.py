@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from apo_bench.records.relations import WRONG
-from apo_bench.records.short_names import RESIDUALS
+from apo_bench.records.short_names import FOREIGN_ARMS, RESIDUALS
 
 _MOST = 3
 """Names in the sentence."""
@@ -19,6 +19,7 @@ _MOST = 3
 def own_code(row: Mapping[str, Any]) -> tuple[str, ...]:
     """What of a row is code of somebody's own; files of noise and scenarios are data."""
     found = [row[name] for name in ("method", "arm") if ":" in (row.get(name) or "")]
+    found = [name for name in found if not name.startswith(FOREIGN_ARMS)]
     noise, relations = row["noise"], row["relations"]
     found += [noise] * (":" in noise and not noise.startswith(RESIDUALS))
     found += [relations] * (":" in relations and relations.partition(":")[0] not in WRONG)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,8 @@ _GRIPPER = "gripper/"
 _USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment")
 _FINGER_ARMATURE, _FINGER_DAMPING = 1e-4, 0.02
 """Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
-_MOST_JOINTS = 8
+_MOST_JOINTS, _MOST_BUILT = 8, 8
+_BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
 
 def read_arm(path: str | Path) -> Arm:
@@ -35,17 +35,17 @@ def read_arm(path: str | Path) -> Arm:
     Raises:
         InputError: Anything that is wrong in the file or in the models that it names.
     """
-    path = Path(path)
-    said = read_description(path)
-    files = [path, *files_of(said.mjcf), *(files_of(said.gripper.mjcf) if said.gripper.mjcf else ())]
-    times = tuple((str(each), each.stat().st_mtime_ns) for each in files if each.is_file())
-    return _built(path, times)
+    return read_described(read_description(Path(path)))
 
 
-@lru_cache(maxsize=8)
-def _built(path: Path, times: tuple[tuple[str, int], ...]) -> Arm:
-    """Remembered until one of the files changes."""
-    return build_arm(read_description(path))
+def read_described(said: ArmDescription) -> Arm:
+    """The arm of a description, as it was built and measured when its files were as they are now."""
+    times = tuple((str(each), each.stat().st_mtime_ns) for each in (said.file, *_files(said)) if each.is_file())
+    if times not in _BUILT:
+        while len(_BUILT) >= _MOST_BUILT:
+            del _BUILT[next(iter(_BUILT))]
+        _BUILT[times] = build_arm(said)
+    return _BUILT[times]
 
 
 def build_arm(said: ArmDescription) -> Arm:
@@ -98,6 +98,7 @@ def build_arm(said: ArmDescription) -> Arm:
         mount=found.mount,
         home=start,
         opening_m=float(found.hand.opening[-1]),
+        squeeze_m=found.hand.squeeze_m,
         model=text,
         hand=found.hand,
         limits=_limits(said, joints, drives),

@@ -30,11 +30,19 @@ class Hand:
     states: Array
     """(n, joints), [rad] or [m]."""
     force_n: float
-    """How hard each pad pushes on a part when it is fully closed."""
+    """How hard each pad pushes on a part of half its opening."""
+    squeeze_m: float
+    """How far inside the part its fingers are sent for that, each."""
+    gives_m: float
+    """How far the middle of each pad then gives way, beyond the surface of that part."""
     friction: float
     """Of the pads."""
     seconds: float
     """How long it takes to close or open at most."""
+    pads: tuple[str, str]
+    """A geom of each side."""
+    thick_m: float
+    """How much farther apart the middles of these are than the surfaces that hold."""
     reach: Array
     """(n,), how far the pads reach beyond the tip, [m]."""
 
@@ -63,11 +71,6 @@ class Hand:
         """The opening that is commanded, [m]."""
         k = int(np.abs(self.commands[-1] - self.commands[0]).argmax())
         return _inverse(self.commands[:, k], self.opening, float(ctrl[k]))
-
-    def of_state(self, q: Array) -> float:
-        """The opening at which the fingers stand, [m], by the joint that turns the most."""
-        k = int(np.abs(self.states[-1] - self.states[0]).argmax())
-        return _inverse(self.states[:, k], self.opening, float(q[k]))
 
     def _at(self, rows: Array, opening: float) -> Array:
         if not self.graded:

@@ -38,7 +38,8 @@ def find_home(arm: Arm) -> Array:
     found: list[Array] = []
     for i in range(_TRIES):
         start = rng.uniform(low, high)
-        start = start if i % 2 else (low + high) / 2 + _NEAR * (start - (low + high) / 2)
+        near = _NEAR * (i > 0)
+        start = start if i % 2 else (low + high) / 2 + near * (start - (low + high) / 2)
         q = kinematics.inverse(tip_down(np.array(_AT)), start, 25)
         if q is None or any(np.abs(q - other).max() < _SAME_RAD for other in found) or _in_table(kinematics, q):
             continue

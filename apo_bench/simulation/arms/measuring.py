@@ -34,8 +34,10 @@ _BEYOND_M = 0.01
 """So far the pads reach beyond the tip."""
 _FAR_M = 1.0
 _SNAP = np.cos(np.radians(1.0))
-_PROBE_M = 0.024
-"""The width of the part on which the force is measured."""
+_PROBE = 0.5
+"""How wide the part is on which the force is measured, as a part of the opening."""
+_SQUEEZES_M, _MOST_N = (0.03, 0.015, 0.008, 0.004), 60.0
+"""How far inside a part fingers are sent at most: less where they press harder than this."""
 _PROBE_HIGH_M, _STROKE_S, _SLOWLY_S, _LOOKS = 0.006, 0.1, 0.02, 100
 """Half of its height, about the tip; so much longer than to open a gripper may take to close; how long each of the
 steps takes in which it is closed on the part; steps over which the force is averaged."""
@@ -126,7 +128,7 @@ def _rig(model: Any, path: Path, joints: Sequence[str], home: Array, flange: int
     hard = physics(_STEP_S)
     model.geom_solref[:], model.geom_solimp[:] = hard.solref, hard.solimp
     model.opt.cone, model.opt.impratio = int(mujoco.mjtCone.mjCONE_ELLIPTIC), hard.impratio
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     data = mujoco.MjData(model)
     at = np.array([model.jnt_qposadr[j] for j in arm])
     data.qpos[at] = home
@@ -267,7 +269,12 @@ def _table(
     T = np.eye(4)
     T[:3, :3] = R_mount.T @ np.column_stack([across, side, ahead])
     T[:3, 3] = R_mount.T @ (at - data.xpos[mount])
-    force = _force(rig, at, np.column_stack([across, side, ahead]), rows[kept[-1]][0], ends)
+    left, right = sides[0][0], sides[1][0]
+    apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across))
+    thick = apart - 2 * rows[-1][0]
+    table = [rows[i] for i in kept]
+    force, squeeze = _force(rig, at, np.column_stack([across, side, ahead]), table)
+    apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across)) - thick
     hand = Hand(
         actuators=tuple(model.actuator(int(a)).name for a in rig.actuators),
         joints=tuple(model.joint(int(j)).name for j in rig.joints),
@@ -275,7 +282,11 @@ def _table(
         commands=np.array([rows[i][1] for i in kept]),
         states=np.array([rows[i][2] for i in kept]),
         force_n=force,
+        squeeze_m=squeeze,
+        gives_m=max(0.0, _PROBE * rows[kept[-1]][0] - apart / 2),
         friction=max(float(model.geom_friction[g, 0]) for g in pads),
+        pads=(model.geom(left).name, model.geom(right).name),
+        thick_m=thick,
         seconds=seconds + _STROKE_S,
         reach=np.array([reach[i] - longest + _BEYOND_M for i in kept]),
     )
@@ -291,19 +302,37 @@ def _ascending(openings: Sequence[float]) -> list[int]:
     return kept
 
 
-def _force(rig: _Rig, at: Array, R: Array, opening: float, ends: tuple[Array, Array]) -> float:
-    """How hard a pad pushes on a part between them, [N]."""
+def _force(rig: _Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, Array]]) -> tuple[float, float]:
+    """How hard each pad pushes on a part between them, [N], and how far inside it they are sent for that, [m].
+
+    Farther means harder where the drive is soft; it is not more than a part should be pressed by.
+    """
     model, data = rig.model, rig.data
-    closed, opened = ends
-    rig.settle(opened)
+    opening, opened = table[-1][0], table[-1][1]
     body = model.body(PROBE).id
     geom = int(model.body_geomadr[body])
-    half = np.array([min(_PROBE_M / 2, 0.6 * opening), 0.02, _PROBE_HIGH_M])
+    half = np.array([_PROBE * opening, 0.02, _PROBE_HIGH_M])
     model.geom_size[geom], model.geom_rbound[geom] = half, float(np.linalg.norm(half))
     model.geom_aabb[geom, 3:] = half
     mocap = int(model.body_mocapid[body])
-    data.mocap_pos[mocap] = at
-    mujoco.mju_mat2Quat(data.mocap_quat[mocap], np.ascontiguousarray(R).ravel())
+    data.mocap_pos[mocap] = (0.0, 0.0, -_FAR_M)
+    force = squeeze = 0.0
+    for squeeze in _SQUEEZES_M:
+        rig.settle(opened)
+        data.mocap_pos[mocap] = at
+        mujoco.mju_mat2Quat(data.mocap_quat[mocap], np.ascontiguousarray(R).ravel())
+        wanted, openings = half[0] - squeeze, [row[0] for row in table]
+        closed = np.array([np.interp(wanted, openings, column) for column in np.array([row[1] for row in table]).T])
+        force = _pressed(rig, opened, closed, R[:, 0])
+        data.mocap_pos[mocap] = (0.0, 0.0, -_FAR_M)
+        if force <= _MOST_N:
+            break
+    return force, squeeze
+
+
+def _pressed(rig: _Rig, opened: Array, closed: Array, across: Array) -> float:
+    """The mean force of a pad while it presses, [N]."""
+    data = rig.data
     for part in np.linspace(0.0, 1.0, _LEVELS)[1:]:
         rig.settle(opened + part * (closed - opened), _SLOWLY_S)
     rig.settle(closed)
@@ -311,9 +340,8 @@ def _force(rig: _Rig, at: Array, R: Array, opening: float, ends: tuple[Array, Ar
     for _ in range(_LOOKS):
         rig.settle(closed, _STEP_S)
         for c in range(data.ncon):
-            mujoco.mj_contactForce(model, data, c, wrench)
-            total += abs(float(wrench[0] * (data.contact[c].frame[:3] @ R[:, 0])))
-    data.mocap_pos[mocap] = (0.0, 0.0, -_FAR_M)
+            mujoco.mj_contactForce(rig.model, data, c, wrench)
+            total += abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
     return total / 2 / _LOOKS
 
 

@@ -13,7 +13,8 @@ _DEPART_M = 0.09
 _OPEN_TO_PICK_M, _OPEN_TO_RELEASE_M = 0.012, 0.008
 """How far each finger stands off before it closes, and when it has let go."""
 _LOST_M = 0.002
-"""Fingers that close this far beyond the part's surface hold nothing."""
+"""Fingers that close this far beyond the part's surface hold nothing; those of a linkage that gives way, a quarter of
+the way to the middle."""
 
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
@@ -69,5 +70,6 @@ def centre(robot: Robot, t: Transfer, grip: Grip) -> None:
 
 
 def check_hold(robot: Robot, grip: Grip) -> None:
-    if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - _LOST_M:
+    lost = _LOST_M if robot.arm.hand is None else max(_LOST_M, grip.half_width / 4)
+    if robot.scene.grasp == "friction" and robot.opening() < grip.half_width - lost:
         raise Halt(robot.stage, "lost_grasp")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,8 @@ from apo_bench.simulation.execution.grasping import (
 )
 from apo_bench.simulation.execution.motions import PUT_DOWN, arrival_line, departure_motions, motions
 from apo_bench.simulation.execution.transfer import SAFE_M, ApproachLine, Grip, Motion, Transfer, key_poses
-from apo_bench.simulation.robot.paths import turn_from
+from apo_bench.simulation.robot.paths import Trajectory, turn_from
+from apo_bench.simulation.robot.reach import at_end
 from apo_bench.simulation.scene.scene import Scene
 
 _GRAVITY = 9.81
@@ -77,7 +79,7 @@ def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
     made = []
     for task in _tasks(plan, scene):
         operation = plan.assembly.operations[task.step.operation]
-        made.append(Move(task.step, _transfer(plan, scene, task, believed, searches)))
+        made.append(Move(task.step, _turned_to_reach(scene, _transfer(plan, scene, task, believed, searches))))
         T = task.target @ pose.inverse(believed[operation.main])
         believed = {**believed, **{part: T @ believed[part] for part in operation.moves}}
     return tuple(made)
@@ -85,14 +87,38 @@ def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
 
 def unreachable(scene: Scene, transfer: Transfer) -> str:
     """The code of the first end of the transfer at which a tip pose has no joint angles, `` where all have."""
-    q = np.array(scene.arm.home)
+    return key_angles(scene, transfer)[0]
+
+
+def key_angles(scene: Scene, transfer: Transfer) -> tuple[str, list[Array]]:
+    """The same code, and joint angles, (joints,) each, at the tip poses that are reached before it."""
+    q, before, reached = np.array(scene.arm.home), None, list[Array]()
     for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
         for T in poses:
             found = scene.kinematics.inverse(T, q)
+            if found is None and scene.arm.model is not None:
+                found = _reached_on_the_way(scene, before, T, q)
             if found is None:
-                return code
-            q = found
-    return ""
+                return code, reached
+            q, before = found, T
+            reached.append(q)
+    return "", reached
+
+
+def _reached_on_the_way(scene: Scene, before: Array | None, T: Array, q: Array) -> Array | None:
+    """Joint angles at T, step by step from where the tip was: a leap may end at the limit of a joint."""
+    start = scene.kinematics.forward(q) if before is None else before
+    return at_end(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
+
+
+def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
+    """The transfer with its grips the other way round, where only that is in reach; the usual arm has room for one."""
+    if scene.arm.model is None or not unreachable(scene, transfer):
+        return transfer
+    half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    other = tuple(Grip(grip.T_part_tip @ half_turn, grip.half_width) for grip in transfer.grips)
+    turned = replace(transfer, grips=other)
+    return transfer if unreachable(scene, turned) else turned
 
 
 def in_reach(plan: Plan, scene: Scene) -> bool:

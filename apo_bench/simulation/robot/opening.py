@@ -41,7 +41,7 @@ class Fingers(Protocol):
 
 def fingers_of(model: Any, arm: Arm) -> Fingers:
     """The fingers of an arm in a scene."""
-    return SlideFingers(model, arm) if arm.hand is None else MeasuredFingers(model, arm.hand)
+    return SlideFingers(model, arm) if arm.hand is None else MeasuredFingers(model, arm.hand, arm.tip)
 
 
 class SlideFingers:
@@ -75,16 +75,20 @@ class SlideFingers:
 class MeasuredFingers:
     """Any fingers, by what was measured of them."""
 
-    def __init__(self, model: Any, hand: Hand) -> None:
+    def __init__(self, model: Any, hand: Hand, tip: str) -> None:
         self.hand, self.slack, self.longest_s = hand, math.inf, max(hand.seconds, _LONGEST_S)
         self._actuators = np.array([model.actuator(f"arm/{name}").id for name in hand.actuators])
         joints = [model.joint(f"arm/{name}").id for name in hand.joints]
+        self._pads = np.array([model.geom(f"arm/{name}").id for name in hand.pads])
+        self._tip = model.site(f"arm/{tip}").id
         self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self._lever: Array = np.abs(hand.opening[-1] - hand.opening[0]) / np.maximum(np.ptp(hand.states, axis=0), 1e-9)
         self._lever = np.where(np.ptp(hand.states, axis=0) > 1e-6, self._lever, 0.0)
 
     def opening(self, data: Any) -> float:
-        return self.hand.of_state(data.qpos[self._qpos])
+        left, right = data.geom_xpos[self._pads]
+        across = data.site_xmat[self._tip][::3]
+        return (abs(float((left - right) @ across)) - self.hand.thick_m) / 2
 
     def speed(self, data: Any) -> float:
         return float(np.abs(data.qvel[self._dof] * self._lever).max())

@@ -116,6 +116,33 @@ class Robot:
         self.T = line.end
         return 0.0
 
+    def trace(self, line: Trajectory) -> Array:
+        """Follow a line through free air, and see where the tip really is at each step, (n, 4, 4).
+
+        Raises:
+            Halt: The line leaves the arm's reach.
+        """
+        line = within_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        n = max(2, round(line.seconds / self.step_s))
+        path = self._reached(along(self.scene.kinematics, line, line.progress(np.arange(n + 1) / n), self.q))
+        rows, found = path + self._lead * np.gradient(path, self.step_s, axis=0), []
+        for row in rows[1:]:
+            self.data.ctrl[self._drives] = row
+            mujoco.mj_step(self.model, self.data)
+            found.append(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
+        self.q, self.T = path[-1], line.end
+        return np.array(found)
+
+    def pushed(self, force: Array, seconds: float = 0.5) -> Array:
+        """Where the tip is, (3,), world, [m], after a force [N] has pushed on it for a while."""
+        body = self.model.body(f"arm/{self.arm.mount}").id
+        tip = self.scene.kinematics.forward(self.data.qpos[self._qpos])[:3, 3]
+        self.data.xfrc_applied[body, :3] = force
+        self.data.xfrc_applied[body, 3:] = np.cross(tip - self.data.xipos[body], force)
+        self.wait(seconds)
+        self.data.xfrc_applied[body] = 0.0
+        return np.array(self.scene.kinematics.forward(self.data.qpos[self._qpos])[:3, 3])
+
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
         for T in waypoints_unwound(self._rest, self.T, end):

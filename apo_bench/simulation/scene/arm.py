@@ -14,6 +14,7 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.records import copyable
+from apo_bench.records.short_names import FOREIGN_ARMS
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.hand import Hand
 
@@ -103,6 +104,11 @@ DESCRIBED = ("ur5e_primitive", "panda_primitive")
 """Arms that come with the benchmark as arm files."""
 
 
+def arm_names() -> tuple[str, ...]:
+    """The short names of arms."""
+    return (*_ARMS, *DESCRIBED)
+
+
 def find_arm(given: str | Arm) -> Arm:
     """An arm by short name, `module:name`, or as the object itself."""
     if isinstance(given, Arm):
@@ -115,6 +121,10 @@ def find_arm(given: str | Arm) -> Arm:
         from apo_bench.simulation.arms.building import read_arm
 
         return read_arm(folder("assets") / "arms" / f"{given}.toml")
+    if given.startswith(FOREIGN_ARMS):
+        from apo_bench.simulation.arms.foreign import find_foreign
+
+        return find_foreign(given)
     if ":" in given:
         from apo_bench.names import resolve
 
@@ -129,8 +139,10 @@ def find_arm(given: str | Arm) -> Arm:
             raise InputError(f"the arm '{given}' is a {type(made).__name__}; an `Arm`, or a function that returns one.")
         return made
     if given not in _ARMS:
-        known = unknown("arm", given, (*_ARMS, *DESCRIBED))
-        raise InputError(f"{known} Or give your own as FILE.toml, or as 'package.module:name'.")
+        known = unknown("arm", given, arm_names())
+        raise InputError(
+            f"{known} Or give your own as FILE.toml, menagerie:NAME, robosuite:NAME, or 'package.module:name'."
+        )
     return _ARMS[given]()
 
 

@@ -59,8 +59,8 @@ def picture_with_arm(
     data = _at(scene.work, scene, poses)
     for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
         data.joint(f"arm/{joint}").qpos = q
-    for finger in scene.arm.fingers:
-        data.joint(f"arm/{finger}").qpos = scene.arm.opening_m
+    for finger, at in zip(scene.arm.fingers, scene.arm.finger_joints(scene.arm.opening_m), strict=True):
+        data.joint(f"arm/{finger}").qpos = at
     if state is not None:
         data.qpos[:] = state
     mujoco.mj_forward(scene.work.model, data)

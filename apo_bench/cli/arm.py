@@ -1,0 +1,73 @@
+"""The commands `apo-bench arm list | check`: which arms there are, and what one can do at the table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from apo_bench.cli.arguments import check_writable
+
+arm = typer.Typer(add_completion=False, rich_markup_mode=None, help="Arms: those that come along, and any other.")
+
+_SIZE = (960, 720)
+_VIEW = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)
+"""The whole arm and the table."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    app.add_typer(arm, name="arm")
+
+
+@arm.callback()
+def _group() -> None:
+    """Arms: those that come along, and any other."""
+
+
+@arm.command("list")
+def list_arms() -> None:
+    """List the arms that come with the benchmark, and how others are named."""
+    from apo_bench.show.arm_text import list_line
+    from apo_bench.simulation.scene.arm import arm_names, find_arm
+
+    for name in arm_names():
+        typer.echo(list_line(name, find_arm(name)))
+    typer.echo(
+        "any other: FILE.toml, menagerie:NAME (as in MuJoCo Menagerie), robosuite:NAME, or package.module:name; "
+        "`apo-bench arm check` says what it can do"
+    )
+
+
+@arm.command("check")
+def check(
+    name: Annotated[str, typer.Argument(metavar="ARM", help="A name, FILE.toml, menagerie:NAME or robosuite:NAME.")],
+    scenario: Annotated[
+        str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")
+    ] = "stick_in_tower",
+    layouts: Annotated[int, typer.Option(min=1, max=1000, help="How many layouts are looked at.")] = 20,
+    out: Annotated[Path | None, typer.Option(help="Draw it at the table into this file: .png.")] = None,
+) -> None:
+    """Say what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.arm_text import check_lines
+    from apo_bench.simulation.arms.checking import check_arm
+    from apo_bench.simulation.scene.arm import find_arm
+
+    if out is not None:
+        check_writable(out, "--out", (".png",))
+    loaded, found = load_scenario(scenario), find_arm(name)
+    typer.echo(f"{name} at the table of {loaded.name}:")
+    for line in check_lines(check_arm(found, loaded, layouts)):
+        typer.echo(f"  {line}")
+    if out is not None:
+        import imageio.v3 as imageio
+
+        from apo_bench.simulation.scene.render import camera_view, picture_with_arm
+        from apo_bench.simulation.scene.scene import build_scene
+
+        scene = build_scene(loaded, arm=found, grasp="weld")
+        imageio.imwrite(out, picture_with_arm(scene, loaded.start, None, *_SIZE, camera_view(*_VIEW)))
+        typer.echo(f"Wrote {out}")

@@ -1,0 +1,209 @@
+"""What an arm can do at the table, in numbers: reach, errors of its tip, stiffness, gripper, room along a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.arms.home import tip_down
+from apo_bench.simulation.execution.prepare import key_angles, moves
+from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady
+from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.scene.arm import Arm, Kinematics
+from apo_bench.simulation.scene.scene import Scene, build_scene
+
+SPEEDS = (0.01, 0.06, 0.5)
+"""[m/s], at which the robot touches, inserts, and carries."""
+_GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
+_TABLE_M, _TURNS = 0.03, (-1.2, 0.0, 1.2)
+"""Height of the tip, [m], and turns about the vertical, [rad], at which the table is to be reached."""
+_HIGH_M, _WAY_M, _PUSH_N, _STAND_S = 0.35, 0.15, 5.0, 0.3
+"""Errors are looked at on a way of this length at this height, stiffness by this push, after so long a stand."""
+_LAYOUTS, _MOST_GIVING_M = 20, 0.002
+_LEAST_MARGIN_DEG, _LEAST_FORCE_N = 5.0, 10.0
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TipError:
+    """How far the tip is off where it should be at a speed."""
+
+    speed: float
+    """[m/s]"""
+    across_mm: float
+    """At most, beside the line."""
+    along_mm: float
+    turn_deg: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ArmCheck:
+    """What was found of an arm."""
+
+    arm: Arm
+    scenario: str
+    reached: Array
+    """(k, 3): x, y [m] of a grid over the table, and the part of the turns at which it is reached there."""
+    tip_errors: tuple[TipError, ...]
+    rest_error_mm: float
+    """After it has come to a stand."""
+    mm_per_n: tuple[float, float, float]
+    """Along x, y, z of the world."""
+    opening_mm: float
+    force_n: float
+    """Of each pad."""
+    margins_deg: Array
+    """(joints,), the least distance of each from its limits along the plans in reach; not a number where none is."""
+    layouts: int
+    layouts_reached: int
+    clearance_mm: float
+    missing: tuple[str, ...]
+    """What is not there or not enough, each with what to do."""
+
+
+def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck:
+    """Try an arm at the table of a scenario.
+
+    Args:
+        layouts: How many layouts are looked at.
+    """
+    missing = _unsaid(arm)
+    try:
+        scene = build_scene(scenario, arm=arm)
+    except InputError as error:
+        scene = build_scene(scenario, arm=arm, grasp="weld")
+        missing.append(str(error))
+    reached = _reach(scene.kinematics, arm)
+    errors, rest, soft = _errors(scene)
+    force = _force(arm, scene)
+    drawn = [draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in range(layouts)]
+    found = [_margins(scene, Plan(scenario.assembly, each.start, each.goals)) for each in drawn]
+    good = sum(bool(np.isfinite(each).all()) for each in found)
+    margins = np.min([each for each in found if np.isfinite(each).all()] or found, axis=0)
+    across = max((each.across_mm for each in errors if each.speed < SPEEDS[-1]), default=0.0)
+    if not errors:
+        missing.append(f"the tip does not reach {_HIGH_M * 1e3:g} mm above its home; move 'base' or state 'home_deg'.")
+    if across > scene.clearance_mm:
+        missing.append(
+            f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; make "
+            "the joints stiffer ('torque_nm' limits them) or the clearance larger."
+        )
+    if force < _LEAST_FORCE_N:
+        missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {_LEAST_FORCE_N:g} N.")
+    if good < layouts:
+        missing.append(
+            f"{layouts - good} of {layouts} layouts are not reached; move 'base' nearer, or state another 'home_deg'."
+        )
+    if np.nanmin(margins, initial=np.inf) < _LEAST_MARGIN_DEG:
+        joint = arm.joints[int(np.nanargmin(margins))]
+        missing.append(
+            f"the joint '{joint}' comes near its limit along the plan; state another 'home_deg' or turn 'base'."
+        )
+    return ArmCheck(
+        arm=arm,
+        scenario=scenario.name,
+        reached=reached,
+        tip_errors=errors,
+        rest_error_mm=rest,
+        mm_per_n=soft,
+        opening_mm=2e3 * arm.opening_m,
+        force_n=force,
+        margins_deg=margins,
+        layouts=layouts,
+        layouts_reached=good,
+        clearance_mm=scene.clearance_mm,
+        missing=tuple(missing),
+    )
+
+
+def _unsaid(arm: Arm) -> list[str]:
+    """What a file could say and does not."""
+    found = []
+    if arm.limits.payload_kg is None:
+        found.append("no payload is stated ('payload_kg'): all is lifted that friction holds.")
+    if arm.limits.speed_rad_s is None:
+        found.append("no speed of the joints is stated ('speed_deg_s'): none is kept.")
+    if arm.limits.torque_nm is not None and not np.isfinite(arm.limits.torque_nm).all():
+        found.append("the torque of a joint has no limit in the model; state 'torque_nm'.")
+    if arm.hand is not None and not arm.hand.graded:
+        found.append("the gripper knows open and closed only: it opens fully beside other parts.")
+    if arm.hand is not None and arm.hand.gives_m > _MOST_GIVING_M:
+        found.append(
+            f"the fingers give way by {1e3 * arm.hand.gives_m:.1f} mm on a part of half their opening, so it is lost; "
+            "take a gripper whose linkage is stiff, or a softer 'closed'."
+        )
+    return found
+
+
+def _reach(kinematics: Kinematics, arm: Arm) -> Array:
+    rows = []
+    for x, y in _GRID:
+        q, reached = np.array(arm.home), 0
+        for turn in _TURNS:
+            found = kinematics.inverse(tip_down(np.array([x, y, _TABLE_M]), turn), q, 25)
+            reached += found is not None
+        rows.append((x, y, reached / len(_TURNS)))
+    return np.array(rows)
+
+
+def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, float, float]]:
+    """Errors along a line and at rest, [mm], and how far a newton pushes the tip, [mm/N], in free air."""
+    robot = Robot(scene, scene.scenario.start)
+    up = np.array(robot.T)
+    up[2, 3] = _HIGH_M
+    errors = []
+    try:
+        robot.trace(smooth(robot.T, up, 0.3))
+        robot.wait(_STAND_S)
+        for i, speed in enumerate(SPEEDS):
+            way = _WAY_M if speed > SPEEDS[0] else _WAY_M / 10
+            end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
+            line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
+            errors.append(_error(line, robot.trace(line), speed))
+            robot.wait(_STAND_S)
+        rest = float(np.linalg.norm(robot.pushed(np.zeros(3)) - robot.T[:3, 3]))
+        before = robot.pushed(np.zeros(3))
+        x, y, z = (1e3 * abs(float((robot.pushed(_PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
+    except Halt:
+        return (), np.nan, (np.nan, np.nan, np.nan)
+    return tuple(errors), 1e3 * rest, (x, y, z)
+
+
+def _error(line: Trajectory, found: Array, speed: float) -> TipError:
+    """Beside the line, along it behind the command, and turned."""
+    way = line.end[:3, 3] - line.start[:3, 3]
+    way = way / np.linalg.norm(way)
+    n = len(found)
+    asked = line.poses(line.progress(np.arange(1, n + 1) / n))
+    off = found[:, :3, 3] - asked[:, :3, 3]
+    along = off @ way
+    beside = np.linalg.norm(off - along[:, None] * way, axis=1)
+    turned = np.einsum("nij,nij->n", found[:, :3, :3], asked[:, :3, :3])
+    angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))
+    return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()))
+
+
+def _force(arm: Arm, scene: Scene) -> float:
+    """Of each pad, [N]; of slides that one actuator drives together half of its force."""
+    if arm.hand is not None:
+        return arm.hand.force_n
+    return float(scene.work.model.actuator(f"arm/{arm.grip}").forcerange[1]) / len(arm.fingers)
+
+
+def _margins(scene: Scene, plan: Plan) -> Array:
+    low, high = scene.kinematics.range_of_joints
+    least = np.full(len(scene.arm.joints), np.inf)
+    for move in moves(plan, scene):
+        code, path = key_angles(scene, move.transfer)
+        if code:
+            return np.full(len(least), np.nan)
+        least = np.minimum(least, np.min([np.minimum(q - low, high - q) for q in path], axis=0))
+    return np.degrees(least)

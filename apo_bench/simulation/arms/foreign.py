@@ -1,0 +1,121 @@
+"""Arms of other collections, found where they are installed: MuJoCo Menagerie and robosuite. Nothing is downloaded."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import MappingProxyType
+
+from apo_bench.errors import InputError, unknown
+from apo_bench.simulation.arms.building import read_described
+from apo_bench.simulation.arms.description import USUAL_BASE, ArmDescription, GripperDescription
+from apo_bench.simulation.scene.arm import Arm
+
+MENAGERIE, ROBOSUITE = "APO_BENCH_MENAGERIE", "APO_BENCH_ROBOSUITE"
+"""Variables that name their folders."""
+_CACHE = Path("robot_descriptions") / "mujoco_menagerie"
+_2F85 = Path("robotiq_2f85") / "2f85.xml"
+_WITH_FINGERS = ("finger", "gripper", "hand", "knuckle", "driver")
+_GRIPPERS = MappingProxyType(
+    {
+        "ur5e": "robotiq_gripper_85",
+        "panda": "panda_gripper",
+        "sawyer": "rethink_gripper",
+        "iiwa": "robotiq_gripper_140",
+        "kinova3": "robotiq_gripper_85",
+        "xarm7": "xarm7_gripper",
+    }
+)
+"""Of robosuite's arms, the gripper that each has there."""
+
+
+def find_foreign(given: str) -> Arm:
+    """`menagerie:universal_robots_ur5e`, `robosuite:UR5e`.
+
+    Raises:
+        InputError: The collection is not there, with the command that fetches it; it has no such arm; the arm cannot be
+            used as it is.
+    """
+    where, _, name = given.partition(":")
+    return read_described(_of_menagerie(name) if where == "menagerie" else _of_robosuite(name))
+
+
+def _of_menagerie(name: str) -> ArmDescription:
+    root = next((each for each in _menageries() if each.is_dir()), None)
+    if root is None:
+        raise InputError(
+            f"menagerie:{name}: MuJoCo Menagerie was not found; fetch it with 'git clone --depth 1 "
+            f"https://github.com/google-deepmind/mujoco_menagerie' and name its folder in {MENAGERIE}."
+        )
+    known = [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))]
+    if name not in known:
+        raise InputError(f"{root}: {unknown('arm', name, known)}")
+    plain = name.replace("_", "").lower()
+    files = [f for f in sorted((root / name).glob("*.xml")) if plain.endswith(f.stem.replace("_", "").lower())]
+    if not files:
+        raise InputError(
+            f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file."
+        )
+    gripper = None if _has_fingers(files[0]) else root / _2F85
+    if gripper is not None and not gripper.is_file():
+        raise InputError(f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.")
+    return ArmDescription(
+        file=files[0],
+        mjcf=files[0],
+        flange=None,
+        joints=None,
+        home=None,
+        base=USUAL_BASE,
+        gripper=GripperDescription(mjcf=gripper),
+    )
+
+
+def _of_robosuite(name: str) -> ArmDescription:
+    root = _robosuite()
+    if root is None:
+        raise InputError(
+            f"robosuite:{name}: robosuite was not found; install it with 'pip install --no-deps robosuite', or name "
+            f"the folder of the package in {ROBOSUITE}."
+        )
+    robots, key = root / "models" / "assets" / "robots", name.lower()
+    if key not in _GRIPPERS or not (robots / key / "robot.xml").is_file():
+        raise InputError(f"{root}: {unknown('arm', name, _GRIPPERS)}")
+    mjcf = robots / key / "robot.xml"
+    return ArmDescription(
+        file=mjcf,
+        mjcf=mjcf,
+        flange="right_hand",
+        joints=None,
+        home=None,
+        base=USUAL_BASE,
+        gripper=GripperDescription(mjcf=root / "models" / "assets" / "grippers" / f"{_GRIPPERS[key]}.xml"),
+    )
+
+
+def _menageries() -> Iterator[Path]:
+    if named := os.environ.get(MENAGERIE):
+        yield Path(named)
+        return
+    yield Path(os.environ.get("ROBOT_DESCRIPTIONS_CACHE", "") or Path.home() / ".cache" / _CACHE.parent) / _CACHE.name
+
+
+def _robosuite() -> Path | None:
+    if named := os.environ.get(ROBOSUITE):
+        root = Path(named)
+        return root if (root / "models" / "assets").is_dir() else None
+    found = importlib.util.find_spec("robosuite")
+    return Path(found.origin).parent if found is not None and found.origin else None
+
+
+def _has_fingers(mjcf: Path) -> bool:
+    """Whether an actuator, by its name or what it drives, is of a gripper."""
+    import mujoco
+
+    try:
+        spec = mujoco.MjSpec.from_file(str(mjcf))
+    except (ValueError, RuntimeError):
+        return False
+    names = [f"{joint.name} {joint.parent.name}".lower() for joint in spec.joints]
+    return any(word in name for name in names for word in _WITH_FINGERS)
