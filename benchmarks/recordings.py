@@ -41,6 +41,8 @@ from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import DEMONSTRATION, LAYOUT, stream
 
 RATE_HZ = 30.0
+BEGINS_S = 100.0
+"""What the tracker's clock says then."""
 BEFORE_S = 1.0
 """The log begins so long before the hand takes the first part."""
 TASKS = ("stick_in_tower", "stick_on_castles", "pocket_table", "carried_bridge")
@@ -119,7 +121,7 @@ def tracked(truth: Truth, errors: Errors, rng: np.random.Generator) -> tuple[Arr
         gap = int(rng.integers(0, n))
         kept[gap : gap + 4] = False
         t = truth.t + np.clip(errors.jitter_s * rng.standard_normal(n), -0.4 / RATE_HZ, 0.4 / RATE_HZ)
-        found[part] = Tracked(str(11 + i), T_model_part, t[kept], T_seen[kept])
+        found[part] = Tracked(str(11 + i), T_model_part, BEGINS_S + t[kept], T_seen[kept])
     return X, found
 
 
@@ -311,6 +313,21 @@ def succeeds(truth: Truth, form: Form, errors: Errors, method: str, seed: int) -
     return verdict.success, done.outcome.code if done.outcome.failed else verdict.rests_on.code
 
 
+def write_example(path: Path) -> None:
+    """The log of the guide: 15 frames a second, ids 11 to 13, and a stick whose model lies otherwise than the part."""
+    truth = watched("stick_in_tower", 3)
+    assert truth is not None
+    thin = truth._replace(t=truth.t[::2], T={part: T[::2] for part, T in truth.T.items()})
+    rng = np.random.default_rng(19)
+    X, found = tracked(thin, Errors(frame=0.5), rng)
+    models = dict.fromkeys(found, np.eye(4)) | {"stick": pose.at((0.0, 0.0, -0.01), (0.0, 0.0, 90.0))}
+    for part, one in found.items():
+        T = one.T @ one.T_model_part @ pose.inverse(models[part])
+        found[part] = one._replace(T_model_part=models[part], T=T)
+    FORMS["csv-wxyz"].write(found, path)
+    print(f"Wrote {path}; the camera stood at {np.round(1e3 * X[:3, 3], 1).tolist()} mm")
+
+
 def main() -> None:
     """Write logs, or measure."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -321,7 +338,10 @@ def main() -> None:
     parser.add_argument("--level", type=float, default=1.0, help="mm and degrees of each frame")
     parser.add_argument("--stays", type=float, default=0.0, help="mm and degrees of the error that stays")
     parser.add_argument("--methods", default="none,contact-robust")
+    parser.add_argument("--example", type=Path, help="write the log of the guide into this file")
     given = parser.parse_args()
+    if given.example:
+        return write_example(given.example)
     errors = Errors(frame=given.level, stays=given.stays)
     tasks = given.tasks.split(",")
     if given.write:

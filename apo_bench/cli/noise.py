@@ -1,4 +1,4 @@
-"""The commands `apo-bench noise list | card | fit | learn`: noise models, their cards, noise that is measured."""
+"""The commands `apo-bench noise list | card | fit | learn | still`: noise models, cards, noise that is measured."""
 
 from __future__ import annotations
 
@@ -123,6 +123,46 @@ def fit(
         raise InputError(f"{error.filename} cannot be written ({error.strerror}); choose another place.") from error
     for path, _, _ in written:
         if path is not None and not as_json:
+            typer.echo(f"Wrote {path}")
+
+
+@noise.command()
+def still(
+    log: Annotated[Path, typer.Argument(help="A tracker's log in which parts rest, or a folder of logs.")],
+    form: Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")],
+    camera: Annotated[Path, typer.Option(help="How the log is written, and where its camera stands if known: .toml.")],
+    out: Annotated[Path | None, typer.Option(help="The noise file for --noise and --camera-noise: .toml.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")] = None,
+) -> None:
+    """Measure a camera on parts that rest: how its frames scatter, how many are missing, how many are wrong."""
+    from apo_bench.observation.fitting import fit as fits
+    from apo_bench.observation.noise_file import noise_text
+    from apo_bench.recording.camera_file import read_camera
+    from apo_bench.recording.formats import read_log
+    from apo_bench.recording.still import still_residuals
+    from apo_bench.show.fit_picture import draw_fit
+    from apo_bench.show.fit_text import fit_lines
+
+    for path, option, ending in ((out, "--out", ".toml"), (picture, "--picture", ".png")):
+        if path is not None:
+            check_writable(path, option, (ending,))
+            if path.exists() and camera.exists() and path.samefile(camera):
+                raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+    stated = read_camera(camera)
+    found = still_residuals(read_log(log, form, stated.conventions))
+    measured = fits.fit_noise(found, _printable(f"parts at rest in {log.name}"))
+    typer.echo("\n".join(fit_lines(found, measured, fits.goodness_of_fit(found, measured))))
+    typer.echo("\nAn error that stays while a part rests is not in these numbers: no log of still parts can show it.")
+    try:
+        if out is not None:
+            notes = _printable(f"apo-bench noise still {log.name} --format {form}"), "without errors that stay"
+            out.write_text(noise_text(measured, notes, stated.T_world_camera), encoding="utf-8")
+        if picture is not None:
+            draw_fit(found, measured, picture)
+    except OSError as error:
+        raise InputError(f"{error.filename} cannot be written ({error.strerror}); choose another place.") from error
+    for path in (out, picture):
+        if path is not None:
             typer.echo(f"Wrote {path}")
 
 

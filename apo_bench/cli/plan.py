@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from apo_bench.assembly.goals import Plan
+from apo_bench.cli.arguments import check_writable
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
@@ -32,17 +33,34 @@ def plan(
     ] = None,
     deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
     deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+    robot: Annotated[
+        Path | None, typer.Option(help="Write tip poses, grasps and guarded motions for a robot into this file: .json.")
+    ] = None,
+    frames: Annotated[
+        Path | None,
+        typer.Option(help="Base, flange, order of quaternions of --robot: .toml; default: world, tip, xyzw."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
+    from apo_bench.files.json_forms import write_form
+    from apo_bench.files.robot_frames import RobotFrames, read_robot_frames
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.plan_text import plan_lines, plan_lines_form, plan_text
+    from apo_bench.show.robot_form import robot_form
 
+    if robot is not None:
+        check_writable(robot, "--robot", (".json",))
+    if frames is not None and robot is None:
+        raise InputError(f"--frames {frames} was given without --robot, whose frames they would be; give both.")
+    stated = RobotFrames() if frames is None else read_robot_frames(frames)
     if observation is None:
         if method is not None:
             raise InputError(f"--method {method} was given without --observation; give both, or neither.")
         if (deviation_mm, deviation_deg) != (None, None):
             raise InputError("a standard deviation was given without --observation, whose it would be; leave it out.")
+        if robot is not None:
+            raise InputError("--robot was given without --observation, which says where things are; give both.")
         loaded, notes = load_scenario(scenario), list[str]()
         asked, where = Plan(loaded.assembly, loaded.start, loaded.goals), "at the nominal goals"
         frames = "directions and until in the frame of the assembly"
@@ -53,11 +71,15 @@ def plan(
         where = f"at the goals of {observation}, {_by(method)}"
         frames = "directions in the frame of the assembly, until in the world"
     lines = plan_lines(asked, loaded)
+    if robot is not None:
+        write_form(robot_form(lines, asked, loaded, stated, notes), robot)
     if as_json:
         typer.echo(json.dumps(plan_lines_form(lines, loaded, notes), allow_nan=False))
         return
     typer.echo(f"{loaded.name} {where}; {frames}: mm and degrees\n")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
+    if robot is not None:
+        typer.echo(f"\nWrote {robot}")
 
 
 def _planned(

@@ -65,8 +65,8 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     return measured, Camera(read_pose(top["camera"])) if "camera" in top else Camera()
 
 
-def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
-    """A noise file, with notes at its head."""
+def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = (), T_world_camera: Array | None = None) -> str:
+    """A noise file, with notes at its head, and the pose of the camera if it is known."""
     source = measured.source.replace("\\", "\\\\").replace('"', '\\"')
     head = (
         [f"# {note}" for note in notes],
@@ -76,6 +76,7 @@ def noise_text(measured: MeasuredNoise, notes: tuple[str, ...] = ()) -> str:
         [f"outlier_farthest_mm = {measured.farthest_mm:.5g}"],
         _split_lines("shift", measured.shift_mm, "mm"),
         _split_lines("turn", measured.turn_deg, "deg"),
+        [] if T_world_camera is None else _camera_lines(T_world_camera),
         [] if measured.view is None else _view_lines(measured.view),
         [] if measured.constant is None else _constant_lines(measured.constant),
     )
@@ -88,6 +89,14 @@ def _split_lines(name: str, split: Split, unit: str) -> list[str]:
         lines.append(f"{direction}_scale_{unit} = {tail.scale:.5g}")
         lines.append(f"{direction}_degrees_of_freedom = {tail.freedom:.5g}")
     return lines
+
+
+def _camera_lines(T_world_camera: Array) -> list[str]:
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_matrix(T_world_camera[:3, :3]).as_euler("xyz", degrees=True)
+    at = 1e3 * T_world_camera[:3, 3]
+    return ["", "[camera]  # in the world", f"at_mm = {_listed(at)}", f"turn_deg = {_listed(turn)}"]
 
 
 def _view_lines(view: ViewNoise) -> list[str]:

@@ -11,17 +11,15 @@ from typing import Literal, final
 import numpy as np
 
 from apo_bench.errors import unknown
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
-from apo_bench.scenario.keys import read_pose, refuse
+from apo_bench.scenario.keys import read_any_pose, refuse
 
 _SCHEMA = "apo-bench/camera/1"
 LENGTHS = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0})
 ANGLES = MappingProxyType({"deg": np.pi / 180.0, "rad": 1.0})
 TIMES = MappingProxyType({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
-_LARGEST_MM = 1e5
 
 
 @final
@@ -75,25 +73,10 @@ def read_camera(path: str | Path) -> CameraFile:
         refuse(top["known"], "the pose of the camera is stated too; state one of the two")
     return CameraFile(
         conventions=_conventions(top["log"]) if "log" in top else Conventions(),
-        T_world_camera=any_pose(top["pose"]) if "pose" in top else None,
+        T_world_camera=read_any_pose(top["pose"]) if "pose" in top else None,
         known=_known(top["known"]) if "known" in top else {},
         stays=_stays(top["noise"]) if "noise" in top else None,
     )
-
-
-def any_pose(node: JsonNode) -> Array:
-    """`at_mm` with `turn_deg`, `quaternion_wxyz` or `quaternion_xyzw`, as (4, 4), [m]."""
-    keys = node.fields(("at_mm",), ("turn_deg", "quaternion_wxyz", "quaternion_xyzw"))
-    stated = [key for key in keys if key != "at_mm"]
-    if len(stated) > 1:
-        refuse(node, f"{' and '.join(stated)} state the same; keep one")
-    if stated in ([], ["turn_deg"]):
-        return read_pose(node)
-    at = keys["at_mm"].numbers(3)
-    if np.abs(at).max() > _LARGEST_MM:
-        keys["at_mm"].fail(f"lengths of at most {_LARGEST_MM:g} mm are needed")
-    q = keys[stated[0]].quaternion()
-    return pose.unpack(np.concatenate([at * 1e-3, q if stated[0].endswith("wxyz") else np.roll(q, 1)]))
 
 
 def _conventions(node: JsonNode) -> Conventions:
@@ -150,7 +133,7 @@ def _known(node: JsonNode) -> Mapping[str, Array | None]:
                 child.fail(unknown("place", value, ("start",)).rstrip(".") + '; "start" or a pose is needed')
             found[part] = None
         else:
-            found[part] = any_pose(child)
+            found[part] = read_any_pose(child)
     return found
 
 

@@ -13,9 +13,8 @@ from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
-from apo_bench.recording.camera_file import any_pose
 from apo_bench.recording.log import Log, Track
-from apo_bench.scenario.keys import refuse
+from apo_bench.scenario.keys import read_any_pose, refuse
 
 _SCHEMA = "apo-bench/objects/1"
 
@@ -90,7 +89,7 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
 
 def _tracked(node: JsonNode) -> TrackedPart:
     keys = node.fields(("id",), ("frame",))
-    return TrackedPart(_id(keys["id"]), any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
+    return TrackedPart(_id(keys["id"]), read_any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
 
 
 def _id(node: JsonNode) -> str:

@@ -14,6 +14,7 @@ from apo_bench.io.strict_json import JsonNode
 
 LARGEST_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""
+_FARTHEST_MM = 1e5
 _AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0)) for i in range(3)}
 
 
@@ -36,6 +37,21 @@ def read_pose(node: JsonNode) -> Array:
     if np.abs(turn).max() > 360:
         keys["turn_deg"].fail("three angles from -360 to 360 degrees are needed")
     return pose.at(1e-3 * at, turn)
+
+
+def read_any_pose(node: JsonNode) -> Array:
+    """`at_mm` with `turn_deg`, `quaternion_wxyz` or `quaternion_xyzw`, as (4, 4), [m]."""
+    keys = node.fields(("at_mm",), ("turn_deg", "quaternion_wxyz", "quaternion_xyzw"))
+    stated = [key for key in keys if key != "at_mm"]
+    if len(stated) > 1:
+        refuse(node, f"{' and '.join(stated)} state the same; keep one")
+    if stated in ([], ["turn_deg"]):
+        return read_pose(node)
+    at = keys["at_mm"].numbers(3)
+    if np.abs(at).max() > _FARTHEST_MM:
+        keys["at_mm"].fail(f"lengths of at most {_FARTHEST_MM:g} mm are needed")
+    q = keys[stated[0]].quaternion()
+    return pose.unpack(np.concatenate([at * 1e-3, q if stated[0].endswith("wxyz") else np.roll(q, 1)]))
 
 
 def read_unit_axis(node: JsonNode) -> Array:

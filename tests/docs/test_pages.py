@@ -40,6 +40,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"replay .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
     r"replay .*--noise megapose-lmo ": "a replay of seconds; tests/observation/test_measured_noise.py runs the model",
     r"replay .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
+    r"replay .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
     r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
     r"eye ": "many depth images; tests/depth_camera runs them",
     r"part import ": "needs a CAD file; tests/cad runs it",
@@ -192,7 +193,8 @@ def test_what_a_page_says_works_from_top_to_bottom(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
     (tmp_path / "docs").mkdir()
-    shutil.copy(ROOT / "docs" / "seen.csv", tmp_path / "docs")
+    for name in ("seen.csv", "recording.csv"):
+        shutil.copy(ROOT / "docs" / name, tmp_path / "docs")
     if page.name == "report.md":
         for sweep in ("mine", "other"):
             shutil.copytree(SWEEP, tmp_path / "runs" / sweep)

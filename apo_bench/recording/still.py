@@ -1,0 +1,67 @@
+"""The noise of a camera from parts that rest: what its frames scatter about the mean of each rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.residuals import Residuals
+from apo_bench.recording.log import Log, Track
+from apo_bench.recording.rests import Rest, rests_of
+
+_MOST_GAP = 1.5
+"""A time between two frames that is so many times the usual one has frames missing."""
+
+
+def still_residuals(log: Log) -> Residuals:
+    """The residuals of all frames of all rests, in the frames of the rays; missing frames are those of gaps in time.
+
+    An error that stays while a part rests is in the mean, and therefore not in these.
+
+    Raises:
+        InputError: Nothing rests.
+    """
+    where, shift, turn, distance = list[tuple[int, int, int]](), list[Array](), list[Array](), list[float]()
+    camera, image = Camera(np.eye(4)), 0
+    for part, track in enumerate(log.tracks.values()):
+        for rest in rests_of(track):
+            errors = _errors(camera, track, rest)
+            missing = _missing(track.t[rest.first : rest.last + 1])
+            shift += [*errors[:, :3] * 1e3, *np.full((missing, 3), np.nan)]
+            turn += [*np.degrees(errors[:, 3:]), *np.full((missing, 3), np.nan)]
+            distance += [1e3 * float(np.linalg.norm(rest.T[:3, 3]))] * len(errors)
+            n = len(errors) + missing
+            where += [(0, image + i, part) for i in range(n)]
+            image += n
+    if not shift:
+        raise InputError(f"{log.file}: nothing rests in the log; give one in which parts stand still.")
+    n = len(shift)
+    return Residuals(
+        where=np.array(where, dtype=np.int64),
+        shift_mm=np.array(shift),
+        turn_deg=np.array(turn),
+        trace_deg=np.linalg.norm(np.array(turn), axis=1),
+        score=np.full(n, np.nan),
+        distance_mm=float(np.median(distance)),
+    )
+
+
+def _errors(camera: Camera, track: Track, rest: Rest) -> Array:
+    """(n, 6), (x, y, along; rx, ry, about), [m, rad]: from the mean of a rest to each frame.
+
+    A mean of n frames takes part of each error with it, so what is left is as much larger as it was made smaller.
+    """
+    T, n = track.T[rest.first : rest.last + 1], float(rest.mean.inlier.sum())
+    F = camera.frames(rest.T[None])[0]
+    shift = (T[:, :3, 3] - rest.T[:3, 3]) @ F
+    turn = pose.log(pose.inverse(rest.T) @ T)[:, 3:] @ rest.T[:3, :3].T @ F
+    return np.concatenate([shift, turn], axis=1) * np.sqrt(n / max(n - 1.0, 1.0))
+
+
+def _missing(t: Array) -> int:
+    """How many frames are missing between others, by the usual time between two."""
+    steps = np.diff(t) / float(np.median(np.diff(t)))
+    return int(np.sum(np.round(steps[steps > _MOST_GAP]) - 1.0))

@@ -1,0 +1,183 @@
+"""A plan in a robot's terms: poses of tip or flange in the frame of its base, motions with guards, mm.
+
+The tip lies between the fingertips: z points ahead, x along the direction in which the fingers close. Each motion is a
+straight line `from` a pose `to` a pose. One that is guarded ends where contact is felt against its direction, which
+should be at `to`; it begins as far before as the plan comes from, or `NEAR_M` where nothing else says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.assembly.placement import placements
+from apo_bench.files.robot_frames import RobotFrames
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.scenario.scenario import Grasp, Scenario
+from apo_bench.show.plan_text import PlanLine
+
+_SCHEMA = "apo-bench/robot-plan/1"
+NEAR_M = 0.005
+"""A guarded motion whose length nothing else says begins so far before contact."""
+_BEYOND_M = 0.002
+"""Contact is sought this far beyond where it should be."""
+_ABOVE_M = 0.1
+"""A part is approached from so far above."""
+_ALONG = 0.999
+
+
+def robot_form(
+    lines: Sequence[PlanLine], plan: Plan, scenario: Scenario, frames: RobotFrames, notes: Sequence[str] = ()
+) -> dict[str, Any]:
+    """What `json` can write: one entry per step, undone steps too, mm and unit vectors.
+
+    Args:
+        lines: Of the plan, step by step.
+        notes: What is to be said with it.
+    """
+    poses = dict(plan.start)
+    steps = []
+    history: list[Mapping[str, Array]] = []
+    for line in lines:
+        after = history.pop() if line.undo else _after(plan, line, poses)
+        if not line.undo:
+            history.append(dict(poses))
+        steps.append(_step(line, poses, after, plan, scenario, frames))
+        poses = dict(after)
+    return {
+        "schema": _SCHEMA,
+        "scenario": scenario.name,
+        "poses": {
+            "of": "tip" if frames.T_flange_tip is None else "flange",
+            "in": "base",
+            "position": "mm",
+            "quaternion": frames.quaternion,
+            "tip": "between the fingertips: z ahead, x along the direction in which the fingers close",
+            "base_in_world": _pose(frames.T_world_base, frames),
+        },
+        "steps": steps,
+        "notes": list(notes),
+    }
+
+
+def _after(plan: Plan, line: PlanLine, poses: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Where every part is when a step is done."""
+    assert line.goal is not None
+    operation = plan.assembly.operations[line.operation]
+    alone = type(plan.assembly)(plan.assembly.solids, (operation,), plan.assembly.fixed)
+    return placements(alone, poses, line.goal[None])[0]
+
+
+def _step(
+    line: PlanLine,
+    poses: Mapping[str, Array],
+    after: Mapping[str, Array],
+    plan: Plan,
+    scenario: Scenario,
+    frames: RobotFrames,
+) -> dict[str, Any]:
+    part, solid = line.what.main, plan.assembly.solids[line.what.main]
+    here, goal = poses[part], after[part]
+    grip = tip_in_part(line.grasp, here)
+    low, high = solid.bounds
+    width = float(np.abs(line.grasp.across) @ (high - low))
+    tip = here @ grip
+    return {
+        "operation": line.operation + 1,
+        "undo": line.undo,
+        "part": part,
+        "carries": list(line.what.carries),
+        "grasp": {
+            "tip_in_part": _pose(grip, frames),
+            "part_is_at_most_mm_wide": round(1e3 * width, 6),
+        },
+        "pick": {"above": _tip(_lifted(tip, _ABOVE_M), frames), "at": _tip(tip, frames)},
+        "motions": [
+            *_departs(line, here, grip, frames),
+            *_arrives(line, goal, grip, frames),
+        ],
+        "part_at_goal": _pose(pose.inverse(frames.T_world_base) @ goal, frames),
+        "trouble": line.trouble or None,
+    }
+
+
+def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
+    """The tip in the frame of the part, (4, 4): looking down where the part stands like this."""
+    down = -T_world_part[2, :3]
+    across = grasp.across - (grasp.across @ down) * down
+    across = across / np.linalg.norm(across)
+    T = np.eye(4)
+    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = across, np.cross(down, across), down, grasp.point
+    return T
+
+
+def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
+    """The motions by which the part leaves the contacts that it is in, one after the other."""
+    found, at = [], here
+    for macro in line.leaves.departs:
+        way = here[:3, :3] @ line.leaves.own(macro.direction)
+        to = _shifted(at, way, macro.length_m or NEAR_M)
+        found.append(_motion(macro.name, False, at, to, way, grip, frames))
+        at = to
+    return found
+
+
+def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
+    """The motions by which the part comes to its goal: the last one ends there, each where the next one begins."""
+    way_in = goal[:3, :3] @ line.comes.line.direction
+    macros = list(line.comes.macros)
+    if not macros:
+        at = _shifted(goal, way_in, -line.comes.line.travel_m)
+        return [_motion("put down", False, at, goal, way_in, grip, frames)]
+    found, end = list[dict[str, Any]](), goal
+    for i, macro in reversed(list(enumerate(macros))):
+        way = goal[:3, :3] @ line.comes.own(macro.direction)
+        first_along = way @ way_in > _ALONG and not any(
+            goal[:3, :3] @ line.comes.own(other.direction) @ way_in > _ALONG for other in macros[:i]
+        )
+        length = line.comes.line.travel_m if first_along else macro.length_m or NEAR_M
+        begin = _shifted(end, way, -length)
+        found.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
+        end = begin
+    return found[::-1]
+
+
+def _motion(
+    name: str, guarded: bool, begin: Array, end: Array, way: Array, grip: Array, frames: RobotFrames
+) -> dict[str, Any]:
+    direction = pose.inverse(frames.T_world_base)[:3, :3] @ way
+    return {
+        "macro": name,
+        "from": _tip(begin @ grip, frames),
+        "to": _tip(end @ grip, frames),
+        "direction": (np.round(direction, 12) + 0.0).tolist(),
+        "length_mm": round(1e3 * float(np.linalg.norm(end[:3, 3] - begin[:3, 3])), 6),
+        "guarded": guarded,
+        "seek_beyond_mm": 1e3 * _BEYOND_M if guarded else None,
+    }
+
+
+def _tip(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
+    """A pose of the tip, or of the flange that carries it, in the frame of the base."""
+    T = pose.inverse(frames.T_world_base) @ T_world_tip
+    return _pose(T if frames.T_flange_tip is None else T @ pose.inverse(frames.T_flange_tip), frames)
+
+
+def _pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
+    packed = pose.pack(T)
+    q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)
+    return {"position_mm": (packed[:3] * 1e3).round(9).tolist(), f"quaternion_{frames.quaternion}": q.tolist()}
+
+
+def _lifted(T: Array, far: float) -> Array:
+    return _shifted(T, np.array([0.0, 0.0, 1.0]), far)
+
+
+def _shifted(T: Array, way: Array, far: float) -> Array:
+    out = np.array(T)
+    out[:3, 3] += far * way
+    return out

@@ -1,0 +1,62 @@
+"""A plan in a robot's terms says the same, whatever frames and order of quaternions it is written in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.files.robot_frames import RobotFrames
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import layout_at
+from apo_bench.show.plan_text import plan_lines
+from apo_bench.show.robot_form import robot_form, tip_in_part
+
+BASE, TOOL = pose.at((-0.4, 0.1, 0.02), (0.0, 0.0, 30.0)), pose.at((0.0, 0.01, 0.15), (0.0, 0.0, 45.0))
+
+
+def form(name: str, frames: RobotFrames) -> dict[str, Any]:
+    scenario = load_scenario(name)
+    layout = layout_at(scenario, 0.1, 0.0, 0.3)
+    plan = Plan(scenario.assembly, layout.start, layout.goals)
+    return robot_form(plan_lines(plan, scenario), plan, scenario, frames)
+
+
+def matrix(said: dict[str, list[float]]) -> Array:
+    q = said["quaternion_wxyz"] if "quaternion_wxyz" in said else np.roll(said["quaternion_xyzw"], 1)
+    return pose.unpack(np.concatenate([np.array(said["position_mm"]) * 1e-3, q]))
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "carried_bridge", "pocket_table"])
+def test_motions_follow_each_other_and_end_with_the_part_at_its_goal(name: str) -> None:
+    goals = layout_at(load_scenario(name), 0.1, 0.0, 0.3).goals
+    for step, goal in zip(form(name, RobotFrames())["steps"], goals, strict=True):
+        grip = matrix(step["grasp"]["tip_in_part"])
+        assert np.allclose(matrix(step["motions"][-1]["to"]), goal @ grip, atol=1e-9)
+        assert np.allclose(matrix(step["part_at_goal"]), goal, atol=1e-9)
+        for motion in step["motions"]:
+            begin, end = (np.array(motion[key]["position_mm"]) for key in ("from", "to"))
+            assert np.allclose(begin + motion["length_mm"] * np.array(motion["direction"]), end, atol=1e-5)
+
+
+def test_base_flange_and_order_are_those_that_were_asked_for() -> None:
+    plain = form("stick_in_tower", RobotFrames())
+    other = form("stick_in_tower", RobotFrames(BASE, TOOL, "wxyz"))
+    assert (plain["poses"]["of"], other["poses"]["of"]) == ("tip", "flange")
+    assert other["poses"]["quaternion"] == "wxyz"
+    for a, b in zip(plain["steps"], other["steps"], strict=True):
+        assert np.allclose(BASE @ matrix(b["pick"]["at"]) @ TOOL, matrix(a["pick"]["at"]), atol=1e-9)
+
+
+def test_the_tip_looks_down_and_closes_along_the_grasp() -> None:
+    scenario = load_scenario("stick_in_tower")
+    for operation, grasp in zip(scenario.assembly.operations, scenario.grasps, strict=True):
+        T = scenario.start[operation.main]
+        tip = T @ tip_in_part(grasp, T)
+        assert np.allclose(tip[:3, 2], [0.0, 0.0, -1.0])
+        assert np.allclose(tip[:3, 0], T[:3, :3] @ grasp.across)
+        assert np.isclose(np.linalg.det(tip[:3, :3]), 1.0)
