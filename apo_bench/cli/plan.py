@@ -63,20 +63,20 @@ def plan(
             raise InputError("--robot was given without --observation, which says where things are; give both.")
         loaded, notes = load_scenario(scenario), list[str]()
         asked, where = Plan(loaded.assembly, loaded.start, loaded.goals), "at the nominal goals"
-        frames = "directions and until in the frame of the assembly"
+        axes = "directions and until in the frame of the assembly"
     else:
         method = CORRECTOR if method is None else method
         with redirect_output(as_json):
             loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
-        frames = "directions in the frame of the assembly, until in the world"
+        axes = "directions in the frame of the assembly, until in the world"
     lines = plan_lines(asked, loaded)
     if robot is not None:
         write_form(robot_form(lines, asked, loaded, stated, notes), robot)
     if as_json:
         typer.echo(json.dumps(plan_lines_form(lines, loaded, notes), allow_nan=False))
         return
-    typer.echo(f"{loaded.name} {where}; {frames}: mm and degrees\n")
+    typer.echo(f"{loaded.name} {where}; {axes}: mm and degrees\n")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
     if robot is not None:
         typer.echo(f"\nWrote {robot}")

@@ -335,3 +335,22 @@ def test_rotation_never_adds_freedom_that_translation_lacks(name: str) -> None:
             screw = turning_state(scenario.assembly, found, poses)
             assert screw.translation == found.state
             assert min(*screw.all, *screw.rotation) >= 0
+
+
+def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, frames = tmp_path / "robot.json", tmp_path / "robot.toml"
+    frames.write_text('schema = "apo-bench/robot/1"\nquaternion = "wxyz"\n', encoding="utf-8")
+    seen = ["plan", "stick_in_tower", "--observation", str(ROOT / "docs" / "seen.csv"), "--method", "contact"]
+    assert cli.main([*seen, "--robot", str(out), "--frames", str(frames)]) == 0
+    found = json.loads(out.read_text(encoding="utf-8"))
+    assert found["poses"]["quaternion"] == "wxyz"
+    assert [step["part"] for step in found["steps"]] == ["castle1", "castle2", "stick"]
+    capsys.readouterr()
+    for wrong, sentence in (
+        (["plan", "stick_in_tower", "--robot", str(out)], "--robot was given without --observation"),
+        ([*seen, "--frames", str(frames)], "was given without --robot"),
+    ):
+        assert cli.main(wrong) == 2
+        assert sentence in capsys.readouterr().err
