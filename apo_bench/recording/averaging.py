@@ -100,8 +100,11 @@ def _middle(T: Array) -> Array:
 
 
 def _near(xi: Array) -> NDArray[np.bool_]:
-    spread = np.maximum(_MAD * np.median(np.abs(xi - np.median(xi, axis=0)), axis=0), FLOOR)
-    return np.asarray((np.abs(xi - np.median(xi, axis=0)) < _FAR * spread).all(axis=1))
+    """Which frames are no outliers: at least half of them, since few frames say little of their spread."""
+    off = np.abs(xi - np.median(xi, axis=0))
+    spread = np.maximum(_MAD * np.median(off, axis=0), FLOOR)
+    worst = (off / spread).max(axis=1)
+    return np.asarray(worst <= max(_FAR, float(np.median(worst))))
 
 
 def _scatter(xi: Array) -> Array:

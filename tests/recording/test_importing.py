@@ -9,6 +9,7 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.recording.averaging import average
 from apo_bench.recording.bare import bare_recording
 from apo_bench.recording.camera_file import CameraFile, Conventions
 from apo_bench.recording.importing import Imported, Stated, import_recording
@@ -67,6 +68,15 @@ def test_the_covariance_of_a_frame_is_that_of_its_noise() -> None:
     deviations = np.sqrt([np.diagonal(S) for S in scatter]) / np.repeat([1e-3, np.radians(1.0)], 3)
     assert np.abs(deviations - 1.0).max() < 0.6  # 24 frames: 15 % each, eighteen of them
     assert abs(deviations.mean() - 1.0) < 0.15
+
+
+def test_at_least_half_of_few_frames_count() -> None:
+    """A frame may be the farthest along one axis only: here each is, so that each would be an outlier."""
+    xi = np.zeros((5, 6))
+    xi[np.arange(5), np.arange(5)] = 0.01
+    found = average(pose.exp(xi))
+    assert found.inlier.sum() >= 3
+    assert np.isfinite(found.T).all()
 
 
 def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> None:
