@@ -70,6 +70,7 @@ class Arm:
     hand: Hand | None = None
     """What the gripper does, where that was measured."""
     limits: Limits = Limits()
+    """What it can do."""
     files: tuple[Path, ...] = ()
     """All files that it was made of; none: `mjcf` alone."""
     control: str = "own position actuators"
