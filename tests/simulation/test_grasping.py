@@ -142,6 +142,24 @@ def test_a_part_that_matters_both_ways_is_centred_once_more(pockets: Scene) -> N
     assert abs(held[:3, 0] @ centred[:3, 0]) < 1e-9
 
 
+def test_a_part_is_centred_across_walls_that_are_along_none_of_its_axes(tmp_path: Path) -> None:
+    """A block with sides turned by 30 degrees in its frame: held across two, centred across those that will touch."""
+    turn = pose.at((0, 0, 0), (0, 0, -30))[:2, :2]
+    corners = [(float(x), float(y)) for x, y in np.array([(-20, -20), (20, -20), (20, 20), (-20, 20)]) @ turn.T]
+    block = extrude(polygon(*corners, names=("ny", "px", "py", "nx")), 0, 30, bottom="bottom", top="top")
+    operations = [
+        Operation("first", contacts("first", "bottom-table.top")),
+        Operation("second", contacts("second", "bottom-table.top", "nx-first.px")),
+    ]
+    x, y = (np.append(axis, 0.0) for axis in turn.T)
+    grasps = [Grasp(np.array([0.0, 0.0, 0.02]), y), Grasp(np.array([0.0, 0.0, 0.02]), y)]
+    start = {"first": pose.at((0, -0.27, 0)), "second": pose.at((0, 0.27, 0))}
+    goals = [np.eye(4), pose.at(0.04 * x)]
+    scene = build_scene(scenario(tmp_path, {"first": block, "second": block}, operations, goals, start, grasps))
+    (centring,) = moves(nominal(scene), scene)[0].transfer.centring
+    assert abs(centring.T_part_tip[:3, 0] @ x) == pytest.approx(1.0)
+
+
 def test_a_group_is_lifted_not_pulled_out(pockets: Scene) -> None:
     done = moves(nominal(pockets), pockets)
     assert done[5].transfer.carried == ("cube2", "cube3")

@@ -73,13 +73,16 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Resting
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
-    """The first clear grasp that closes along a direction of the part, or None."""
-    able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ across) > 0.99]
+    """The first clear grasp that closes along what is level of a direction of the part, either way, or None."""
+    up = _upwards(place.T)
+    level = across - (across @ up) * up
+    level /= np.linalg.norm(level)
+    able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ level) > 0.99]
     return _first_clear(scene, part, able, [place])
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
-    """The grasp for a stroke; if the gripper would strike something on the way, one to begin and one to end with.
+    """The grasp for a stroke; if none is clear all the way, however little, one to begin and one to end with.
 
     Both are clear at the change of grip, with fingers open, and on their part of the way, with fingers closed.
 
@@ -92,13 +95,15 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
         return Grips(preferred)
     everything = _candidates(scene, part, places[0].T)
     for margin in _MARGINS_M:
+        clear = _clear(scene, part, everything, ends, margin)
+        whole = next((grasp for grasp in clear if not _nearest(scene, part, grasp, stroke, margin)), None)
+        if whole is not None:
+            return Grips(whole)
+    for margin in _MARGINS_M:
         able = [
             (_nearest(scene, part, grasp, stroke, margin), grasp)
             for grasp in _clear(scene, part, everything, places, margin)
         ]
-        whole = _clear(scene, part, [grasp for left, grasp in able if left == 0.0], ends, margin)
-        if whole:
-            return Grips(whole[0])
         found = _pair(scene, part, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
         if found is not None:
             return found

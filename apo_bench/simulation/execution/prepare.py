@@ -268,7 +268,7 @@ def _centring(
     for wall in later_walls(assembly, k, part):
         if abs((T[:3, :3] @ wall)[2]) < 0.5 and all(abs(T[:3, :3] @ wall @ way) < 0.5 for way in settled):
             settled.append(T[:3, :3] @ wall)
-            grasp = clear_across(scene, part, np.abs(wall), place)
+            grasp = clear_across(scene, part, wall, place)
             grips += [] if grasp is None else [_grip(scene, part, grasp, T, T)]
     return tuple(grips)
 
