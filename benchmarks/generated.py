@@ -76,9 +76,9 @@ def pinned(between: Between, rng: np.random.Generator) -> Assembled:
 
 
 def bushed(between: Between, rng: np.random.Generator) -> Assembled:
-    """A block, two bushes with a flange in it, a pin with a head in each."""
+    """A block, two bushes with a collar in it, a pin with a head in each."""
     width, thick, r = between(90, 110), between(24, 32), between(4, 5.5)
-    outer, play, flange = round(r + between(5, 7), 1), between(0.2, 0.4), between(4, 6)
+    outer, play, flange = round(r + between(5, 7), 1), between(0.2, 0.4), between(14, 18)
     bores = [bore((x, 0), outer + play, 0, thick, f"bore_{i}") for i, x in enumerate((-width / 4, width / 4), start=1)]
     block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
     inner = [Step(0, thick + flange, r + play, name="bore")]

@@ -15,15 +15,19 @@ from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.drafting.standing import Stance, stance
 from apo_bench.drafting.touching import clashes, closed, found_contacts, walls_without_play
 from apo_bench.errors import InputError, unknown
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.holds import Hold, holds
-from apo_bench.geometry.solid import Solid, extent
+from apo_bench.geometry.intrusion import intrusion_depths
+from apo_bench.geometry.solid import Box, Solid, extent
 from apo_bench.parts import load_part
 
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
+_FINGER_M, _MOST_HOLDS = (0.012, 0.018, 0.035), 300
+"""Half the size of a finger with room to open, from 10 mm below its tip up; so many places are looked at."""
 
 
 @final
@@ -90,7 +94,8 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     for part, at in laid_out(solids, turns, site, keep).items():
         starts[part] = np.array(poses[part])
         starts[part][:3, 3] = (*at, stances[part].height_m)
-    grasps = {part: _hold(solids[part], turns[part]) for part in free}
+    grasps, crowded = _holds(solids, poses, order, base)
+    notes += crowded
     notes += _notes(solids, turns, stances, grasps)
     return Draft(
         tuple(PosedPart(each.name, each.file, each.solid, poses[each.name], each.color) for each in parts),
@@ -114,10 +119,42 @@ def _base(parts: Sequence[PosedPart]) -> tuple[tuple[str, ...], str]:
     return (chosen.name,), "the largest of those that lie lowest"
 
 
-def _hold(solid: Solid, R: Array) -> Hold | None:
-    """The best place for the pads; None if there is none."""
-    found = holds(solid, np.round(R[2], 9), _OPENING_M)
-    return found[0] if found else None
+def _holds(
+    solids: Mapping[str, Solid], poses: Poses, order: Sequence[Placing], base: Sequence[str]
+) -> tuple[Mapping[str, Hold | None], list[str]]:
+    """Where each part is held: the best place at which fingers have room beside what stands when it is put down.
+
+    And what is to be said of parts that have no such place.
+    """
+    found: dict[str, Hold | None] = {}
+    notes = list[str]()
+    there = {*base}
+    for placing in order:
+        main = placing.moves[0]
+        others = [part for part in there if part not in placing.moves]
+        offered = holds(solids[main], np.round(poses[main][2, :3], 9), _OPENING_M)
+        free = (hold for hold in offered[:_MOST_HOLDS] if not _struck(hold, poses[main], solids, poses, others))
+        found[main] = next(free, None)
+        if offered and found[main] is None:
+            found[main] = offered[0]
+            notes.append(
+                f"wherever a gripper holds '{main}', fingers that reach 10 mm below their tips meet what stands around "
+                "its place; let it stand out higher, or give it a handle"
+            )
+        there |= set(placing.moves)
+    return found, notes
+
+
+def _struck(hold: Hold, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]) -> bool:
+    """Whether a finger beside a part at T would be in one of the others."""
+    up = T[2, :3]
+    fingers = tuple(
+        Box("", np.array([sign * (hold.half_width + _FINGER_M[0]), 0.0, 0.025]), np.array(_FINGER_M))
+        for sign in (-1.0, 1.0)
+    )
+    R = T[:3, :3] @ np.column_stack([hold.across, np.cross(up, hold.across), up])
+    at = pose.apply(T, hold.point[None])
+    return any(intrusion_depths(fingers, R, at, solids[part].pieces, poses[part])[0] > 0.0 for part in others)
 
 
 def _notes(

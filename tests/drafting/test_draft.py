@@ -119,6 +119,27 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
     assert any("'thin' needs turning over" in note for note in notes)
 
 
+def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: Path) -> None:
+    floor = extrude(rectangle(90, 60), 0, 10, bottom="bottom", top="top")
+    cube = extrude(rectangle(20, 20), 0, 30, bottom="bottom", top="top")
+    places = {
+        "floor": ("floor", at(0, 0, 0)),
+        "left": ("cube", at(-15, 0, 10)),
+        "right": ("cube", at(15, 0, 10)),
+    }
+    found = draft(on_the_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
+    last = found.grasps[found.order[-1].moves[0]]
+    assert last is not None
+    assert abs(last.across[1]) == 1.0
+    hole = extrude(rectangle(60, 60), 0, 20, holes=[rectangle(21, 21)], bottom="bottom", top="top")
+    low = extrude(rectangle(20, 20), 0, 20, bottom="bottom", top="top")
+    sunk = {"hole": ("hole", at(0, 0, 0)), "low": ("low", at(0, 0, 0))}
+    assert any(
+        "stand out higher" in note
+        for note in draft(on_the_table(made(tmp_path, {"hole": hole, "low": low}, sunk))).notes
+    )
+
+
 def test_what_hangs_in_the_air_has_no_order(tmp_path: Path) -> None:
     beside = made(
         tmp_path,
