@@ -360,7 +360,13 @@ def part_lines() -> list[str]:
 
 def arm_lines() -> list[str]:
     """The fields of `Arm`, with the sentences below them."""
-    lines = ["", "## Arms", "", "An arm is data: `--arm mymodule:my_arm`, where `my_arm` is an"]
+    lines = [
+        "",
+        "## Arms",
+        "",
+        "[A file](../guide/arm.md#a-file-that-describes-an-arm) describes any arm. An arm is data also in",
+    ]
+    lines[-1] += " Python: `--arm mymodule:my_arm`, where `my_arm` is an"
     lines[-1] += " `apo_bench.simulation.scene.arm.Arm` or a function that returns one. The site `tip` lies between the"
     lines[-1] += " fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example."
     lines += ["", "| field | meaning |", "|---|---|"]
