@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from apo_bench.assembly.goals import Plan
+from apo_bench.assembly.topology import Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.hull import SAGITTA_M, Hull
 from apo_bench.geometry.solid import Piece
-from apo_bench.parts.making import solid_of
+from apo_bench.parts.making import shaft, solid_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, initial_state, part_pose, place
-from tests.round_scenes import PLATE, peg_in_hole
+from tests.round_scenes import PLATE, contacts, peg_in_hole, scenario
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +118,30 @@ def test_a_bored_plate_stands_on_few_contacts(scene: Scene):
     touching = [{int(scene.shown.geom_part[g]) for g in pair} for pair in data.contact.geom]
     plate, table = ((*scene.shown.free, *scene.shown.fixed).index(part) for part in ("plate", "table"))
     assert 3 <= touching.count({plate, table}) <= 40
+
+
+def test_flat_ends_that_graze_a_round_part_are_not_found_deep_inside_of_it(tmp_path: Path):
+    """With MuJoCo's own tolerance a wall of a hole is at times found millimetres inside of a cylinder it stands on."""
+    operations = [
+        Operation("stub", contacts("stub", "bottom-table.top")),
+        Operation("plate", contacts("plate", "bottom-stub.top")),
+    ]
+    start = {"plate": pose.at((0, -0.27, 0)), "stub": pose.at((0, 0.27, 0))}
+    grasps = [Grasp(np.array([0.0, 0.0, 0.02]), np.array([1.0, 0.0, 0.0]))] * 2
+    bodies = {"plate": PLATE, "stub": shaft(11, 0, 40, "wall", bottom="bottom", top="top")}
+    its = build_scene(scenario(tmp_path, bodies, operations, [np.eye(4), pose.at((0, 0, 0.04))], start, grasps)).shown
+    data, rng, stub = (
+        initial_state(its, start | {"table": np.eye(4)}),
+        np.random.default_rng(0),
+        pose.at((0.3, 0.2, 0.3)),
+    )
+    place(its, data, "stub", stub)
+    for _ in range(200):
+        at = (*rng.normal(scale=1e-6, size=2), 0.04 - SAGITTA_M + rng.normal(scale=1e-8))
+        turn = (*rng.normal(size=2) * 10.0 ** rng.uniform(-7, -4), rng.uniform(-20, 20))
+        place(its, data, "plate", stub @ pose.at(at, turn))
+        mujoco.mj_fwdPosition(its.model, data)
+        assert data.contact.dist.min() > -1e-5
 
 
 def test_a_peg_stands_on_its_end_and_one_that_lies_stays(scene: Scene):
