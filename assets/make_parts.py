@@ -19,6 +19,7 @@ SIDES = ("ny", "px", "py", "nx")
 TAN_60, TAN_30 = float(np.tan(np.radians(60.0))), float(np.tan(np.radians(30.0)))
 _UNDER = 15.0 + 65.0 * TAN_30
 """Height of the roof of lean_to at its open end."""
+_GEARS = ((-48, "a_bore"), (0, "b_bore"), (48, "c_bore"))
 
 
 def bored_plate() -> Body:
@@ -132,6 +133,48 @@ def l_plate() -> Body:
     return extrude(outline, 0, 16, bores=holes, bottom="bottom", top="top")
 
 
+def gear_base() -> Body:
+    """174 x 70 x 20 mm with three blind bores of 10 mm, 48 mm apart, 17 mm deep, and two walls, 23 mm high."""
+    holes = [
+        Bore((x, 0), (Step(3, 16, 5, name=name, fit=True), Step(16, 20, 7)), {3: f"{name}_floor", 16: f"{name}_rim"})
+        for x, name in _GEARS
+    ]
+    plate = extrude(rectangle(174, 70), 0, 20, bores=holes, bottom="bottom", top="top")
+    ends = [extrude(rectangle(14, 70, (x, 0)), 20, 43, top=name) for x, name in ((-80, "wall_n"), (80, "wall_p"))]
+    return join(plate, *ends)
+
+
+def axle() -> Body:
+    """10 mm thick, 60 mm long, with a collar of 22 mm, 5 mm thick, 15 mm above its tip."""
+    steps = [
+        Step(0, 1, 4, 5, "side_chamfer"),
+        Step(1, 15, 5, name="side"),
+        Step(15, 20, 11, name="collar"),
+        Step(20, 59, 5, name="neck"),
+        Step(59, 60, 5, 4, name="neck_chamfer"),
+    ]
+    return turned(steps, flats={0: "tip", 15: "shoulder", 20: "ledge", 60: "head"})
+
+
+def stand() -> Body:
+    """40 x 40 x 20 mm with a bore of 10 mm, 17 mm deep: holds an axle upright."""
+    hole = Bore((0, 0), (Step(3, 16, 5, name="bore", fit=True), Step(16, 20, 7)), {3: "floor", 16: "rim"})
+    return extrude(rectangle(40, 40), 0, 20, bores=[hole], bottom="bottom", top="top")
+
+
+def disc() -> Body:
+    """A gear without teeth: 40 mm across, 14 mm thick, with a bore of 10 mm."""
+    return turned([Step(0, 14, 20)], [Step(0, 14, 5, name="bore", fit=True)], flats={0: "low", 14: "high"})
+
+
+def gear_cover() -> Body:
+    """174 x 70 x 16 mm with three bores of 10 mm, 48 mm apart."""
+    holes = [
+        Bore((x, 0), (Step(0, 1, 8), Step(1, 16, 5, name=name, fit=True)), {1: f"{name}_rim"}) for x, name in _GEARS
+    ]
+    return extrude(rectangle(174, 70), 0, 16, bores=holes, bottom="bottom", top="top")
+
+
 def _along_x(body: Body) -> Body:
     """A prism over an outline (y, z), drawn along z, as one along x."""
     return body.moved(turn_deg=(90, 0, 90))
@@ -156,6 +199,11 @@ PARTS: Mapping[str, Body] = {
     "wedge": wedge(),
     "pin_plate": pin_plate(),
     "l_plate": l_plate(),
+    "gear_base": gear_base(),
+    "axle": axle(),
+    "stand": stand(),
+    "disc": disc(),
+    "gear_cover": gear_cover(),
 }
 
 

@@ -63,6 +63,14 @@ TABLE = {
         ("S -> D", SLOT),
     ],
     "dovetail": [("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
+    "gearbox": [
+        ("S -> A", [DOWN]),
+        *[("S -> H", INTO)] * 4,
+        ("S -> A", [DOWN]),
+        *[("S -> H", INTO)] * 2,
+        ("H -> H", ["depart +z", *INTO]),
+        ("S -> H", INTO),
+    ],
     "l_bracket_on_plate": [("S -> A", [DOWN]), ("S -> H", INTO)],
     "nested_bushings": [("S -> A", [DOWN]), ("S -> H", INTO), ("S -> H", INTO)],
     "peg_in_hole": [("S -> A", [DOWN]), ("S -> H", INTO)],
@@ -85,8 +93,11 @@ LENGTHS_MM = {
     ("peg_in_hole", 2): 20.0,
     ("shaft_through_brackets", 3): 123.016,
 }
+LENGTHS_MM |= {("gearbox", axle): 10.016 for axle in (2, 4, 7, 9)}
+LENGTHS_MM |= {("gearbox", disc): 39.016 for disc in (3, 5, 8)} | {("gearbox", 10): 20.016}
 TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 3): (2, 0, 4)}
 TURNING |= {("nested_bushings", 2): (1, 1, 4), ("nested_bushings", 3): (1, 1, 4)}
+TURNING |= {("gearbox", k): (1, 1, 4) for k in (2, 3, 4, 5, 7, 8, 9)}
 """Of shafts, which turn in their bores, where the faces of the letter alone leave no turn."""
 SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "F": (0, 6, 0), "H": (0, 1, 5)}
 

@@ -31,7 +31,7 @@ LOW |= {"shaft_through_brackets": {2: 1}, "dovetail": {1: 1}}
 """Operations, counted from 0, whose part ends some clearances low: a stick lies on the floor of its slot, and a cube
 hangs on the stick that does."""
 
-ALIKE = {"vanished_fixture": {1, 2}, "nested_bushings": {0, 1}}
+ALIKE = {"vanished_fixture": {1, 2}, "nested_bushings": {0, 1}, "gearbox": {5, 6, 7}}
 """Operations, counted from 0, that show the error where a part goes along with the one that is wrong."""
 
 
