@@ -231,40 +231,59 @@ def _volume(corners: Array) -> float:
 
 
 def _rounded(corners: Array, shafts: Sequence[Region]) -> Array:
-    """A piece with as many corners on the circles of a shaft as its wall needs."""
+    """A piece with as many corners on circles of a shaft as its wall needs: new ones on whole circles, more on others."""
     from scipy.spatial import ConvexHull
 
-    added = [corners]
-    for shaft in shafts:
-        height, distance, angle = shaft.polar(corners)
-        on = np.abs(distance - shaft.radius_at(height)) < 1e-5 * max(*shaft.radii, 1.0)
-        on &= (height > shaft.span[0] - _SAME_MM) & (height < shaft.span[1] + _SAME_MM)
-        if on.sum() < 6:
+    added, dropped = [corners], np.zeros(len(corners), dtype=bool)
+    for shaft in sorted(shafts, key=lambda shaft: -int(_on_wall(corners, shaft).sum())):
+        height, _, angle = shaft.polar(corners)
+        on = _on_wall(corners, shaft) & ~dropped
+        if on.sum() < 3:
             continue
-        step = 2.0 * np.pi / sides_of(1e-3 * max(shaft.radii))
-        x, y = shaft.frame()
-        assert shaft.point is not None
-        assert shaft.axis is not None
+        count = sides_of(1e-3 * max(shaft.radii))
         for h in np.unique(np.round(height[on], 3)):
-            ring = np.sort(angle[on & (np.abs(height - h) < 2e-3)])
-            exact = float(height[on & (np.abs(height - h) < 2e-3)].mean())
-            if len(ring) < 3:
-                continue
-            gaps = np.diff(np.append(ring, ring[0] + 2.0 * np.pi))
-            usual = float(np.median(gaps))
-            fresh = [
-                a + gap * np.arange(1, n) / n
-                for a, gap in zip(ring, gaps, strict=True)
-                if gap < 1.6 * usual and (n := int(np.ceil(gap / step - 1e-9))) > 1
-            ]
-            if fresh:
-                a = np.concatenate(fresh)
-                r = shaft.radius_at(exact)
-                added.append(shaft.point + exact * shaft.axis + r * (np.outer(np.cos(a), x) + np.outer(np.sin(a), y)))
+            mine = on & (np.abs(height - h) < 2e-3)
+            a, whole = _around_axis(np.sort(angle[mine]), count)
+            if whole:
+                dropped |= mine
+            if len(a):
+                added.append(_ring(shaft, float(height[mine].mean()), a))
     if len(added) == 1:
         return corners
+    added[0] = corners[~dropped]
     every = _once(np.concatenate(added))
     return np.asarray(every[np.sort(ConvexHull(every).vertices)])
+
+
+def _on_wall(corners: Array, shaft: Region) -> Any:
+    height, distance, _ = shaft.polar(corners)
+    on = np.abs(distance - shaft.radius_at(height)) < max(1e-5 * max(shaft.radii), _SAME_MM)
+    return on & (height > shaft.span[0] - _SAME_MM) & (height < shaft.span[1] + _SAME_MM) & (distance > _SAME_MM)
+
+
+def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
+    """Angles of corners that a wall of so many sides needs beside those of a ring; whether they stand for all of it."""
+    if len(ring) < 3:
+        return ring[:0], False
+    gaps = np.diff(np.append(ring, ring[0] + 2.0 * np.pi))
+    usual = float(np.median(gaps))
+    if len(ring) >= 6 and gaps.max() < 1.6 * usual:
+        return 2.0 * np.pi * (np.arange(count) + 0.5) / count, True
+    step = 2.0 * np.pi / count
+    fresh = [
+        a + gap * np.arange(1, n) / n
+        for a, gap in zip(ring, gaps, strict=True)
+        if gap < 1.6 * usual and (n := int(np.ceil(gap / step - 1e-9))) > 1
+    ]
+    return np.concatenate([ring[:0], *fresh]), False
+
+
+def _ring(shaft: Region, height: float, angles: Array) -> Array:
+    assert shaft.point is not None
+    assert shaft.axis is not None
+    x, y = shaft.frame()
+    out = np.outer(np.cos(angles), x) + np.outer(np.sin(angles), y)
+    return np.asarray(shaft.point + height * shaft.axis + shaft.radius_at(height) * out)
 
 
 def _as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]:

@@ -17,6 +17,8 @@ from apo_bench.cad.reading import CadFile, read_meshes
 from apo_bench.cad.regions import regions_of
 from apo_bench.cad.shells import closed_solids
 from apo_bench.cad.stating import flat_face, round_face
+from apo_bench.cad.step import KINDS as STEP_KINDS
+from apo_bench.cad.step import read_step
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
@@ -28,7 +30,6 @@ from apo_bench.parts.allowed import MOST_CORNERS_IN_ALL, MOST_FACES, MOST_PIECES
 from apo_bench.parts.making import Body, solid_of, write_part
 
 _RAYS = 720
-_WORD = "_"
 
 
 @final
@@ -47,17 +48,19 @@ class Imported:
 
 
 def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
-    """The solids of a file of triangles, with fitted and named faces.
+    """The solids of a file, with named faces: as STEP states them, or fitted to triangles.
 
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
     """
+    if path.suffix.lower() in STEP_KINDS:
+        return read_step(path, unit)
     file = read_meshes(path, unit)
     found = []
     for each in closed_solids(path, file.shapes):
         regions, facets = regions_of(each.mesh)
         named = with_names(each.mesh, regions)
-        found.append(RawSolid(each.name, each.mesh, named, facets, each.poses, each.said))
+        found.append(RawSolid(each.name, each.mesh, named, facets, each.places, each.said))
     return file, found
 
 
@@ -96,7 +99,8 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
         raise InputError(
             f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
         )
-    path = write_part(name, body, folder, density=density, source=source, licence="as that file")
+    color = {"color": raw.places[0].color} if raw.places[0].color else {}
+    path = write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
     try:
         solid = load_part(path)
     except InputError as error:
@@ -113,12 +117,6 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
 def with_new_names(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     """With other names for some faces."""
     return replace(raw, regions=renamed(raw.regions, names))
-
-
-def part_name(text: str) -> str:
-    """A name that a part may have, from any text."""
-    plain = "".join(c if c.isascii() and (c.isalnum() or c == _WORD) else _WORD for c in text)[:48]
-    return plain if plain[:1].isalpha() else f"part_{plain}"
 
 
 def _faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:

@@ -11,15 +11,15 @@ from apo_bench.parts.making.moments import Moments
 
 
 def matter(raw: RawSolid, cut: Cut) -> Moments:
-    """[m]: of the mesh, and what lies between its flat strips and the walls that pieces are rebuilt for.
+    """[m]: as the file has it, else of the mesh and what lies between its strips and walls that pieces are rebuilt for.
 
     Where pieces stand for free shapes, of the pieces.
     """
     if cut.hulls:
         found = mesh_moments(_union(cut))
     else:
-        found = mesh_moments(raw.mesh)
-        for region in raw.regions:
+        found = raw.moments or mesh_moments(raw.mesh)
+        for region in raw.regions if raw.moments is None else ():
             if region.square:
                 found = found.plus(_behind_strips(raw, region))
     return Moments(1e-9 * found.size, 1e-12 * found.first, 1e-15 * found.second)

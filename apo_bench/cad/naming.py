@@ -59,6 +59,12 @@ def renamed(regions: Sequence[Region], names: Mapping[str, str]) -> tuple[Region
     return tuple(replace(region, name=said.get(region.name, region.name)) for region in regions)
 
 
+def part_name(text: str) -> str:
+    """A name that a part may have, from any text."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in text)[:48]
+    return plain if plain[:1].isalpha() else f"part_{plain}"
+
+
 def _plain(name: str) -> str:
     return {"+": "p", "-": "n"}.get(name[:1], name[:1]) + name[1:]
 

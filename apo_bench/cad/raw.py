@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, final
+from typing import Any, Literal, NamedTuple, final
 
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import WHOLE_TURN
+from apo_bench.parts.making.moments import Moments
 
 Kind = Literal["plane", "cylinder", "cone", "other"]
 
@@ -130,6 +131,16 @@ class Region:
         return self.radii[0] + self.slope * (height - self.span[0])
 
 
+class Place(NamedTuple):
+    """One of the places at which a file has a solid."""
+
+    name: str
+    T: Array
+    """Of the frame of the solid in that of the file, (4, 4), [mm]."""
+    color: tuple[float, float, float] | None = None
+    """Red, green, blue, 0 to 1."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class RawSolid:
@@ -140,10 +151,12 @@ class RawSolid:
     regions: tuple[Region, ...]
     facets: Any
     """The flat piece that each triangle belongs to, (t,)."""
-    poses: tuple[Array, ...] = (np.eye(4),)
-    """Where the file has it: the first one as it stands, then repeated ones, [mm]."""
+    places: tuple[Place, ...]
+    """Where the file has it."""
     said: tuple[str, ...] = ()
     """What was mended."""
+    moments: Moments | None = None
+    """As the file has them, where it has more than triangles, [mm]."""
 
     def named(self) -> Mapping[str, Region]:
         return {region.name: region for region in self.regions if region.name}

@@ -36,6 +36,8 @@ class CadFile(NamedTuple):
     unit: str
     said: str
     """Where the unit is from."""
+    left_out: tuple[str, ...] = ()
+    """Why some of its solids are not read."""
 
 
 def read_meshes(path: Path, unit: str | None = None) -> CadFile:

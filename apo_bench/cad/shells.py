@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.crossing import crossing
-from apo_bench.cad.raw import Mesh
+from apo_bench.cad.raw import Mesh, Place
 from apo_bench.cad.reading import Shape
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -24,7 +24,7 @@ class Closed(NamedTuple):
 
     name: str
     mesh: Mesh
-    poses: tuple[Array, ...]
+    places: tuple[Place, ...]
     said: tuple[str, ...]
 
 
@@ -37,7 +37,7 @@ def closed_solids(path: Path, shapes: tuple[Shape, ...]) -> list[Closed]:
     found: list[Closed] = []
     for shape in shapes:
         mesh, said = _joined(shape.mesh)
-        _check_closed(path, mesh)
+        check_closed(path, mesh)
         turned = _alike(path, mesh)
         if turned is not mesh:
             said = (*said, "triangles that looked the other way than their neighbours were turned")
@@ -51,7 +51,7 @@ def closed_solids(path: Path, shapes: tuple[Shape, ...]) -> list[Closed]:
         for i, (solid, flipped) in enumerate(solids, start=1):
             name = shape.name if len(solids) == 1 else f"{shape.name}_{i}"
             more = ("it was inside out, and was turned",) if flipped else ()
-            _add(found, Closed(name, solid, (np.eye(4),), (*said, *more)))
+            _add(found, Closed(name, solid, (Place(name, np.eye(4)),), (*said, *more)))
     return found
 
 
@@ -81,7 +81,8 @@ def _is_closed(mesh: Mesh) -> bool:
     return bool(len(mesh.triangles)) and bool((_counts(mesh) == 2).all())
 
 
-def _check_closed(path: Path, mesh: Mesh) -> None:
+def check_closed(path: Path, mesh: Mesh) -> None:
+    """Raise an `InputError` unless every edge has two triangles."""
     if len(mesh.triangles) < 4:
         raise InputError(f"{path}: the triangles make no solid; save the part as a closed mesh.")
     counts = _counts(mesh)
@@ -179,14 +180,14 @@ def _is_inside(shell: Mesh, point: Array) -> bool:
 def _add(found: list[Closed], new: Closed) -> None:
     """Another solid, as a place of one that is the same, or on its own."""
     for i, old in enumerate(found):
-        pose = _pose(old.mesh, new.mesh)
+        pose = moved_onto(old.mesh, new.mesh)
         if pose is not None:
-            found[i] = old._replace(poses=(*old.poses, pose))
+            found[i] = old._replace(places=(*old.places, new.places[0]._replace(T=pose)))
             return
     found.append(new)
 
 
-def _pose(a: Mesh, b: Mesh) -> Array | None:
+def moved_onto(a: Mesh, b: Mesh) -> Array | None:
     """How the first one is moved onto the second, which has the same triangles in the same order; else None."""
     if len(a.corners) != len(b.corners) or len(a.triangles) != len(b.triangles):
         return None

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from apo_bench.cli.arguments import path_given
 from apo_bench.errors import InputError
+
+if TYPE_CHECKING:
+    from apo_bench.cad.importing import Imported
+    from apo_bench.cad.raw import RawSolid
 
 part = typer.Typer(add_completion=False, rich_markup_mode=None, help="Parts from CAD files.")
 
@@ -26,7 +31,7 @@ def _group() -> None:
 
 @part.command("import")
 def import_file(
-    file: Annotated[Path, typer.Argument(help="A file of triangles: .stl, .obj or .3mf.", parser=path_given)],
+    file: Annotated[Path, typer.Argument(help="A CAD file: .step, .stp, .stl, .obj or .3mf.", parser=path_given)],
     out: Annotated[Path, typer.Option(help="The folder for the part files and their pictures; made if needed.")],
     unit: Annotated[
         str | None, typer.Option(help="Of the numbers in the file: mm, in, m, cm, ft, um; default: as it states.")
@@ -35,11 +40,13 @@ def import_file(
         list[str] | None, typer.Option(help="Another name for a face, such as hole1=bore; may be given again.")
     ] = None,
     density: Annotated[float, typer.Option(help="In kg/m^3.")] = 1000.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
-    from apo_bench.cad.importing import import_part, part_name, raw_solids, with_new_names
-    from apo_bench.show.part_picture import draw_part
-    from apo_bench.show.part_text import import_lines, unit_line
+    from apo_bench.cad.importing import raw_solids, with_new_names
+    from apo_bench.cad.places import named_places, write_places
+    from apo_bench.show.part_form import report_form
+    from apo_bench.show.part_text import unit_line
 
     names = _pairs(name or [])
     if not 1.0 <= density <= 25_000.0:
@@ -52,20 +59,57 @@ def import_file(
     raws = [with_new_names(raw, names) for raw in raws]
     try:
         out.mkdir(parents=True, exist_ok=True)
-        typer.echo(f"{file}: {unit_line(source)}")
-        used: set[str] = set()
-        for raw in raws:
-            called = part_name(raw.name)
-            while called in used:
-                called += "_"
-            used.add(called)
-            done = import_part(raw, called, out, file.name, density)
-            typer.echo("\n".join(import_lines(done)))
-            picture = done.path.with_suffix(".png")
-            draw_part(raw, frozenset(done.refused), called, picture)
-            typer.echo(f"Wrote {done.path} and {picture}")
+        _say(f"{file}: {unit_line(source)}", as_json)
+        done, left_out = _written(file, raws, out, density, as_json)
+        left_out = [*source.left_out, *left_out]
+        places = named_places({each.path.stem: each.raw.places for each in done})
+        poses = write_places(places, out, file.name) if len(places) > 1 else None
     except OSError as error:
         raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+    if poses is not None:
+        _say(f"Wrote {poses}: {len(places)} places of {len(done)} parts", as_json)
+    if as_json:
+        typer.echo(json.dumps(report_form(source, file, done, poses), allow_nan=False))
+    if left_out:
+        raise InputError(f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
+
+
+def _written(
+    file: Path, raws: Sequence[RawSolid], out: Path, density: float, as_json: bool
+) -> tuple[list[Imported], list[str]]:
+    """Parts with their pictures; and why others of the file became none."""
+    from apo_bench.cad.importing import import_part
+    from apo_bench.cad.naming import part_name
+    from apo_bench.show.part_picture import draw_part
+    from apo_bench.show.part_text import import_lines
+
+    done: list[Imported] = []
+    left_out: list[str] = []
+    used: set[str] = set()
+    for raw in raws:
+        called = part_name(raw.name)
+        while called in used:
+            called += "_"
+        used.add(called)
+        try:
+            each = import_part(raw, called, out, file.name, density)
+        except InputError as error:
+            if len(raws) == 1:
+                raise
+            left_out.append(f"{called}: {str(error).removeprefix(f'{file.name}: ')}")
+            _say(f"{called}: NO PART", as_json)
+            continue
+        done.append(each)
+        _say("\n".join(import_lines(each)), as_json)
+        picture = each.path.with_suffix(".png")
+        draw_part(raw, frozenset(each.refused), called, picture)
+        _say(f"Wrote {each.path} and {picture}", as_json)
+    return done, left_out
+
+
+def _say(text: str, as_json: bool) -> None:
+    if not as_json:
+        typer.echo(text)
 
 
 def _pairs(given: list[str]) -> Mapping[str, str]:

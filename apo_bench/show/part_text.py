@@ -28,9 +28,10 @@ def import_lines(done: Imported) -> Iterator[str]:
     yield f"{done.path.stem}: {_numbers(high - low, ' x ')} mm, {len(raw.mesh.triangles):,} triangles, watertight"
     for said in raw.said:
         yield f"  mended: {said}"
-    for k, pose in enumerate(raw.poses[1:], start=2):
-        turn = np.degrees(np.arccos(np.clip((np.trace(pose[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
-        yield f"  place {k} of it in the file: shifted by ({_numbers(pose[:3, 3])}) mm, turned by {turn:.4g} degrees"
+    for k, (_, T, _) in enumerate(raw.places, start=1):
+        turn = np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
+        if len(raw.places) > 1 or turn or T[:3, 3].any():
+            yield f"  place {k} of it in the file: shifted by ({_numbers(T[:3, 3])}) mm, turned by {turn:.4g} degrees"
     yield f"  faces: {_counts(raw)}"
     for name, region in raw.named().items():
         reason = done.refused.get(name)
@@ -48,8 +49,11 @@ def import_lines(done: Imported) -> Iterator[str]:
     for name, radius in done.free_mm.items():
         fitted = min(raw.named()[name].radii)
         yield f"  free radius of {name}: {radius:.4f} mm, {1e3 * (radius - fitted):+.1f} um from the fitted wall"
-    stated, mesh = 1e9 * done.solid.volume, raw.mesh.volume
-    yield f"  volume: {mesh:.6g} mm^3 as tessellated, {stated:.6g} mm^3 with round walls as fitted"
+    stated = 1e9 * done.solid.volume
+    if raw.moments is not None:
+        yield f"  volume: {raw.moments.size:.6g} mm^3 in the file, {stated:.6g} mm^3 as written"
+    else:
+        yield f"  volume: {raw.mesh.volume:.6g} mm^3 as tessellated, {stated:.6g} mm^3 with round walls as fitted"
     loss = (
         f"; {done.cut.hulls} of them stand for hollow or free shapes and grow it by {done.cut.grown:.3g} mm^3"
         if done.cut.hulls

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tomllib
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -132,8 +133,8 @@ def test_solids_of_one_shape_are_one_part_with_places(tmp_path: Path) -> None:
         np.concatenate([triangles(each) for each in (a, b, rod(5, 20, (0, 60, 0)))]), tmp_path / "a.stl"
     )
     _, raws = raw_solids(path, None)
-    assert [len(raw.poses) for raw in raws] == [2, 1]
-    assert raws[0].poses[1][:3, 3] == pytest.approx([50, 0, 0], abs=1e-4)
+    assert [len(raw.places) for raw in raws] == [2, 1]
+    assert raws[0].places[1].T[:3, 3] == pytest.approx([50, 0, 0], abs=1e-4)
 
 
 def test_a_3mf_says_its_unit_and_places(tmp_path: Path) -> None:
@@ -149,9 +150,9 @@ def test_a_3mf_says_its_unit_and_places(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
         archive.writestr("3D/3dmodel.model", model)
     file, (solid,) = raw_solids(tmp_path / "a.3mf", None)
-    assert (file.unit, solid.name, len(solid.poses)) == ("in", "brick", 2)
+    assert (file.unit, solid.name, len(solid.places)) == ("in", "brick", 2)
     assert solid.mesh.extent == pytest.approx(50.8)
-    assert solid.poses[1][:3, 3] == pytest.approx([76.2, 0, 0], abs=1e-4)
+    assert solid.places[1].T[:3, 3] == pytest.approx([76.2, 0, 0], abs=1e-4)
 
 
 def test_a_free_surface_is_geometry_without_contact_and_is_said(tmp_path: Path) -> None:
@@ -182,3 +183,25 @@ def test_the_command_says_what_it_did_and_names_as_asked(tmp_path: Path, capsys:
     assert {each.suffix for each in out.iterdir()} == {".xml", ".toml", ".png"}
     assert main(["part", "import", str(path), "--name", "hole7=bore", "--out", str(out)]) == 2
     assert "unknown face 'hole7'" in capsys.readouterr().err
+
+
+def test_step_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("apo_bench.cad.step.find_spec", lambda name: None)
+    path = tmp_path / "a.step"
+    path.write_text("ISO-10303-21;\n")
+    with pytest.raises(InputError, match=r"needs the extra cad; run: pip install 'apo_bench\[cad\]'"):
+        raw_solids(path, None)
+    with pytest.raises(InputError, match="a STEP file states its own"):
+        raw_solids(path, "mm")
+
+
+def test_places_of_several_solids_are_written(tmp_path: Path) -> None:
+    a, b = block(30, 20, 10), block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
+    path = write_triangles(
+        np.concatenate([triangles(each) for each in (a, b, block(9, 8, 7, (0, 60, 0)))]), tmp_path / "a.stl"
+    )
+    assert main(["part", "import", str(path), "--out", str(tmp_path / "out")]) == 0
+    poses = tomllib.loads((tmp_path / "out" / "poses.toml").read_text())["pose"]
+    assert [(each["part"], each["name"]) for each in poses] == [("a_1", "a_1"), ("a_1", "a_2"), ("a_3", "a_3")]
+    assert poses[1]["at_mm"] == pytest.approx([50, 0, 0], abs=1e-4)
+    assert poses[1]["quaternion_wxyz"] == pytest.approx([np.cos(np.pi / 12), 0, 0, np.sin(np.pi / 12)], abs=1e-6)

@@ -1,0 +1,53 @@
+"""A file of poses: where each copy of an imported part is in the file that it is from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from apo_bench.cad.naming import part_name
+from apo_bench.cad.raw import Place
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+NAME = "poses.toml"
+
+
+def named_places(parts: Mapping[str, Iterable[Place]]) -> list[tuple[str, str, Place]]:
+    """Part, name and place of each copy: as the file calls it, with a number where that is taken.
+
+    Args:
+        parts: Places of each part file.
+    """
+    used: set[str] = set()
+    found = []
+    for part, places in parts.items():
+        for place in places:
+            stem = part_name(place.name)
+            name, number = stem, 2
+            while name in used:
+                name, number = f"{stem}{number}", number + 1
+            used.add(name)
+            found.append((part, name, place))
+    return found
+
+
+def write_places(places: Iterable[tuple[str, str, Place]], folder: Path, source: str) -> Path:
+    """Write `poses.toml`, which `scenario new` reads beside the part files."""
+    lines = [f"# where {source} has its parts".replace("\n", " ")]
+    for part, name, place in places:
+        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"', f"at_mm = {_list(place.T[:3, 3])}"]
+        lines.append(f"quaternion_wxyz = {_list(_quaternion(place.T))}")
+        if place.color is not None:
+            lines.append(f"color = {_list(place.color)}")
+    path = folder / NAME
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def _quaternion(T: Array) -> Array:
+    return pose.pack(T)[3:]
+
+
+def _list(values: Iterable[float]) -> str:
+    return "[" + ", ".join(f"{round(float(x), 12) + 0.0:.12g}" for x in values) + "]"

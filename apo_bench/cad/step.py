@@ -1,0 +1,124 @@
+"""STEP files become raw solids: read in a process of its own, as what a file makes of the reader is its own affair."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.cad.brep import LIMIT_BYTES, LIMIT_S, BrepSolid
+from apo_bench.cad.from_brep import raw_of
+from apo_bench.cad.raw import RawSolid
+from apo_bench.cad.reading import LARGEST_MM, SMALLEST_MM, CadFile
+from apo_bench.cad.shells import moved_onto
+from apo_bench.errors import InputError
+from apo_bench.io.reading import read_bytes
+
+KINDS = (".step", ".stp")
+_LARGEST_BYTES, _MOST_TRIANGLES, _MOST_SOLIDS, _WALL_S = 60_000_000, 400_000, 200, 120
+_START = "import sys; path, *sys.path = sys.argv[1:]; from apo_bench.cad.brep import serve; serve(path)"
+_ENDS_CPU = -24
+_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
+_NAMED = {"INCH": "in", "FOOT": "ft", "FEET": "ft"}
+
+
+def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
+    """The solids of a STEP file, each once, with all of its places.
+
+    Raises:
+        InputError: The extra is missing, the file cannot be read, or it holds no closed solid of a size for a part.
+    """
+    if unit is not None:
+        raise InputError(f"--unit {unit} was given, and a STEP file states its own; leave --unit out.")
+    raw = read_bytes(path, "STEP file", _LARGEST_BYTES)
+    if not raw:
+        raise InputError(f"{path}: the file is empty; save the part again.")
+    if b"ISO-10303-21" not in raw[:2000]:
+        raise InputError(f"{path}: this is no STEP file (it does not begin with ISO-10303-21); save the part again.")
+    if find_spec("build123d") is None:
+        raise InputError(f"{path}: reading STEP needs the extra cad; run: pip install 'apo_bench[cad]'")
+    used = _unit(raw)
+    solids = _asked(path)
+    if not solids:
+        raise InputError(f"{path}: the file holds no solid; save the part as a solid, not as curves or a drawing.")
+    count = sum(len(face.triangles) for solid in solids for face in solid.faces)
+    if len(solids) > _MOST_SOLIDS or count > _MOST_TRIANGLES:
+        raise InputError(
+            f"{path}: the file has {len(solids)} solids with {count:,} triangles; {_MOST_SOLIDS} and "
+            f"{_MOST_TRIANGLES:,} are the most, so save less of it."
+        )
+    _check_size(path, solids, used)
+    found: list[RawSolid] = []
+    left_out: list[str] = []
+    for solid in solids:
+        try:
+            _add(found, raw_of(path, solid))
+        except InputError as error:
+            if len(solids) == 1:
+                raise
+            left_out.append(f"{solid.name}: {str(error).removeprefix(f'{path}: ')}")
+    return CadFile((), used, "stated in the file", tuple(left_out)), found
+
+
+def _asked(path: Path) -> list[BrepSolid]:
+    """What the reader finds."""
+    command = [sys.executable, "-P", "-c", _START, str(path.absolute()), *sys.path]
+    try:
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=_WALL_S, check=False, env=_one_thread()
+        )
+    except subprocess.TimeoutExpired as error:
+        raise InputError(f"{path}: reading the file takes more than {_WALL_S} s; save less of it.") from error
+    if done.returncode == _ENDS_CPU:
+        raise InputError(f"{path}: reading the file takes more than {LIMIT_S} s; save less of it.")
+    if done.returncode:
+        words = done.stderr.decode(errors="replace").strip().splitlines() or [""]
+        if "MemoryError" in words[-1] or "bad_alloc" in words[-1]:
+            raise InputError(f"{path}: reading the file takes more than {LIMIT_BYTES / 1e9:g} GB; save less of it.")
+        raise InputError(f"{path}: the file cannot be read as STEP; save the part again from where it was drawn.")
+    found: list[BrepSolid] = pickle.loads(done.stdout)
+    return found
+
+
+def _one_thread() -> dict[str, str]:
+    """The variables of this process, with one thread for numbers: each thread takes memory."""
+    return {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+def _unit(raw: bytes) -> str:
+    """The unit of lengths, as the file names it."""
+    text = raw.decode("latin-1")
+    for entity in re.findall(r"=\s*\(([^;]*?LENGTH_UNIT[^;]*?)\)\s*;", text):
+        named = re.search(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'", entity)
+        if named:
+            return _NAMED.get(named[1].strip().upper(), named[1].strip().lower())
+    found = re.search(r"LENGTH_UNIT[^;]*?SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.", text)
+    return _PREFIXES.get(found[1] or "", f"{found[1]}metre".lower()) if found else "mm"
+
+
+def _check_size(path: Path, solids: list[BrepSolid], unit: str) -> None:
+    """Parts are neither too small nor too large."""
+    sizes = [np.ptp(np.concatenate([f.corners for f in solid.faces]), axis=0).max() for solid in solids]
+    for size in (min(sizes), max(sizes)):
+        if not SMALLEST_MM <= size <= LARGEST_MM:
+            raise InputError(
+                f"{path}: a solid in it is {size:.4g} mm long (unit {unit}, stated in the file); parts of "
+                f"{SMALLEST_MM:g} mm to {LARGEST_MM / 1000:g} m are allowed, so save it in its true unit, or scale it."
+            )
+
+
+def _add(found: list[RawSolid], new: RawSolid) -> None:
+    """Another solid, as a place of one that is the same, or on its own."""
+    for i, old in enumerate(found):
+        T = moved_onto(old.mesh, new.mesh)
+        if T is not None:
+            found[i] = replace(old, places=(*old.places, *(each._replace(T=each.T @ T) for each in new.places)))
+            return
+    found.append(new)

@@ -1,0 +1,147 @@
+"""Parts from STEP files of known solids: faces as the file has them, copies, names, colours, splines, and refusals."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.cad.brep import solids_of
+from apo_bench.cad.from_brep import raw_of
+from apo_bench.cad.importing import Imported, import_part, raw_solids
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+from tests.cad.brep_made import brep_made, write_step
+from tests.cad.made import MADE
+
+pytestmark = pytest.mark.extras
+pytest.importorskip("build123d")
+EXACT_MM, FREE_MM, VOLUME = 1e-6, 0.01, 1e-3
+
+
+def imported(shape: Any, folder: Path) -> Imported:
+    """In this process, which has read build123d already."""
+    path = write_step(shape, folder / "a.step")
+    (solid,) = solids_of(path)
+    return import_part(raw_of(path, solid), "a", folder, "a.step", density=8000.0)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_faces_and_parameters_are_those_of_the_file(name: str, tmp_path: Path) -> None:
+    made = brep_made(name)
+    done = imported(made.mesh, tmp_path)
+    whole = [r for r in done.raw.regions if r.is_whole]
+    assert sum(r.kind == "plane" for r in done.raw.regions) == made.flats
+    assert sum(r.is_round and not r.is_whole for r in done.raw.regions) == made.arcs
+    assert sum(r.kind == "cone" for r in whole) == made.cones
+    assert sum(r.kind == "other" for r in done.raw.regions) == 0
+    for hole, radii in ((True, made.holes), (False, made.shafts)):
+        found = sorted(r.radii[0] for r in whole if r.kind == "cylinder" and r.hole == hole)
+        assert found == pytest.approx(list(radii), abs=EXACT_MM)
+    assert dict(done.refused) == {}
+    assert 1e9 * done.solid.volume == pytest.approx(made.volume, rel=VOLUME)
+    free = sorted(done.free_mm[n] for n, wall in done.solid.rounds.items() if wall.hole and wall.kind == "cylinder")
+    assert free == pytest.approx(list(made.holes), abs=FREE_MM)
+    assert done.cut.hulls == 0
+
+
+def test_places_and_directions_of_faces_are_exact(tmp_path: Path) -> None:
+    named = imported(brep_made("bracket").mesh, tmp_path).raw.named()
+    assert set(named) == {"px", "px2", "nx", "py", "ny", "pz", "pz2", "nz", "hole1", "hole2"}
+    for name, at in {"px": 30, "px2": -20, "nx": 30, "py": 20, "ny": 20, "pz": 50, "pz2": 10, "nz": 0}.items():
+        assert named[name].normal is not None
+        assert named[name].normal @ named[name].point == pytest.approx(at, abs=EXACT_MM)
+    high, low = named["hole1"], named["hole2"]
+    assert np.abs(low.point - [15, 0, 0]).max() < EXACT_MM
+    assert low.span == pytest.approx((0, 10), abs=EXACT_MM)
+    assert np.abs(high.point - [0, 0, 30]).max() < EXACT_MM
+    assert high.span == pytest.approx((-30, -20), abs=EXACT_MM)
+    assert np.abs(np.abs(high.axis) - [1, 0, 0]).max() < 1e-12
+
+
+def test_turned_faces_keep_their_directions(tmp_path: Path) -> None:
+    from scipy.spatial.transform import Rotation
+
+    wall = imported(brep_made("turned_pin").mesh, tmp_path).raw.named()["shaft1"]
+    axis = Rotation.from_euler("xyz", [33, 44, 55], degrees=True).as_matrix()[:, 2]
+    assert np.linalg.norm(np.cross(wall.axis, axis)) < 1e-9
+    assert sorted(np.abs(wall.span)) == pytest.approx([0, 30], abs=EXACT_MM)
+
+
+def test_splines_that_are_flat_or_round_are_found(tmp_path: Path) -> None:
+    from build123d import Solid
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+
+    made = brep_made("countersink")
+    solid = Solid(BRepBuilderAPI_NurbsConvert(made.mesh.shape.solid().wrapped).Shape())
+    assert {str(face.geom_type) for face in solid.faces()} == {"GeomType.BSPLINE"}
+    done = imported(solid, tmp_path)
+    kinds = [region.kind for region in done.raw.regions]
+    assert (kinds.count("plane"), kinds.count("cylinder"), kinds.count("cone")) == (6, 1, 1)
+    assert done.raw.named()["hole1"].radii == pytest.approx((4, 4), abs=EXACT_MM)
+    assert dict(done.refused) == {}
+
+
+def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from build123d import Box, Color, Compound, Cylinder, Location, Pos
+
+    plate = Box(60, 40, 20) - Pos(5, -3, 0) * Cylinder(5.1, 20)
+    plate.label, plate.color = "plate", Color(1, 0, 0)
+    pin = Cylinder(5, 40)
+    pins = [pin.located(Location((5, -3, 10))), pin.located(Location((100, 0, 0), (0, 90, 0)))]
+    for each in pins:
+        each.label, each.color = "pin", Color(0, 0, 1)
+    inner = Compound(label="inner", children=[pins[0]])
+    inner.location = Location((0, 0, 7), (0, 0, 90))
+    path = write_step(Compound(label="all", children=[plate, inner, pins[1]]), tmp_path / "a.step")
+    out = tmp_path / "out"
+    assert main(["part", "import", str(path), "--out", str(out), "--json"]) == 0
+    assert '"unit": "mm"' in capsys.readouterr().out
+    assert {each.name for each in out.glob("*.xml")} == {"plate.xml", "pin.xml"}
+    first, second, third = tomllib.loads((out / "poses.toml").read_text())["pose"]
+    assert (first["part"], first["color"]) == ("plate", [1, 0, 0])
+    assert (second["part"], second["name"], third["part"], third["name"]) == ("pin", "pin", "pin", "pin2")
+    assert second["at_mm"] == pytest.approx([3, 5, 17], abs=EXACT_MM)
+    assert second["quaternion_wxyz"] == pytest.approx([0.5**0.5, 0, 0, 0.5**0.5], abs=1e-9)
+    assert third["color"] == [0, 0, 1]
+
+
+def test_units_are_those_of_the_file(tmp_path: Path) -> None:
+    path = write_step(brep_made("cuboid").mesh, tmp_path / "a.step")
+    text = path.read_text().replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)")
+    path.write_text(text)
+    file, (raw,) = raw_solids(path, None)
+    assert file.unit == "cm"
+    assert raw.mesh.extent == pytest.approx(300.0)
+    path.write_text(text.replace("SI_UNIT(.CENTI.,.METRE.)", "SI_UNIT($,.METRE.)"))
+    with pytest.raises(InputError, match=r"3e\+04 mm long \(unit m, stated in the file\)"):
+        raw_solids(path, None)
+
+
+def test_a_shell_that_is_open_is_refused(tmp_path: Path) -> None:
+    from build123d import Box, Shell
+
+    path = write_step(Shell(Box(20, 20, 20).faces()[:5]), tmp_path / "a.step")
+    with pytest.raises(InputError, match="the shell is open"):
+        raw_solids(path, None)
+
+
+def test_files_that_are_no_step_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.stp"
+    path.touch()
+    with pytest.raises(InputError, match="the file is empty"):
+        raw_solids(path, None)
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match="no STEP file"):
+        raw_solids(path, None)
+    path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=GARBAGE(#2);\nENDSEC;\nEND-ISO-10303-21;\n")
+    with pytest.raises(InputError, match=r"holds no solid|cannot be read"):
+        raw_solids(path, None)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(InputError, match="a pipe was given"):
+        raw_solids(path, None)
