@@ -25,11 +25,13 @@ from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 from apo_bench.parts import load_part
-from apo_bench.parts.agreement import check_faces
+from apo_bench.parts.agreement import check_faces, supported
 from apo_bench.parts.allowed import MOST_CORNERS_IN_ALL, MOST_FACES, MOST_PIECES
 from apo_bench.parts.making import Body, solid_of, write_part
 
 _RAYS = 720
+_LEAST_SHARE = 0.5
+"""So much of a flat face must lie on the pieces where these stand for free shapes."""
 
 
 @final
@@ -43,6 +45,8 @@ class Imported:
     cut: Cut
     refused: Mapping[str, str]
     """Faces that can make no contact, with the reason."""
+    shares: Mapping[str, float]
+    """What of a flat face is stated, where the pieces do not hold all of it."""
     free_mm: Mapping[str, float]
     """Free radius of each hole that is stated, as the pieces leave it."""
 
@@ -86,9 +90,14 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
     body = Body(found.pieces, tuple(flats), tuple(rounds), matter(raw, found))
     solid = solid_of(name, body)
     faces: list[Face | RoundFace] = [*flats, *rounds]
+    shares: dict[str, float] = {}
     for face in faces:
         reason = _reason(solid, face)
-        if reason:
+        less = supported(face, solid.pieces) if reason and isinstance(face, Face) and found.hulls else None
+        if less is not None and less[1] > _LEAST_SHARE and not _reason(solid, less[0]):
+            shares[face.name] = less[1]
+            flats = [less[0] if flat is face else flat for flat in flats]
+        elif reason:
             refused[face.name] = reason
     body = replace(
         body,
@@ -111,7 +120,7 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
             f"{source}: what the solid was cut into makes no part ({why}); leave out fillets and free surfaces."
         ) from error
     free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
-    return Imported(path, raw, solid, found, refused, free)
+    return Imported(path, raw, solid, found, refused, shares, free)
 
 
 def with_new_names(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
@@ -138,12 +147,21 @@ def _faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
 
 def _reason(solid: Solid, face: Face | RoundFace) -> str:
     """Why a face is not as the pieces are; empty if it is."""
+    if isinstance(face, Face) and not _is_one_area(face):
+        return "its outline crosses itself"
     flat, wall = ({face.name: face}, {}) if isinstance(face, Face) else ({}, {face.name: face})
     try:
         check_faces(replace(solid, faces=flat, rounds=wall), Path("part"))
     except InputError as error:
         return str(error).split(": ", 1)[-1].split("; ")[0]
     return ""
+
+
+def _is_one_area(face: Face) -> bool:
+    from shapely import Polygon
+
+    across = np.argsort(np.abs(face.normal))[:2]
+    return bool(Polygon(face.outline[:, across], [hole[:, across] for hole in face.holes]).is_valid)
 
 
 def _free_radius(solid: Solid, wall: RoundFace) -> float:

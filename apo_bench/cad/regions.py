@@ -13,7 +13,7 @@ from apo_bench.cad.raw import Mesh, Region
 from apo_bench.cad.round_region import fitted_plane, round_region
 
 _LARGER = 8.0
-"""A flat piece so much larger than its neighbours on a free surface is a plane beside it."""
+"""A flat piece so much larger than most of its neighbours on a free surface, slivers aside, is a plane beside it."""
 
 
 def regions_of(mesh: Mesh) -> tuple[tuple[Region, ...], Any]:
@@ -45,10 +45,9 @@ def _free(facets: Facets, of_round: Any) -> Any:
     pairs = facets.smooth[left[facets.smooth].all(axis=1)]
     free = np.zeros(len(left), dtype=bool)
     free[pairs] = True
-    around: dict[int, list[float]] = {}
-    for i, k in pairs.tolist():
-        around.setdefault(i, []).append(facets.areas[k])
-        around.setdefault(k, []).append(facets.areas[i])
-    for f, areas in around.items():
-        free[f] = facets.areas[f] < _LARGER * float(np.median(areas))
+    owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    order = np.lexsort((facets.areas[other], owner))
+    pieces, first, count = np.unique(owner[order], return_index=True, return_counts=True)
+    beside = facets.areas[other[order]]
+    free[pieces] = facets.areas[pieces] < _LARGER * beside[first + 3 * count // 4]
     return free

@@ -21,6 +21,8 @@ _IN_PLANE_M, _PARALLEL = 1e-6, 1e-7
 _ROUNDED_M = 1e-6
 """What coordinates in files are rounded by at most, and so walls."""
 _BESIDE_M = SAGITTA_M + _ROUNDED_M
+_WRITTEN_M = 1e-8
+"""Corners of faces that are made are on this grid: writing them does not make them cross."""
 _SNAP_M = 1e-9
 """Areas are united on this grid: without one, some of them may be lost among corners that differ by rounding."""
 _ABOVE_M = 2e-5
@@ -89,16 +91,11 @@ def _check_flat(face: Face, sides: _Sides, place: str) -> None:
     """A face is made of sides of pieces that look its way, and lies bare."""
     import shapely
 
-    n = face.normal
+    n, to_plane = face.normal, _plane(face.normal)
     margin = np.full(3, _ABOVE_M)
     sides = _near(sides, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
-    to_plane = _plane(n)
     stated = shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes])
-    on = (sides.planes[:, :3] @ n > 1.0 - _PARALLEL) & (
-        np.abs(sides.planes[:, 3] - n @ face.outline[0]) < 2.0 * _IN_PLANE_M
-    )
-    owner = np.searchsorted(sides.first, np.flatnonzero(on), side="right") - 1
-    below = [_shadow(sides.pieces[k], side, to_plane) for k, side in zip(owner, sides.planes[on], strict=True)]
+    below = _below(face, sides, to_plane)
     bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
     if not bare.is_empty:
         at = bare.representative_point()
@@ -115,6 +112,37 @@ def _check_flat(face: Face, sides: _Sides, place: str) -> None:
             piece = sides.pieces[int(inside.argmin())]
             x, y, z = 1e3 * point
             _fail(place, f"piece '{piece.name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+
+
+def _below(face: Face, sides: _Sides, to_plane: Array) -> list[Any]:
+    """Sides of pieces in the plane of a face, as flat areas."""
+    on = (sides.planes[:, :3] @ face.normal > 1.0 - _PARALLEL) & (
+        np.abs(sides.planes[:, 3] - face.normal @ face.outline[0]) < 2.0 * _IN_PLANE_M
+    )
+    owner = np.searchsorted(sides.first, np.flatnonzero(on), side="right") - 1
+    return [_shadow(sides.pieces[k], side, to_plane) for k, side in zip(owner, sides.planes[on], strict=True)]
+
+
+def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | None:
+    """What of a flat face lies on sides of pieces, and its share; None if that is not a single area."""
+    import shapely
+
+    to_plane = _plane(face.normal)
+    stated = shapely.make_valid(shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes]))
+    found = stated.intersection(shapely.unary_union(_below(face, _sides(pieces), to_plane), grid_size=_SNAP_M))
+    for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
+        found = found.buffer(by, join_style="mitre")
+    found = shapely.set_precision(found.simplify(_ROUNDED_M), _WRITTEN_M)
+    if found.geom_type != "Polygon" or found.is_empty:
+        return None
+    off = (face.normal @ face.outline[0]) * face.normal
+    rings = [np.asarray(ring.coords)[:-1] @ to_plane.T + off for ring in (found.exterior, *found.interiors)]
+    oriented = [ring if (_winding(ring, face.normal) > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
+    return Face(face.name, oriented[0], tuple(oriented[1:])), float(found.area / stated.area)
+
+
+def _winding(ring: Array, n: Array) -> float:
+    return float(np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0) @ n)
 
 
 def _plane(n: Array) -> Array:

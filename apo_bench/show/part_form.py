@@ -39,7 +39,8 @@ def part_form(done: Imported) -> dict[str, Any]:
         "mended": list(raw.said),
         "places": [_place(each) for each in raw.places],
         "faces": {
-            name: {**_face(region), "no_contact": done.refused.get(name)} for name, region in raw.named().items()
+            name: {**_face(region), "no_contact": done.refused.get(name), "share": done.shares.get(name, 1.0)}
+            for name, region in raw.named().items()
         },
         "without_contact": {
             "partly_round_radii_mm": sorted(max(region.radii) for region in corners),

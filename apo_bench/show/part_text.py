@@ -35,7 +35,10 @@ def import_lines(done: Imported) -> Iterator[str]:
     yield f"  faces: {_counts(raw)}"
     for name, region in raw.named().items():
         reason = done.refused.get(name)
-        yield f"    {name}: {_region(region)}" + (f"; NO CONTACT: {reason}" if reason else "")
+        less = (
+            f"; {100.0 * done.shares[name]:.3g} % of it can touch, its border is coarser" if name in done.shares else ""
+        )
+        yield f"    {name}: {_region(region)}" + (f"; NO CONTACT: {reason}" if reason else less)
     corners = [r for r in raw.regions if r.is_round and not r.name]
     if corners:
         radii = sorted({f"{max(r.radii):.4g}" for r in corners}, key=float)
@@ -55,7 +58,8 @@ def import_lines(done: Imported) -> Iterator[str]:
     else:
         yield f"  volume: {raw.mesh.volume:.6g} mm^3 as tessellated, {stated:.6g} mm^3 with round walls as fitted"
     loss = (
-        f"; {done.cut.hulls} of them stand for hollow or free shapes and grow it by {done.cut.grown:.3g} mm^3"
+        f"; {done.cut.hulls} of them stand for hollow or free shapes, which changes what collides by "
+        f"{done.cut.grown:+.3g} mm^3 ({100.0 * done.cut.grown / (1e9 * done.solid.volume):+.2g} %)"
         if done.cut.hulls
         else ""
     )

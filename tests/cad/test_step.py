@@ -86,6 +86,18 @@ def test_splines_that_are_flat_or_round_are_found(tmp_path: Path) -> None:
     assert dict(done.refused) == {}
 
 
+def test_what_is_neither_flat_nor_round_is_geometry_without_a_contact(tmp_path: Path) -> None:
+    from build123d import Box, fillet
+
+    box = Box(40, 30, 20)
+    done = imported(fillet(box.edges(), 3), tmp_path)
+    kinds = [region.kind for region in done.raw.regions]
+    assert (kinds.count("plane"), kinds.count("cylinder"), kinds.count("other")) == (6, 12, 8)
+    assert not done.solid.rounds
+    assert len(done.solid.faces) == 6
+    assert dict(done.refused) == {}
+
+
 def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from build123d import Box, Color, Compound, Cylinder, Location, Pos
 

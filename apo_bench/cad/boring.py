@@ -1,0 +1,105 @@
+"""Round holes: filled before a solid is cut, then cut out of its pieces as wedges that touch the wall, [mm]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from apo_bench.cad.corners import SAME_MM, corners_of, extremes, is_thick, once
+from apo_bench.cad.raw import Mesh, Region
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import sides_of
+
+
+def filled(mesh: Mesh, bore: Region) -> Any:
+    """What was taken away by a round hole, as the mesh has it."""
+    import manifold3d
+
+    return manifold3d.Manifold.hull_points(mesh.corners[np.unique(mesh.triangles[bore.triangles])])
+
+
+def bored(corners: Array, bores: Sequence[Region], flats: Array) -> list[Array]:
+    """A convex piece less round holes, as convex pieces."""
+    import manifold3d
+
+    parts = [manifold3d.Manifold.hull_points(corners)]
+    for a, b in combinations(bores, 2):
+        plane = _between(a, b)
+        if plane is not None:
+            parts = [
+                half
+                for part in parts
+                for half in (
+                    part.split_by_plane(plane[:3], float(plane[3])) if _meets(part, a) and _meets(part, b) else (part,)
+                )
+            ]
+    for bore in bores:
+        parts = [piece for part in parts for piece in (_around(part, bore) if _meets(part, bore) else (part,))]
+    if len(parts) == 1 and not any(_meets(parts[0], bore) for bore in bores):
+        return [corners]
+    found = []
+    for part in parts:
+        if not part.is_empty() and (points := once(corners_of(part))).shape[0] >= 4 and is_thick(points):
+            found.append(extremes(points, flats))
+    return found
+
+
+def _between(a: Region, b: Region) -> Array | None:
+    """The plane between two holes side by side, (4,)."""
+    assert a.axis is not None
+    assert b.axis is not None
+    assert a.point is not None
+    assert b.point is not None
+    across = np.cross(a.axis, b.axis)
+    if np.linalg.norm(across) > 1e-6:
+        return None
+    off = b.point - a.point
+    off = off - off @ a.axis * a.axis
+    gap = float(np.linalg.norm(off))
+    room = gap - max(a.radii) - max(b.radii)
+    if room <= 0.0:
+        return None
+    n = off / gap
+    return np.append(n, n @ a.point + max(a.radii) + room / 2.0)
+
+
+def _meets(part: Any, bore: Region) -> bool:
+    """Whether the box around a part, seen along the axis of a hole, comes near to the hole."""
+    if part.is_empty():
+        return False
+    corners = corners_of(part)
+    height, _, _ = bore.polar(corners)
+    if height.max() < bore.span[0] + SAME_MM or height.min() > bore.span[1] - SAME_MM:
+        return False
+    x, y = bore.frame()
+    assert bore.point is not None
+    from shapely import MultiPoint, Point
+
+    flat = np.column_stack([(corners - bore.point) @ x, (corners - bore.point) @ y])
+    return bool(MultiPoint(flat).convex_hull.distance(Point(0.0, 0.0)) < max(bore.radii) - SAME_MM)
+
+
+def _around(part: Any, bore: Region) -> Iterator[Any]:
+    """A convex part less a round hole: what is below and above it, and wedges that touch its wall from outside."""
+    assert bore.point is not None
+    assert bore.axis is not None
+    axis, x, y = bore.axis, *bore.frame()
+    foot = float(bore.point @ axis)
+    above, rest = part.split_by_plane(axis, foot + bore.span[1])
+    slab, below = rest.split_by_plane(axis, foot + bore.span[0])
+    yield from (each for each in (above, below) if not each.is_empty())
+    n = sides_of(1e-3 * max(bore.radii))
+    slope = bore.slope if bore.kind == "cone" else 0.0
+    at = bore.point + bore.span[0] * axis
+    for i in range(n):
+        a, b, m = (2.0 * np.pi * (i + off) / n for off in (-0.5, 0.5, 0.0))
+        right = -np.sin(a) * x + np.cos(a) * y
+        left = np.sin(b) * x - np.cos(b) * y
+        wall = np.cos(m) * x + np.sin(m) * y - slope * axis
+        wedge = slab.trim_by_plane(right, float(right @ at)).trim_by_plane(left, float(left @ at))
+        wedge = wedge.trim_by_plane(wall, float((wall @ at + bore.radii[0]) / np.linalg.norm(wall)))
+        if not wedge.is_empty():
+            yield wedge

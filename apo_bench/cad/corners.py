@@ -1,0 +1,115 @@
+"""Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Hull
+
+_MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 200
+"""Of a piece; of one that has more, the farthest corners are kept."""
+_FARTHEST, _IN_PLANE = (60, 40, 24, 12, 0), (16, 8, 4)
+"""In how many directions: in space; in each flat face."""
+_INSIDE_M = 5e-8
+"""Corners so far inside of a piece are none of it."""
+SAME_MM = 2e-4
+"""Corners of a piece nearer to each other than this are one."""
+_THIN_MM = 0.02
+"""Pieces thinner than this across are left out."""
+_ON_MM = 2e-4
+_MOST_TRIED = 500
+
+
+def corners_of(part: Any) -> Array:
+    raw = part.to_mesh64()
+    return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
+
+
+def extremes(points: Array, flats: Array) -> Array:
+    """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
+
+    Args:
+        flats: Planes of flat faces, (k, 4).
+    """
+    from scipy.spatial import ConvexHull
+
+    points = once(points)
+    corners = points[np.sort(ConvexHull(points).vertices)]
+    hull = Hull("", 1e-3 * corners)
+    for _ in range(4):
+        inside = (hull.planes[:, 3] - hull.corners @ hull.planes[:, :3].T).min(axis=1) > _INSIDE_M
+        if not inside.any():
+            break
+        corners = corners[~inside]
+        hull = Hull("", 1e-3 * corners)
+    if _is_simple(hull):
+        return np.asarray(corners)
+    for many in _IN_PLANE:
+        on_flats = _on_flats(corners, flats, many)
+        for farthest in _FARTHEST:
+            kept = np.union1d(on_flats, _farthest(corners, farthest))
+            if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
+                return np.asarray(corners[kept])
+    return np.asarray(corners[_farthest(corners, _FARTHEST[0])])
+
+
+def _is_simple(hull: Hull) -> bool:
+    return (
+        len(hull.corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS
+    )
+
+
+def _on_flats(corners: Array, flats: Array, many: int) -> Any:
+    """Those that are farthest in a flat face, in so many directions."""
+    kept = [np.zeros(0, dtype=np.intp)]
+    turn = 2.0 * np.pi * np.arange(many) / many
+    for n, d in zip(flats[:, :3], flats[:, 3], strict=True):
+        mine = np.flatnonzero(np.abs(corners @ n - d) < _ON_MM)
+        if len(mine) >= 3:
+            x = np.eye(3)[int(np.abs(n).argmin())]
+            x = x - (x @ n) * n
+            x /= np.linalg.norm(x)
+            way = np.outer(x, np.cos(turn)) + np.outer(np.cross(n, x), np.sin(turn))
+            kept.append(mine[(corners[mine] @ way).argmax(axis=0)])
+    return np.unique(np.concatenate(kept))
+
+
+def _farthest(corners: Array, many: int) -> Any:
+    """Those that are farthest in so many directions in space."""
+    if not many:
+        return np.zeros(0, dtype=np.intp)
+    k = np.arange(many) + 0.5
+    up, turn = 1.0 - 2.0 * k / many, np.pi * (1.0 + 5.0**0.5) * k
+    flat = np.sqrt(1.0 - up**2)
+    way = np.concatenate([np.column_stack([np.cos(turn) * flat, np.sin(turn) * flat, up]), np.eye(3), -np.eye(3)])
+    return np.unique((corners @ way.T).argmax(axis=0))
+
+
+def once(points: Array) -> Array:
+    """Points without those that are near to an earlier one."""
+    from scipy.spatial import cKDTree
+
+    drop = {int(k) for _, k in sorted(cKDTree(points).query_pairs(SAME_MM))}
+    return points[[k for k in range(len(points)) if k not in drop]]
+
+
+def volume_of(corners: Array) -> float:
+    from scipy.spatial import ConvexHull
+
+    return float(ConvexHull(corners).volume)
+
+
+def is_thick(points: Array) -> bool:
+    """Whether points span more than a sheet."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        planes = ConvexHull(points).equations
+    except QhullError:
+        return False
+    planes = planes[:: -(-len(planes) // _MOST_TRIED)]
+    depth = -(points @ planes[:, :3].T + planes[:, 3]).min(axis=0)
+    return bool(depth.min() > _THIN_MM)
