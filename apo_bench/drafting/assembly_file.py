@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.cad.importing import import_part, part_name, raw_solids
+from apo_bench.cad.importing import import_part, raw_solids
+from apo_bench.cad.naming import part_name
 from apo_bench.cad.raw import Mesh, RawSolid, Region
 from apo_bench.drafting.posed import free_name
 from apo_bench.errors import InputError
@@ -33,7 +34,7 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
         InputError: The file cannot be read, a solid makes no part, or there are too few.
     """
     _, raws = raw_solids(file, unit)
-    if sum(len(raw.poses) for raw in raws) < fewest:
+    if sum(len(raw.places) for raw in raws) < fewest:
         raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
     folder.mkdir(parents=True, exist_ok=True)
     tables, said, used, copies = list[str](), list[str](), set[str](), set[str]()
@@ -44,10 +45,10 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
         done = import_part(_shifted(raw, -foot), called, folder, f"{file.name}, {raw.name}")
         said.append(f"{called}: {len(done.solid.faces)} flat and {len(done.solid.rounds)} round faces")
         said += [f"{called}.{face} can make no contact: {why}" for face, why in done.refused.items()]
-        for T in raw.poses:
+        for place in raw.places:
             name = free_name(called, copies)
             copies.add(name)
-            tables.append(_table(called, name, T @ pose.at(foot)))
+            tables.append(_table(called, name, place.T @ pose.at(foot)))
     written = folder / POSES
     written.write_text(f"# The parts of {file.name}, in its frame.\n" + "".join(tables), encoding="utf-8")
     return written, tuple(said)
@@ -62,7 +63,8 @@ def _foot(mesh: Mesh) -> Array:
 def _shifted(raw: RawSolid, by: Array) -> RawSolid:
     """The same solid elsewhere, [mm]."""
     mesh = Mesh(raw.mesh.corners + by, raw.mesh.triangles)
-    return replace(raw, mesh=mesh, regions=tuple(_moved(region, by) for region in raw.regions))
+    moments = None if raw.moments is None else raw.moments.moved(np.eye(3), by)
+    return replace(raw, mesh=mesh, regions=tuple(_moved(region, by) for region in raw.regions), moments=moments)
 
 
 def _moved(region: Region, by: Array) -> Region:
