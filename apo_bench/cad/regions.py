@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.bands import turn_of, without_bands
-from apo_bench.cad.facets import Facets, facets_of
+from apo_bench.cad.facets import FLAT, Facets, facets_of
 from apo_bench.cad.growing import groups, walls_of
 from apo_bench.cad.raw import Mesh, Region
 from apo_bench.cad.round_region import fitted_plane, round_region
@@ -31,6 +31,8 @@ def regions_of(mesh: Mesh) -> tuple[tuple[Region, ...], Any]:
         for each in rounds
     ]
     free = _free(facets, of_round)
+    thin = facets.areas < (FLAT * mesh.extent) ** 2
+    free |= thin & (of_round < 0)
     for f in np.flatnonzero((of_round < 0) & ~free):
         found.append(fitted_plane(mesh, np.flatnonzero(facets.of == f)))
     for group in groups(facets, np.flatnonzero(free)):

@@ -26,7 +26,14 @@ _LARGEST_BYTES, _MOST_TRIANGLES, _MOST_SOLIDS, _WALL_S = 60_000_000, 400_000, 20
 _START = "import sys; path, *sys.path = sys.argv[1:]; from apo_bench.cad.brep import serve; serve(path)"
 _ENDS_CPU = -24
 _PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
-_NAMED = {"INCH": "in", "FOOT": "ft", "FEET": "ft"}
+_NAMED = {
+    "INCH": "in",
+    "FOOT": "ft",
+    "FEET": "ft",
+    "METRE": "m",
+    "CENTIMETRE": "cm",
+    "MILLIMETRE": "mm",
+}
 
 
 def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:

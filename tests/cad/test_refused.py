@@ -205,3 +205,14 @@ def test_places_of_several_solids_are_written(tmp_path: Path) -> None:
     assert [(each["part"], each["name"]) for each in poses] == [("a_1", "a_1"), ("a_1", "a_2"), ("a_3", "a_3")]
     assert poses[1]["at_mm"] == pytest.approx([50, 0, 0], abs=1e-4)
     assert poses[1]["quaternion_wxyz"] == pytest.approx([np.cos(np.pi / 12), 0, 0, np.sin(np.pi / 12)], abs=1e-6)
+
+
+def test_triangles_without_an_area_change_nothing(tmp_path: Path) -> None:
+    """Two in a row on an edge, as exporters leave them."""
+    given = triangles(block(20, 20, 20))
+    a, b, c = given[0]
+    m, k = a + (b - a) / 4, a + (b - a) / 2
+    more = np.array([[a, m, c], [m, k, c], [k, b, c], [a, b, k], [a, k, m]])
+    _, (raw,) = raw_solids(write_triangles(np.concatenate([given[1:], more]), tmp_path / "a.stl"), None)
+    assert sum(region.kind == "plane" for region in raw.regions) == 6
+    assert dict(import_part(raw, "a", tmp_path, "a.stl").refused) == {}
