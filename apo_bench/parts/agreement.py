@@ -31,7 +31,8 @@ _COARSE = 0.09
 """Sides of a wall that no contact uses may be this part of its radius away from it: eight of them are."""
 _TRIED_M = 5e-5
 """A clearance that any part can have; receded pieces are remembered."""
-_RAYS, _SHARES = 72, np.array([0.02, 0.25, 0.5, 0.75, 0.98])
+_RAYS, _SHARES = 73, np.array([0.02, 0.25, 0.5, 0.75, 0.98])
+"""A prime number of rays: were it that of the sides of a wall, all could meet corners, which are nearest to it."""
 _LEAST_WALL = 0.5
 """So much of a round face must be there; bores may cross it."""
 _NEAR = 0.05
