@@ -21,6 +21,7 @@ import numpy as np
 from fields import sentences
 
 from apo_bench.cli.setting_options import shown_default
+from apo_bench.drafting.writing import THRESHOLDS
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.observation.models.fitted import ConstantError, ViewNoise
 from apo_bench.observation.noise_file import noise_text, read_noise
@@ -125,15 +126,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
         },
         "judge": {
             "success": "`assembled` (else) or `as_demonstrated`: which verdict counts as success",
-            "fit_margin_mm": "gap of parts that fit beyond the clearance",
-            "support_mm": "gap of other contacts",
-            "overlap_fraction": "share of the true overlap that must be covered",
-            "penetration_mm": "depth of one part in another",
-            "pushed_mm": "displacement of a corner after its part was put down",
-            "rest_mm_s": "speed below which a part is at rest",
-            "rest_deg_s": "turning speed below which a part is at rest",
-            "loose_gap_mm": "gap of the loose verdict",
-            "loose_angle_deg": "angle of the loose verdict",
+            **THRESHOLDS,
         },
     },
     "Noise files": {

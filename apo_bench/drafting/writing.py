@@ -19,7 +19,7 @@ from apo_bench.records.thresholds import Thresholds
 
 _WIDTH = 118
 _LEVEL = 1e-9
-_JUDGE = {
+THRESHOLDS = {
     "fit_margin_mm": "gap of parts that fit beyond their play",
     "support_mm": "gap of other contacts",
     "overlap_fraction": "share of the true overlap that must be covered",
@@ -70,7 +70,7 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
         f"yaw_deg = [{_n(-draft.site.yaw_deg)}, {_n(draft.site.yaw_deg)}]",
         "",
         "[judge]  # as in the scenarios of the package",
-        *(f"{name} = {getattr(Thresholds(), name):g}  # {means}" for name, means in _JUDGE.items()),
+        *(f"{name} = {getattr(Thresholds(), name):g}  # {means}" for name, means in THRESHOLDS.items()),
     ]
     return "\n".join(lines) + "\n"
 

@@ -9,9 +9,10 @@ import pytest
 
 from apo_bench.cad.importing import Imported, import_part, raw_solids
 from apo_bench.parts import load_part
+from tests.cad.held import hold
 from tests.cad.made import MADE, write_stl
 
-PARAMETER_MM, FREE_MM, VOLUME = 0.02, 0.01, 1e-3
+PARAMETER_MM = 0.02
 
 
 def imported(name: str, folder: Path) -> Imported:
@@ -23,19 +24,7 @@ def imported(name: str, folder: Path) -> Imported:
 def test_faces_parameters_volume_and_free_radii_are_those_of_the_solid(name: str, tmp_path: Path) -> None:
     made = MADE[name]()
     done = imported(name, tmp_path)
-    whole = [r for r in done.raw.regions if r.is_whole]
-    assert sum(r.kind == "plane" for r in done.raw.regions) == made.flats
-    assert sum(r.is_round and not r.is_whole for r in done.raw.regions) == made.arcs
-    assert sum(r.kind == "cone" for r in whole) == made.cones
-    assert sum(r.kind == "other" for r in done.raw.regions) == 0
-    for hole, radii in ((True, made.holes), (False, made.shafts)):
-        found = sorted(r.radii[0] for r in whole if r.kind == "cylinder" and r.hole == hole)
-        assert found == pytest.approx(list(radii), abs=PARAMETER_MM)
-    assert dict(done.refused) == {}
-    assert 1e9 * done.solid.volume == pytest.approx(made.volume, rel=VOLUME)
-    free = sorted(done.free_mm[n] for n, wall in done.solid.rounds.items() if wall.hole and wall.kind == "cylinder")
-    assert free == pytest.approx(list(made.holes), abs=FREE_MM)
-    assert done.cut.hulls == 0
+    hold(done, made, PARAMETER_MM)
     again = load_part(done.path)
     assert {*again.faces, *again.rounds} >= {r.name for r in done.raw.regions if r.name}
 

@@ -16,11 +16,12 @@ from apo_bench.cad.importing import Imported, import_part, raw_solids
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from tests.cad.brep_made import brep_made, write_step
+from tests.cad.held import hold
 from tests.cad.made import MADE
 
 pytestmark = pytest.mark.extras
 pytest.importorskip("build123d")
-EXACT_MM, FREE_MM, VOLUME = 1e-6, 0.01, 1e-3
+EXACT_MM = 1e-6
 
 
 def imported(shape: Any, folder: Path) -> Imported:
@@ -34,19 +35,7 @@ def imported(shape: Any, folder: Path) -> Imported:
 def test_faces_and_parameters_are_those_of_the_file(name: str, tmp_path: Path) -> None:
     made = brep_made(name)
     done = imported(made.mesh, tmp_path)
-    whole = [r for r in done.raw.regions if r.is_whole]
-    assert sum(r.kind == "plane" for r in done.raw.regions) == made.flats
-    assert sum(r.is_round and not r.is_whole for r in done.raw.regions) == made.arcs
-    assert sum(r.kind == "cone" for r in whole) == made.cones
-    assert sum(r.kind == "other" for r in done.raw.regions) == 0
-    for hole, radii in ((True, made.holes), (False, made.shafts)):
-        found = sorted(r.radii[0] for r in whole if r.kind == "cylinder" and r.hole == hole)
-        assert found == pytest.approx(list(radii), abs=EXACT_MM)
-    assert dict(done.refused) == {}
-    assert 1e9 * done.solid.volume == pytest.approx(made.volume, rel=VOLUME)
-    free = sorted(done.free_mm[n] for n, wall in done.solid.rounds.items() if wall.hole and wall.kind == "cylinder")
-    assert free == pytest.approx(list(made.holes), abs=FREE_MM)
-    assert done.cut.hulls == 0
+    hold(done, made, EXACT_MM)
 
 
 def test_places_and_directions_of_faces_are_exact(tmp_path: Path) -> None:

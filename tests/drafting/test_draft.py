@@ -130,7 +130,7 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     found = draft(on_the_table(made(tmp_path, {"floor": floor, "cube": cube}, places)))
     last = found.grasps[found.order[-1].moves[0]]
     assert last is not None
-    assert abs(last.across[1]) == 1.0
+    assert abs(last.across[1]) == pytest.approx(1.0)
     hole = extrude(rectangle(60, 60), 0, 20, holes=[rectangle(21, 21)], bottom="bottom", top="top")
     low = extrude(rectangle(20, 20), 0, 20, bottom="bottom", top="top")
     sunk = {"hole": ("hole", at(0, 0, 0)), "low": ("low", at(0, 0, 0))}
