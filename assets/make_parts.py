@@ -134,13 +134,13 @@ def l_plate() -> Body:
 
 
 def gear_base() -> Body:
-    """174 x 70 x 20 mm with three blind bores of 10 mm, 48 mm apart, 17 mm deep, and two walls, 23 mm high."""
+    """174 x 70 x 24 mm with three blind bores of 10 mm, 48 mm apart, 21 mm deep, and two walls, 26 mm high."""
     holes = [
-        Bore((x, 0), (Step(3, 16, 5, name=name, fit=True), Step(16, 20, 7)), {3: f"{name}_floor", 16: f"{name}_rim"})
+        Bore((x, 0), (Step(3, 20, 5, name=name, fit=True), Step(20, 24, 7)), {3: f"{name}_floor", 20: f"{name}_rim"})
         for x, name in _GEARS
     ]
-    plate = extrude(rectangle(174, 70), 0, 20, bores=holes, bottom="bottom", top="top")
-    ends = [extrude(rectangle(14, 70, (x, 0)), 20, 43, top=name) for x, name in ((-80, "wall_n"), (80, "wall_p"))]
+    plate = extrude(rectangle(174, 70), 0, 24, bores=holes, bottom="bottom", top="top")
+    ends = [extrude(rectangle(14, 70, (x, 0)), 24, 50, top=name) for x, name in ((-80, "wall_n"), (80, "wall_p"))]
     return join(plate, *ends)
 
 
@@ -157,9 +157,9 @@ def axle() -> Body:
 
 
 def stand() -> Body:
-    """40 x 40 x 20 mm with a bore of 10 mm, 17 mm deep: holds an axle upright."""
-    hole = Bore((0, 0), (Step(3, 16, 5, name="bore", fit=True), Step(16, 20, 7)), {3: "floor", 16: "rim"})
-    return extrude(rectangle(40, 40), 0, 20, bores=[hole], bottom="bottom", top="top")
+    """40 x 40 x 24 mm with a bore of 10 mm, 21 mm deep: holds an axle upright."""
+    hole = Bore((0, 0), (Step(3, 20, 5, name="bore", fit=True), Step(20, 24, 7)), {3: "floor", 20: "rim"})
+    return extrude(rectangle(40, 40), 0, 24, bores=[hole], bottom="bottom", top="top")
 
 
 def disc() -> Body:
