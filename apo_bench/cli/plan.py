@@ -1,4 +1,4 @@
-"""One command: `apo-bench plan`, operations as macros with their motion parameters; no simulator is needed."""
+"""One command: `apo-bench plan`, operations as macros with their motion parameters; only `--arm` needs a simulator."""
 
 from __future__ import annotations
 
@@ -40,6 +40,9 @@ def plan(
         Path | None,
         typer.Option(help="Base, flange, order of quaternions of --robot: .toml; default: world, tip, xyzw."),
     ] = None,
+    arm: Annotated[
+        str | None, typer.Option(help="Say whether this arm would carry it out; compiles its scene.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
@@ -70,6 +73,10 @@ def plan(
             loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
         axes = "directions in the frame of the assembly, until in the world"
+    if arm is not None:
+        from apo_bench.trial.plan_warning import arm_sentence
+
+        notes.append(arm_sentence(loaded, None if observation is None else asked, arm))
     lines = plan_lines(asked, loaded)
     if robot is not None:
         write_form(robot_form(lines, asked, loaded, stated, notes), robot)

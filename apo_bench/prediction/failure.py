@@ -1,4 +1,4 @@
-"""Will a plan fail, where and why? Said before anything moves, from the plan and the sizes of the parts alone.
+"""Will a plan fail, where and why? Said before anything moves, from the plan, the sizes of the parts and the arm.
 
 Four things are looked at. A goal at which a part would not stand. Contacts that are planned further off than the
 judge allows: of faces that fit into one another, and of axes, those across the way in, since along it the robot goes on
@@ -7,6 +7,9 @@ does not turn the part; of supports none, since weight closes them however wrong
 does not stand on what lies below alone: it leans as far as clearances let it. Parts that are planned into one another
 where no contact is meant, at the goal or on the way in; of those that touch in the same operation the contacts have
 told, except where a level way in begins: there a part comes down beside all others.
+
+Where it is known what an arm makes of the plan (`prediction/arm.py`): whether it reaches all of it, whether its open
+gripper has room, and whether contacts that would be near enough still are with the error of its tip.
 """
 
 from __future__ import annotations
@@ -25,12 +28,24 @@ from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.line import Attach
+from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
 from apo_bench.prediction.resting import between, enters, is_support, residual, resting_poses
 from apo_bench.prediction.stability import BALANCED, imbalance
 from apo_bench.records.thresholds import Thresholds
 
-_Code = Literal["ok", "residual", "interference", "unstable_goal"]
+_Code = Literal[
+    "ok",
+    "residual",
+    "interference",
+    "unstable_goal",
+    "unreachable_start",
+    "unreachable",
+    "gripper_room",
+    "tip_error",
+]
+ARM_CODES = ("unreachable_start", "unreachable", "gripper_room", "tip_error")
+"""Of what another arm could do."""
 _ACROSS = 0.5
 """A face whose normal makes a smaller cosine with the way in is a wall beside it."""
 _BESIDE_MM = 1e-3
@@ -43,6 +58,9 @@ _CODES: Mapping[str, _Code] = MappingProxyType(
         "leans": "residual",
         "on_way": "interference",
         "from_above": "interference",
+        "gripper": "gripper_room",
+        "own": "tip_error",
+        "tip": "tip_error",
     }
 )
 _CONTACTS_OFF = "its contacts are planned {:.2f} mm off, {:g} mm are allowed"
@@ -54,6 +72,15 @@ _WHY = MappingProxyType(
         "leans": "the part would lean against what lies above it, as far as both clearances let it",
         "on_way": "it would be {:.2f} mm deep in another part, {:g} mm are allowed",
         "from_above": "its way in begins {:.2f} mm deep in another part",
+        "gripper": "the open gripper would be {:.2f} mm deep in '{what}', {:g} mm are allowed",
+        "own": "the arm holds its way to {:.3f} mm only, and the play is {:g} mm",
+        "tip": "with the error of the arm's tip its contacts are {:.2f} mm off, {:g} mm are allowed",
+    }
+)
+_OUT_OF_REACH = MappingProxyType(
+    {
+        "unreachable_start": "the arm does not reach the part where it is taken",
+        "unreachable": "the arm does not reach the goal, or the way to it",
     }
 )
 
@@ -69,8 +96,8 @@ class Prediction:
     code: _Code
     sentence: str
     size_mm: float | None
-    """`residual`: the |e| that is too large; `interference`: the depth; `ok`: the largest |e| of a contact that
-    enters; None for an unstable goal, and of what would lean."""
+    """`residual`, `tip_error`: the |e| that is too large; `interference`, `gripper_room`: the depth; `ok`: the largest
+    |e| of a contact that enters; None for an unstable goal, what would lean, and what is out of reach."""
     mendable: bool = False
     """Whether it may fit if directions are changed that contacts leave free."""
 
@@ -92,11 +119,13 @@ class Measure(NamedTuple):
 
     operation: int
     """Counted from 0."""
-    kind: Literal["falls", "fit", "side", "leans", "on_way", "from_above"]
+    kind: Literal["falls", "fit", "side", "leans", "on_way", "from_above", "gripper", "own", "tip"]
     size: float
     """[mm], of parts that are apart negative; of what falls or leans, how much of the weight and its moments over 10 mm
     nothing balances."""
     allowed: float
+    what: str = ""
+    """The part that a gripper would strike."""
 
     @property
     def exceeded(self) -> bool:
@@ -110,13 +139,19 @@ class Measure(NamedTuple):
     @property
     def why(self) -> str:
         """`it would be 7.59 mm deep in another part, 1 mm are allowed`."""
-        return _WHY[self.kind].format(self.size, self.allowed)
+        return _WHY[self.kind].format(self.size, self.allowed, what=self.what)
 
 
-def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach] = ()) -> Prediction:
+def predict(
+    plan: Plan,
+    clearance_mm: float,
+    thresholds: Thresholds,
+    attach: Sequence[Attach] = (),
+    arm: Sequence[ArmMove] = (),
+) -> Prediction:
     """The first operation of the schedule that will fail.
 
-    An unstable goal comes before everything else, since a plan with one is not begun.
+    An unstable goal comes before everything else, and then what is out of reach, since a plan with one is not begun.
 
     Args:
         clearance_mm: Per side, of the parts that are used; fit contacts may be off by this and `fit_margin_mm`, a
@@ -125,27 +160,46 @@ def predict(plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Seq
             others, which would shift on it, and not at all what comes down to where a level way in begins, and would
             stand there on another part.
         attach: The way in of each operation; without it every fit contact counts, and nothing but the goals.
+        arm: What an arm makes of each operation; without it any arm will do.
     """
-    worst_mm = 0.0
-    for _, alike in groupby(measures(plan, clearance_mm, thresholds, attach), lambda one: (one.operation, one.kind)):
+    worst_mm, refused = 0.0, next((move for move in arm if move.refused is not None), None)
+    found = measures(plan, clearance_mm, thresholds, attach, arm=arm)
+    for _, alike in groupby(found, lambda one: (one.operation, one.kind)):
         worst = max(alike, key=lambda one: one.size)
+        if refused is not None and worst.kind != "falls":
+            return _out_of_reach(plan, refused)
         if worst.exceeded:
             main = plan.assembly.operations[worst.operation].main
             sentence = f"operation {worst.operation + 1} ({main}) will fail: {worst.why}"
-            size_mm = None if worst.kind in ("falls", "leans") else worst.size
-            return Prediction(True, worst.operation, worst.code, sentence, size_mm, worst.kind not in ("fit", "side"))
+            size_mm = None if worst.kind in ("falls", "leans") else float(worst.size)
+            mendable = worst.kind not in ("fit", "side", "own", "tip")
+            return Prediction(True, worst.operation, worst.code, sentence, size_mm, mendable)
         if worst.kind == "fit":
             worst_mm = max(worst_mm, worst.size)
     return Prediction(False, None, "ok", "every operation should fit", worst_mm)
 
 
+def _out_of_reach(plan: Plan, move: ArmMove) -> Prediction:
+    assert move.refused is not None
+    main, why = plan.assembly.operations[move.operation].main, _OUT_OF_REACH[move.refused]
+    limit = f": its joint '{move.at_limit}' is at its limit" if move.at_limit else ""
+    sentence = f"operation {move.operation + 1} ({main}) will fail: {why}{limit}"
+    return Prediction(True, move.operation, move.refused, sentence, None, mendable=True)
+
+
 def measures(
-    plan: Plan, clearance_mm: float, thresholds: Thresholds, attach: Sequence[Attach] = (), room_mm: float = 0.0
+    plan: Plan,
+    clearance_mm: float,
+    thresholds: Thresholds,
+    attach: Sequence[Attach] = (),
+    room_mm: float = 0.0,
+    arm: Sequence[ArmMove] = (),
 ) -> Iterator[Measure]:
     """Everything that a plan is measured by, the most important first; always the same things of one schedule.
 
     Args:
         room_mm: Centres of mass are looked at this far aside, too.
+        arm: As in `predict`; its reach is not measured.
     """
     doings = tuple(_doings(plan))
     for doing in doings:
@@ -165,6 +219,9 @@ def measures(
             yield Measure(k, "on_way", 1e3 * depth_m, deep_mm)
         for depth_m in depths_from_above(operation, doing.planned, how, physical):
             yield Measure(k, "from_above", 1e3 * depth_m, _BESIDE_MM)
+        for move in (each for each in arm if each.operation == k and not each.undo):
+            yield Measure(k, "gripper", move.struck_mm, thresholds.pushed_mm, move.struck)
+            yield from _tip(doing, move, how, clearance_mm, thresholds)
 
 
 def _stays(assembly: Assembly, k: int) -> bool:
@@ -206,6 +263,20 @@ def _fit(doing: _Doing, how: Attach | None, clearance_mm: float, thresholds: Thr
             found.append((1e3 * _misfit_m(doing, contact, way), allowed))
     size, allowed = max(found, key=lambda each: each[0] - each[1])
     return Measure(k, "fit", size, allowed)
+
+
+def _tip(
+    doing: _Doing, move: ArmMove, how: Attach | None, clearance_mm: float, thresholds: Thresholds
+) -> Iterator[Measure]:
+    """Of what enters: how far off the arm alone is, which play must take, and how far with what is planned wrong."""
+    if not any(enters(doing.alone, contact) for contact in _operation(doing).contacts):
+        return
+    moved = {part: move.sag @ doing.planned[part] for part in _operation(doing).moves}
+    sagging = doing._replace(planned=MappingProxyType({**doing.planned, **moved}))
+    planned, off = (_fit(each, how, clearance_mm, thresholds) for each in (doing, sagging))
+    own = max(0.0, off.size - planned.size) + move.beside_mm
+    yield Measure(doing.operation, "own", own, max(off.allowed - thresholds.fit_margin_mm, 0.0))
+    yield Measure(doing.operation, "tip", off.size + move.beside_mm, off.allowed)
 
 
 def _misfit_m(doing: _Doing, contact: Contact, way: Array | None) -> float:

@@ -72,8 +72,19 @@ class Predicted(TypedDict):
 
     fails: bool
     operation: _Operation | None
-    code: Literal["ok", "residual", "interference", "unstable_goal"]
+    code: Literal[
+        "ok",
+        "residual",
+        "interference",
+        "unstable_goal",
+        "unreachable_start",
+        "unreachable",
+        "gripper_room",
+        "tip_error",
+    ]
     size_mm: NotRequired[_Number | None]
+    sentence: NotRequired[str]
+    """Of what the arm cannot do."""
 
 
 class Row(TypedDict, total=False):

@@ -1,11 +1,16 @@
-"""What speaks against a plan before it is carried out: the test of its correction, and the failure it predicts."""
+"""What speaks against a plan before it is carried out: the test of its correction, the failure it predicts, the arm."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Plan
 from apo_bench.prediction.failure import predict
+from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.arms.foretelling import arm_moves
+from apo_bench.simulation.scene.scene import build_scene
 
 
 def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) -> str:
@@ -23,3 +28,26 @@ def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) 
     if prediction.fails:
         sentences.append(f"foretold: {prediction.sentence}")
     return "; ".join(sentences)
+
+
+def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
+    """`panda_primitive: operation 3 (shaft) will fail: the arm holds its way to 0.089 mm only, and ..`.
+
+    Where nothing fails, how much room its joints have.
+
+    Args:
+        plan: None: the nominal one in the middle of its place on the table.
+
+    Raises:
+        InputError: The arm is unknown, or its gripper cannot hold a part.
+    """
+    scene = build_scene(scenario, arm=arm)
+    if plan is None:
+        (x, y), yaw = scenario.site.center_m, float(np.mean(scenario.site.yaw_rad))
+        at = layout_at(scenario, x, y, yaw, clearance_mm=scene.clearance_mm)
+        plan = Plan(scenario.assembly, at.start, at.goals)
+    moves = arm_moves(plan, scene)
+    found = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
+    margins = [move.margin_deg for move in moves if move.margin_deg is not None]
+    room = f"; its joints stay {min(margins):.0f} deg from their limits" if margins and not found.fails else ""
+    return f"{arm}: {found.sentence}{room}"

@@ -20,12 +20,13 @@ from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
-from apo_bench.prediction.failure import predict
+from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import Predicted
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE
 from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.arms.foretelling import arm_moves
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
@@ -124,16 +125,22 @@ def observation_failure(observation: Observation) -> Outcome | None:
     return Outcome("observe", "not_seen", k, sentence("not_seen", operation=k))
 
 
-def predicted_outcome(plan: Plan, scene: Scene) -> Predicted:
-    """What the plan says about itself before it is carried out, as it stands in a row: operations from 1, mm."""
-    prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
+def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predicted:
+    """What plan and arm say before it is carried out, as it stands in a row: operations from 1, mm.
+
+    Args:
+        searches: As in `replay_and_judge`.
+    """
+    arm, scenario = arm_moves(plan, scene, searches), scene.scenario
+    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
-    return {
+    said: Predicted = {
         "fails": prediction.fails,
         "operation": operation,
         "code": prediction.code,
         "size_mm": prediction.size_mm,
     }
+    return said if prediction.code not in ARM_CODES else {**said, "sentence": prediction.sentence}
 
 
 def replay_and_judge(

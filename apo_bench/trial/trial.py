@@ -189,8 +189,8 @@ def _outcome(
     if made.plan is None:
         assert made.failure is not None
         return result(made.failure, success=False) | _correction(made)
-    predicted: Row = {"predicted": predicted_outcome(made.plan, scene)}
     searches = parsed(settings.method).searches
+    predicted: Row = {"predicted": predicted_outcome(made.plan, scene, searches)}
     attempt = replay_and_judge(made.plan, scene, reference, watch, settings.fidelity, cache, searches)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     return end | _correction(made) | predicted | _physics(attempt, made.plan, truth)

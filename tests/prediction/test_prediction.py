@@ -15,6 +15,7 @@ from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.line import Attach
+from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.prediction.resting import is_support, residual, resting_poses
 from apo_bench.records.thresholds import Thresholds
@@ -327,3 +328,33 @@ def test_a_plate_comes_to_rest_on_a_shaft() -> None:
     assert residual(scene.assembly, block_on.contacts[0], rests)[0] == pytest.approx(np.zeros(2), abs=1e-9)
     e, n = residual(scene.assembly, block_on.contacts[0], brought)
     assert (e.mean(), n[2]) == pytest.approx((0.8e-3, -1.0), abs=2e-4)
+
+
+def by_arm(k: int, **made: object) -> Prediction:
+    """The true goals of the stick in the tower, one operation of which an arm does like this."""
+    scene = scenes.ALL["stick_in_tower"]()
+    plan = Plan(scene.assembly, scene.start, scene.goals)
+    moves = [ArmMove(i, **(made if i == k else {})) for i in range(len(scene.goals))]
+    return predict(plan, CLEARANCE_MM, Thresholds(), ways(scene), moves)
+
+
+def test_what_an_arm_cannot_do_is_foretold() -> None:
+    last = len(scenes.ALL["stick_in_tower"]().goals) - 1
+    assert by_arm(last).code == "ok"
+    short = by_arm(last, refused="unreachable", at_limit="j4")
+    assert (short.operation, short.code, short.size_mm) == (last, "unreachable", None)
+    assert short.sentence.endswith("the arm does not reach the goal, or the way to it: its joint 'j4' is at its limit")
+    assert by_arm(1, struck="foot", struck_mm=0.9).code == "ok"
+    narrow = by_arm(1, struck="foot", struck_mm=1.1)
+    assert (narrow.operation, narrow.code, narrow.size_mm) == (1, "gripper_room", 1.1)
+    assert "in 'foot'" in narrow.sentence
+
+
+def test_the_error_of_a_tip_counts_where_something_enters() -> None:
+    last = len(scenes.ALL["stick_in_tower"]().goals) - 1
+    assert by_arm(0, beside_mm=5.0).code == "ok"
+    assert by_arm(last, beside_mm=CLEARANCE_MM - 0.01).code == "ok"
+    soft = by_arm(last, beside_mm=CLEARANCE_MM + 0.01)
+    assert (soft.operation, soft.code) == (last, "tip_error")
+    assert soft.size_mm == pytest.approx(CLEARANCE_MM + 0.01)
+    assert by_arm(last, sag=scenes.mm(0, 0, -0.3)).code == "tip_error"

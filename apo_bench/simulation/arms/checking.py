@@ -177,6 +177,20 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
     return tuple(errors), 1e3 * rest, (x, y, z)
 
 
+def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
+    """The error of the tip of an empty hand in free air at one speed, [m/s]; None where it has no way there."""
+    robot = Robot(scene, scene.scenario.start)
+    up = np.array(robot.T)
+    up[2, 3] = _HIGH_M
+    try:
+        robot.trace(smooth(robot.T, up, SPEEDS[-1]))
+        robot.wait(_STAND_S)
+        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), _WAY_M), speed)
+        return _error(line, robot.trace(line), speed)
+    except Halt:
+        return None
+
+
 def _error(line: Trajectory, found: Array, speed: float) -> TipError:
     """Beside the line, along it behind the command, and turned."""
     way = line.end[:3, 3] - line.start[:3, 3]

@@ -10,7 +10,7 @@ from apo_bench.simulation.robot.robot import Halt, Robot
 _FREE, _NEAR = 2.0, 0.8
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
 _DEPART_M = 0.09
-_OPEN_TO_PICK_M, _OPEN_TO_RELEASE_M = 0.012, 0.008
+OPEN_TO_PICK_M, OPEN_TO_RELEASE_M = 0.012, 0.008
 """How far each finger stands off before it closes, and when it has let go."""
 _LOST_M = 0.002
 """Fingers that close this far beyond the part's surface hold nothing; those of a linkage that gives way, a quarter of
@@ -23,7 +23,7 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
     robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=4.5)
     robot.handle(t.part)
-    robot.fingers(min(grip.half_width + _OPEN_TO_PICK_M, robot.arm.opening_m))
+    robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     robot.follow(smooth(robot.T, at, _NEAR))
     robot.stand()
     robot.hold(t.part, *t.carried)
@@ -40,7 +40,7 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.hold_watch = robot.hold_watch.release(robot.in_hand())
     if robot.scene.grasp == "weld":
         robot.weld(t.part, False)
-    robot.fingers(min(grip.half_width + _OPEN_TO_RELEASE_M, robot.arm.opening_m))
+    robot.fingers(min(grip.half_width + OPEN_TO_RELEASE_M, robot.arm.opening_m))
     robot.hold()
 
 

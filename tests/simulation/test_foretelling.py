@@ -1,0 +1,36 @@
+"""What a described arm makes of a plan is worked out before it moves, and enters what is foretold of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.geometry import pose
+from apo_bench.prediction.failure import Prediction, predict
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.arms.foretelling import arm_moves
+from apo_bench.simulation.scene.scene import build_scene
+
+
+def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
+    """The replay is stopped by force at this operation with 0.05 mm, and fits with the 0.25 mm of the scenario."""
+    scene = build_scene(load_scenario("shaft_through_brackets"), arm="panda_primitive")
+    scenario = scene.scenario
+    layout = draw_layout(scenario, np.random.default_rng([0, 0]), scene.clearance_mm)
+    plan = Plan(scenario.assembly, layout.start, layout.goals)
+    moves = arm_moves(plan, scene)
+
+    def said(clearance_mm: float) -> Prediction:
+        return predict(plan, clearance_mm, scenario.thresholds, scenario.attach, moves)
+
+    assert said(0.25).code == "ok"
+    tight = said(0.05)
+    assert (tight.operation, tight.code) == (2, "tip_error")
+    assert tight.size_mm == pytest.approx(0.09, abs=0.03)
+    assert all(move.sag[2, 3] < 0.0 and (move.margin_deg or 0.0) > 5.0 for move in moves)
+    far = pose.at((900.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    away = Plan(scenario.assembly, {part: far @ T for part, T in plan.start.items()}, far @ plan.goals)
+    refused = predict(away, 0.25, scenario.thresholds, scenario.attach, arm_moves(away, scene))
+    assert (refused.operation, refused.code) == (0, "unreachable_start")
