@@ -94,7 +94,7 @@ LENGTHS_MM = {
     ("shaft_through_brackets", 3): 123.016,
 }
 LENGTHS_MM |= {("gearbox", axle): 10.016 for axle in (2, 4, 7, 9)}
-LENGTHS_MM |= {("gearbox", disc): 39.016 for disc in (3, 5, 8)} | {("gearbox", 10): 20.016}
+LENGTHS_MM |= {("gearbox", disc): 39.016 for disc in (3, 5, 8)} | {("gearbox", 10): 17.016}
 TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 3): (2, 0, 4)}
 TURNING |= {("nested_bushings", 2): (1, 1, 4), ("nested_bushings", 3): (1, 1, 4)}
 TURNING |= {("gearbox", k): (1, 1, 4) for k in (2, 3, 4, 5, 7, 8, 9)}
