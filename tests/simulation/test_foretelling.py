@@ -30,7 +30,11 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
     assert (tight.operation, tight.code) == (2, "tip_error")
     assert tight.size_mm == pytest.approx(0.09, abs=0.03)
     assert all(move.sag[2, 3] < 0.0 and (move.margin_deg or 0.0) > 5.0 for move in moves)
-    far = pose.at((900.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    far = pose.at((0.9, 0.0, 0.0), (0.0, 0.0, 0.0))
     away = Plan(scenario.assembly, {part: far @ T for part, T in plan.start.items()}, far @ plan.goals)
     refused = predict(away, 0.25, scenario.thresholds, scenario.attach, arm_moves(away, scene))
     assert (refused.operation, refused.code) == (0, "unreachable_start")
+    raised = {**plan.start, "table": pose.at((0.0, 0.0, 0.06), (0.0, 0.0, 0.0)) @ plan.start["table"]}
+    first = arm_moves(Plan(scenario.assembly, raised, plan.goals), scene)[0]
+    assert first.struck == "table"
+    assert first.struck_mm > 1.0
