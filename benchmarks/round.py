@@ -1,6 +1,6 @@
 """Keep how often round and tilted parts fit: `python benchmarks/round.py FOLDER [FOLDER ...] [--half HALF ...]`.
 
-Takes sweeps of benchmarks/round.toml, whole or not, and of the same with half the time step, and writes
+Takes sweeps of benchmarks/round.toml and gearbox.toml, whole or not, and of the same with half the time step; writes
 results/round.csv, one line for each cell, and docs/results/round.md: success with Wilson's 95 % intervals, contacts
 that were recognised, and how many verdicts half the step changes.
 """
@@ -23,6 +23,10 @@ ROOT = Path(__file__).parents[1]
 KEPT, PAGE = ROOT / "benchmarks" / "results" / "round.csv", ROOT / "docs" / "results" / "round.md"
 METHODS = ("oracle", "none", "search", "paper", "contact")
 RECOGNISED = "recognised"
+CHAIN = "gearbox"
+"""Ten operations, one on the other."""
+LEVELS = (0.0, 1.0, 2.0)
+"""Of every method; the levels between are in a table of their own."""
 SHOWN = "0.25"
 """Play of the scenarios, in mm."""
 
@@ -62,7 +66,9 @@ def main() -> None:
 
 
 def judged(folders: Iterable[Path]) -> list[Row]:
-    return [row for folder in folders for row in read_rows(folder) if row["success"] is not None]
+    """Rows with a verdict, each trial once."""
+    rows = {(place_of(row), row["seed"]): row for folder in folders for row in read_rows(folder)}
+    return [row for row in rows.values() if row["success"] is not None]
 
 
 def grouped(rows: Iterable[Row]) -> dict[Place, list[Row]]:
@@ -89,7 +95,7 @@ def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[
     return [
         "# Round and tilted faces",
         "",
-        "Written by `python benchmarks/round.py` from sweeps of `benchmarks/round.toml`; counts in "
+        "Written by `python benchmarks/round.py` from sweeps of `benchmarks/round.toml` and `gearbox.toml`; counts in "
         "`benchmarks/results/round.csv`. Success: the finished assembly is right; Wilson's 95 % intervals; friction "
         "grasp, the same seeds for every method. A level of L is a standard deviation of L mm and L degrees per axis. "
         "`oracle` is told the true poses, so that neither human nor level changes what it does. Planned wrong by: how "
@@ -110,6 +116,14 @@ def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[
         "",
         *recognition_table(cells),
         "",
+        f"## {CHAIN}: what ten operations do to errors",
+        "",
+        "A careful human. In mm, in the median: how far corners of parts were planned from where they belong, along "
+        "what contacts fix; and how far off `contact` left parts, along what contacts fix and along what they leave "
+        "free, such as where on the table the base stands. Last, the operation at which `none` fails (median).",
+        "",
+        *chain_table(rows),
+        "",
         "## Half the time step",
         "",
         "The same trials with 1 ms and with 0.5 ms, seed by seed.",
@@ -121,6 +135,7 @@ def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[
 def success_table(cells: Mapping[Place, Cell]) -> list[str]:
     plain = {p: c for p, c in cells.items() if p.clearance_mm == float(SHOWN) and p.relations == "given"}
     lines = sorted({(p.scenario, p.careless, p.level) for p in plain if p.method != "oracle"})
+    lines = [line for line in lines if line[0] != CHAIN or line[2] in LEVELS]
     made = [
         "| scenario | human | level | `none` | `search` | `paper` | `contact` | planned wrong by, mm |",
         "|---|" + "---|" * 7,
@@ -155,6 +170,31 @@ def recognition_table(cells: Mapping[Place, Cell]) -> list[str]:
             right = rate(Cell(cell.trials, cell.all_contacts_right, None, 0.0))
             made.append(f"| {place.scenario} | {human(place.careless)} | {right} | {rate(cell)} |")
     return made
+
+
+def chain_table(rows: Iterable[Row]) -> list[str]:
+    made = [
+        "| level | `none` | `search` | `paper` | `contact` | planned: `none` | `paper` | `contact` | left off: fixed "
+        "| free | `none` fails at |",
+        "|---|" + "---|" * 10,
+    ]
+    mine = [row for row in rows if (row["scenario"], row["careless"], row["relations"]) == (CHAIN, 0.0, "given")]
+    for level in sorted({float(row["level"] or 0.0) for row in mine}):
+        of = {m: [row for row in mine if row["method"] == m and row["level"] == level] for m in METHODS[1:]}
+        if all(of.values()):
+            planned = [middle(row["planned_error_fixed_mm"] for row in of[m]) for m in ("none", "paper", "contact")]
+            ends = [
+                middle(row[name] for row in of["contact"]) for name in ("pose_error_fixed_mm", "pose_error_free_mm")
+            ]
+            failed = [row["failure_operation"] for row in of["none"] if not row["success"]]
+            said = [f"{level:g}", *(rate(cell_of(of[m])) for m in METHODS[1:]), *planned, *ends, middle(failed, 0)]
+            made.append(f"| {' | '.join(said)} |")
+    return made
+
+
+def middle(numbers: Iterable[float | None], digits: int = 2) -> str:
+    told = [number for number in numbers if number is not None]
+    return f"{median(told):.{digits}f}" if told else ""
 
 
 def half_table(rows: list[Row], half: list[Row]) -> list[str]:
