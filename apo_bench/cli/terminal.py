@@ -118,6 +118,7 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         asked += ", range finder" if row["eye"] == RANGE else f", {row['noise']} noise" * (row["noise"] != "isotropic")
         asked += f", relations {row['relations']}" * (row["relations"] != "given")
         asked += f", {row['looks']} looks allowed" * bool(row["looks"])
+        asked += f", robot error {row['robot_error']}" * (row["robot_error"] != "none")
     lines = [
         ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
         ("trial", asked),

@@ -23,6 +23,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.records.robot_error import checked_robot_error
 from apo_bench.records.row import Predicted
 from apo_bench.records.settings import RANGE, USUAL, TrialSettings, check, level_pair, refuse_noise
 from apo_bench.scenario.file import load_scenario
@@ -33,6 +34,7 @@ from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.stages import (
     Recording,
     demonstration_failure,
+    draw_robot_error,
     looks_at,
     observation_failure,
     observe_recording,
@@ -115,6 +117,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `clearance_mm`: per side, of parts that fit into one another; None stands for the scenario's.
     - `arm`: by name, or an `Arm`.
     - `timestep_s`: of the physics.
+    - `robot_error`: what is wrong with the robot itself, as standard deviations: `none`, or `hand_eye:1/0.2+tool:0.5`.
     - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
     - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
       display; `human` opens a window when the replay begins.
@@ -141,12 +144,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         timestep_s: float = TrialSettings.timestep_s,
         eye: str = TrialSettings.eye,
         looks: int = TrialSettings.looks,
+        robot_error: str = TrialSettings.robot_error,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
         check("eye", eye)
         check("looks", looks)
+        self._robot_error = checked_robot_error(robot_error)
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
@@ -351,7 +356,15 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if self._refused is not None:
             return failed, self._refused, None
         predicted = predicted_outcome(plan, self._scene)
-        attempt = replay_and_judge(plan, self._scene, recording.layout.goals, self._watch(), most_s=LONGEST_REPLAY_S)
+        assert self._trial is not None
+        attempt = replay_and_judge(
+            plan,
+            self._scene,
+            recording.layout.goals,
+            self._watch(),
+            most_s=LONGEST_REPLAY_S,
+            error=draw_robot_error(self._robot_error, self._scene, self._trial),
+        )
         if attempt.result.reached.final is not None:
             self._poses = attempt.result.reached.final.poses
         judged = attempt.verdict

@@ -115,6 +115,8 @@ class Row(TypedDict, total=False):
     """`friction`, or `weld` for an ideal gripper."""
     arm: Name | None
     """The robot."""
+    robot_error: Name
+    """What is wrong with the robot itself: `none`, or standard deviations of what was drawn, `hand_eye:1/0.2`."""
     relations: Name
     """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
     method: Name

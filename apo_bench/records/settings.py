@@ -17,6 +17,7 @@ from msgspec import Meta
 from apo_bench.errors import InputError
 from apo_bench.records.method import checked_method, is_own, parsed
 from apo_bench.records.relations import checked_relations
+from apo_bench.records.robot_error import NONE, checked_robot_error
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
 from apo_bench.records.short_names import CORRECTOR
@@ -144,6 +145,18 @@ class TrialSettings:
         metadata=about("Name of the arm, FILE.toml, or package.module:name", shared=True, scene=True),
     )
     """The robot, by name, as a file, or `module:name`."""
+    robot_error: Name = field(
+        default=NONE,
+        metadata=about(
+            "Standard deviations of the robot's own errors: none, hand_eye:1/0.2 (mm/degrees), joints:0.05 (degrees), "
+            "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), or several joined by +",
+            spelled=checked_robot_error,
+            key=True,
+            axis="robot_errors",
+            later=True,
+        ),
+    )
+    """What is wrong with the robot itself: `none`, or standard deviations by kind, `hand_eye:1/0.2+tool:0.5`."""
     relations: Name = field(
         default="given",
         metadata=about(

@@ -138,7 +138,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     """Compare the sweeps of two folders.
 
     A trial is the same if all that its key holds is: scenario, clearance, seed, carelessness, level, noise, relations,
-    grasp and method; fidelity, arm and time step are not, so that they can be compared.
+    grasp, robot error and method; fidelity, arm and time step are not, so that they can be compared.
 
     Raises:
         InputError: A folder is no sweep, holds a trial twice, both have no trial in common (of other salts a seed is
@@ -166,7 +166,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     if not both:
         raise InputError(
             f"'{first}' and '{second}' have no trial in common (scenario, clearance, seed, carelessness, level, noise, "
-            "relations, grasp and method); compare sweeps of the same seeds."
+            "relations, grasp, robot error and method); compare sweeps of the same seeds."
         )
     pairs = [(ours[key], theirs[key]) for key in both]
     return Comparison(

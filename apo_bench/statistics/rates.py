@@ -1,5 +1,5 @@
 """Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp,
-fidelity and number of looks."""
+fidelity, number of looks and robot error."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class Place(NamedTuple):
     grasp: str = TrialSettings.grasp
     fidelity: str = TrialSettings.fidelity
     looks: int = TrialSettings.looks
+    robot_error: str = TrialSettings.robot_error
 
 
 class Interval(NamedTuple):
@@ -80,6 +81,7 @@ class Cell:
     grasp: str
     fidelity: str
     looks: int
+    robot_error: str
     trials: int
     """Trials that count: those whose demonstration was right."""
     successes: int
@@ -157,7 +159,7 @@ def place_of(row: Row) -> Place | None:
 
 
 _PLACE = itemgetter(*Place._fields)
-_USUAL = {"fidelity": TrialSettings.fidelity, "looks": TrialSettings.looks}
+_USUAL = {"fidelity": TrialSettings.fidelity, "looks": TrialSettings.looks, "robot_error": TrialSettings.robot_error}
 
 
 def by_place(rows: Iterable[Row]) -> dict[Place, dict[int, Row]]:
@@ -223,4 +225,5 @@ def _cell(key: Place, rows: list[Row]) -> Cell:
 def order(k: Place) -> tuple[Any, ...]:
     """How cells are sorted: by what is asked, then by method (`oracle` first), then by level."""
     where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
-    return (*where, k.grasp, k.fidelity != "full", k.looks, rank(k.method), k.method, k.level, k.level_deg)
+    robot = (k.grasp, k.robot_error != TrialSettings.robot_error, k.robot_error, k.fidelity != "full")
+    return (*where, *robot, k.looks, rank(k.method), k.method, k.level, k.level_deg)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from apo_bench.records.method import as_seen, knows_relations, knows_truth, may_look
+from apo_bench.records.robot_error import NONE
 from apo_bench.records.settings import RANGE, USUAL
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Place, rank_relations
@@ -24,6 +25,7 @@ class Setting(NamedTuple):
     grasp: str
     fidelity: str
     looks: int = 0
+    robot_error: str = NONE
 
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
@@ -33,8 +35,7 @@ class Setting(NamedTuple):
         """
         ceiling = knows_truth(cell.method)
         return (
-            (cell.scenario, cell.clearance_mm, cell.grasp, cell.fidelity)
-            == (self.scenario, self.clearance_mm, self.grasp, self.fidelity)
+            _site(cell) == _site(self)
             and (ceiling or (cell.noise, cell.careless) == (self.noise, self.careless))
             and (not knows_relations(cell.method) or cell.relations == self.relations)
             and (not may_look(cell.method) or cell.looks == self.looks)
@@ -54,6 +55,8 @@ class Setting(NamedTuple):
             said.append(f"relations {self.relations}")
         if self.grasp != "friction":
             said.append(f"{self.grasp} grasp")
+        if self.robot_error != NONE:
+            said.append(f"robot error {self.robot_error}")
         if self.fidelity != "full":
             said.append(f"fidelity {self.fidelity}")
         if self.looks:
@@ -109,11 +112,12 @@ def level_unit(noise: str) -> str:
 
 def setting_of(p: Place) -> Setting:
     """The setting that a place belongs to by itself."""
-    return Setting(p.scenario, p.clearance_mm, p.noise, p.relations, p.careless, p.grasp, p.fidelity, p.looks)
+    robot = (p.grasp, p.fidelity, p.looks, p.robot_error)
+    return Setting(p.scenario, p.clearance_mm, p.noise, p.relations, p.careless, *robot)
 
 
 def _site(x: Place | Setting) -> tuple[Any, ...]:
-    return x.scenario, x.clearance_mm, x.grasp, x.fidelity
+    return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error
 
 
 def _one_ceiling(inside: list[_Item]) -> list[_Item]:

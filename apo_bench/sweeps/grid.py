@@ -63,6 +63,8 @@ class SweepSettings:
     eyes: tuple[str, ...] = (TrialSettings.eye,)
     """Noise models are those of the eye `noise`."""
     grasps: tuple[str, ...] = (TrialSettings.grasp,)
+    robot_errors: tuple[str, ...] = (TrialSettings.robot_error,)
+    """The oracle meets them too."""
     looks: tuple[int, ...] = (TrialSettings.looks,)
     """Methods that cannot ask run once, with none."""
     arm: str = TrialSettings.arm
@@ -147,7 +149,7 @@ def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: 
     """All the work of a sweep, each trial once, seeds first, so that every cell of an interrupted sweep is about
     equally full.
 
-    The oracle meets neither noise nor carelessness: it runs once per seed and grasp, recorded at level 0,
+    The oracle meets neither noise nor carelessness: it runs once per seed, grasp and robot error, recorded at level 0,
     carelessness 0 and the first noise model or eye. Neither it nor `none` asks what touches what: both are recorded
     with relations as given. Methods that cannot ask to see operations again are recorded with no looks.
     """

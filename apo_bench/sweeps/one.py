@@ -201,7 +201,19 @@ def _spec(request: Request, clearance_mm: float) -> TrialSettings:
     return TrialSettings(**(usual | in_python(asked)))
 
 
-DRAWN = (LEVEL.name, "level_mm", "level_deg", "careless", "noise", "relations", "eye", "looks", "seed", "salt_file")
+DRAWN = (
+    LEVEL.name,
+    "level_mm",
+    "level_deg",
+    "careless",
+    "noise",
+    "relations",
+    "eye",
+    "looks",
+    "robot_error",
+    "seed",
+    "salt_file",
+)
 """What has no meaning for an observation that comes from a file, though its contacts may be recognised."""
 
 

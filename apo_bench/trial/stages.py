@@ -22,6 +22,7 @@ from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records.outcomes import sentence
+from apo_bench.records.robot_error import NONE, robot_sigmas
 from apo_bench.records.row import Predicted
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE
@@ -30,14 +31,16 @@ from apo_bench.simulation.arms.foretelling import arm_moves
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
+from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
 
 if TYPE_CHECKING:
     from apo_bench.depth_camera.range_sensor import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
-LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS = range(7)
-"""Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing."""
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND = range(11)
+"""Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing; the last
+four are of what is wrong with the robot."""
 
 
 @final
@@ -143,6 +146,32 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
     return said if prediction.code not in ARM_CODES else {**said, "sentence": prediction.sentence}
 
 
+def draw_robot_error(given: str, scene: Scene, seed: int, salt: Salt | None = None) -> RobotError | None:
+    """What is wrong with the robot in a trial, in proportion to the standard deviations; None of a right one.
+
+    The base is turned about the middle of the nominal goals. A part slips along the pads, the second and third axis of
+    the tip, and turns about their normal, the first.
+
+    Args:
+        given: As in a row.
+    """
+    if given == NONE:
+        return None
+    sigmas = robot_sigmas(given)
+    drawn = stream(seed, HAND_EYE, salt).standard_normal(6)
+    hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * drawn[:3], sigmas.hand_eye[1] * drawn[3:])
+    middle = np.eye(4)
+    middle[:3, 3] = scene.scenario.goals[:, :3, 3].mean(axis=0)
+    if sigmas.hand_eye != (0.0, 0.0):
+        hand_eye = middle @ hand_eye @ pose.inverse(middle)
+    joints = np.radians(sigmas.joints_deg) * stream(seed, JOINTS, salt).standard_normal(len(scene.arm.joints))
+    tool = pose.at(1e-3 * sigmas.tool_mm * stream(seed, TOOL, salt).standard_normal(3), (0.0, 0.0, 0.0))
+    m, deg = 1e-3 * sigmas.in_hand[0], sigmas.in_hand[1]
+    slips = stream(seed, IN_HAND, salt).standard_normal((len(scene.scenario.assembly), 3))
+    in_hand = np.array([pose.at((0.0, m * y, m * z), (deg * turn, 0.0, 0.0)) for y, z, turn in slips])
+    return RobotError(hand_eye, joints, tool, in_hand)
+
+
 def replay_and_judge(
     plan: Plan,
     scene: Scene,
@@ -152,6 +181,7 @@ def replay_and_judge(
     cache: ReplayCache | None = None,
     searches: bool = False,
     most_s: float = math.inf,
+    error: RobotError | None = None,
 ) -> Attempt:
     """Replay a plan and judge what was reached.
 
@@ -160,8 +190,9 @@ def replay_and_judge(
         watch: Called with the `MjData` about every 20 ms of simulated time.
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time that the replay may take.
+        error: What is wrong with the robot; the judge does not care whose error it was.
     """
-    result = replay(plan, scene, watch, fidelity=fidelity, cache=cache, searches=searches, most_s=most_s)
+    result = replay(plan, scene, watch, fidelity=fidelity, cache=cache, searches=searches, most_s=most_s, error=error)
     return Attempt(result, judge(scene.scenario.assembly, result.reached, reference, scene.criteria))
 
 

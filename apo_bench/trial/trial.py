@@ -34,6 +34,7 @@ from apo_bench.trial.stages import (
     Attempt,
     Recording,
     demonstration_failure,
+    draw_robot_error,
     looks_at,
     observe_recording,
     predicted_outcome,
@@ -191,7 +192,8 @@ def _outcome(
         return result(made.failure, success=False) | _correction(made)
     searches = parsed(settings.method).searches
     predicted: Row = {"predicted": predicted_outcome(made.plan, scene, searches)}
-    attempt = replay_and_judge(made.plan, scene, reference, watch, settings.fidelity, cache, searches)
+    error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
+    attempt = replay_and_judge(made.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     return end | _correction(made) | predicted | _physics(attempt, made.plan, truth)
 

@@ -28,7 +28,7 @@ _USUAL: Mapping[str, Any] = MappingProxyType(
     }
 )
 """What a row that does not say means."""
-_NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye")
+_NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye", "robot_error")
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
 _TOGETHER = (
     ("level", "level_deg", "careless"),

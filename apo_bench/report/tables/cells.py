@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.report.tables.saying import interval_columns, level_text, rate_columns
@@ -13,10 +13,11 @@ from apo_bench.statistics.rates import Cell
 
 def cell_table(cells: Sequence[Cell]) -> Table:
     """Axes that are as usual in every cell are left to files."""
-    met = {
+    met: dict[str, Callable[[Cell], bool]] = {
         "noise": lambda c: not knows_truth(c.method),
         "relations": lambda c: knows_relations(c.method),
         "looks": lambda c: may_look(c.method),
+        "robot_error": lambda c: True,
     }
 
     def axis(name: str, usual: str | int) -> Column:
@@ -38,6 +39,7 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             Column("grasp"),
             Column("fidelity"),
             axis("looks", 0),
+            axis("robot_error", "none"),
             Column("", "success", text=lambda c: percent(c.rate)),
             Column("", "95 % interval", text=interval),
             Column("trials", "n"),

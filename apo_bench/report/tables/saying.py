@@ -72,6 +72,7 @@ def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) ->
         axis("grasp"),
         axis("fidelity"),
         axis("looks"),
+        axis("robot_error"),
     )
 
 

@@ -16,6 +16,7 @@ from apo_bench.simulation.execution.prepare import Move, moves, unreachable
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot.hold_watch import HoldWatch
 from apo_bench.simulation.robot.robot import Halt, Robot, Watch
+from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import sleeping, snapshot
 
@@ -40,6 +41,7 @@ def replay(
     cache: ReplayCache | None = None,
     searches: bool = False,
     most_s: float = math.inf,
+    error: RobotError | None = None,
 ) -> ReplayResult:
     """Carry out a plan.
 
@@ -51,17 +53,18 @@ def replay(
         cache: What replays of this scene have in common; changes nothing but the time it takes.
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
+        error: What is wrong with the robot; it goes by the plan as if nothing were.
     """
     start = plan.start if parts_at is None else parts_at
     too_long = len(plan.schedule) * _SHORTEST_STEP_S > most_s
-    todo = () if too_long else moves(plan, scene, searches)
+    todo = () if too_long else _todo(plan, scene, searches, error)
     refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
     cache = ReplayCache() if cache is None or watch is not None else cache
-    way = cache_keys(scene, start, fidelity, todo)
+    way = cache_keys(scene, start, fidelity, todo, error)
     ended = None if refused or not way or most_s < math.inf else cache.ended(way[-1])
     if ended is not None:
         return ended
-    robot, after = Robot(scene, start, watch, fidelity), list[Snapshot | None]([None] * len(plan.assembly))
+    robot, after = Robot(scene, start, watch, fidelity, error), list[Snapshot | None]([None] * len(plan.assembly))
     timeline = list[tuple[Step, float]]()
     with sleeping(scene.work, scene.grasp == "friction"):
         outcome = refused or _carry_out(plan, robot, todo, after, timeline, cache, way, most_s)
@@ -77,6 +80,12 @@ def replay(
     if way and not refused and outcome.code != "time_limit":
         cache.end(way[-1], result)
     return result
+
+
+def _todo(plan: Plan, scene: Scene, searches: bool, error: RobotError | None) -> tuple[Move, ...]:
+    if error is None:
+        return moves(plan, scene, searches)
+    return tuple(Move(step, error.transfer(transfer)) for step, transfer in moves(error.plan(plan), scene, searches))
 
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
@@ -116,6 +125,7 @@ def _carry_out(
         try:
             if kept is None or done <= 2 * i:
                 grip = take(robot, t)
+                robot.slip(step.operation)
                 cache.keep(way[2 * i], robot, grip, after, timeline)
             else:
                 grip = kept.grip

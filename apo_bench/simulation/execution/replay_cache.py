@@ -93,9 +93,13 @@ def _keep(found: dict[bytes, _Kept], mark: bytes, what: _Kept) -> None:
         del found[next(iter(found))]
 
 
-def cache_keys(scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]]) -> list[bytes]:
+def cache_keys(
+    scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]], error: Any = None
+) -> list[bytes]:
     """What has led to each state: two marks for each move, one when the part is lifted, one when the move is done."""
-    digest = hashlib.sha256(_bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity)))
+    digest = hashlib.sha256(
+        _bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity, error))
+    )
     found = []
     for step, t in moves:
         before = digest.copy()

@@ -16,13 +16,14 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.robot.fast_forward import fast_forward
+from apo_bench.simulation.robot.fast_forward import fast_forward, take_along
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.hold_watch import HoldWatch
 from apo_bench.simulation.robot.near import Moving, clear, near_spans
 from apo_bench.simulation.robot.opening import fingers_of
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
 from apo_bench.simulation.robot.reach import along, at_end, within_speed
+from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, place, timestep, unfelt
 
@@ -62,8 +63,18 @@ class Guard(NamedTuple):
 class Robot:
     """One arm during one replay."""
 
-    def __init__(self, scene: Scene, start: Poses, watch: Watch | None = None, fidelity: str = "full") -> None:
-        self.scene, self.watch, self.fidelity = scene, watch, fidelity
+    def __init__(
+        self,
+        scene: Scene,
+        start: Poses,
+        watch: Watch | None = None,
+        fidelity: str = "full",
+        error: RobotError | None = None,
+    ) -> None:
+        self.scene, self.watch, self._error = scene, watch, error
+        self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
+        # What is near is looked for where the tip is believed, so with joints that are off nothing is left out.
+        self.fidelity = "full" if self._off.any() else fidelity
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
         self.model, self.arm = scene.work.model, scene.arm
@@ -76,14 +87,14 @@ class Robot:
         self._find_joints()
         self._net, self._felt = np.zeros((3, self.model.nsensordata)), np.zeros(3)
         self.data: Any = initial_state(scene.work, start)
-        self.data.qpos[self._qpos] = self.arm.home
+        self.data.qpos[self._qpos] = self.arm.home + self._off
         self._fingers.put(self.data, self.arm.opening_m)
         self.data.ctrl[:] = 0.0
         mujoco.mj_forward(self.model, self.data)
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
         self._rest = self.T
-        self.data.ctrl[self._drives] = self.q
+        self.data.ctrl[self._drives] = self.q + self._off
         self._fingers.command(self.data, self.arm.opening_m)
         self._names = (*scene.work.free, *scene.work.fixed)
         self._forces = self.data.sensordata
@@ -127,7 +138,7 @@ class Robot:
         path = self._reached(along(self.scene.kinematics, line, line.progress(np.arange(n + 1) / n), self.q))
         rows, found = path + self._lead * np.gradient(path, self.step_s, axis=0), []
         for row in rows[1:]:
-            self.data.ctrl[self._drives] = row
+            self.data.ctrl[self._drives] = row + self._off
             mujoco.mj_step(self.model, self.data)
             found.append(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
         self.q, self.T = path[-1], line.end
@@ -163,7 +174,7 @@ class Robot:
         force, ctrl, drives = self._feel(), self.data.ctrl, self._drives
         while (asked := law(force)) is not None:
             offset, passed = asked, passed + 1
-            ctrl[drives] = q + offset @ moves
+            ctrl[drives] = q + offset @ moves + self._off
             mujoco.mj_step(self.model, self.data)
             force = self._feel()
             if passed % self._every == 0:
@@ -178,7 +189,7 @@ class Robot:
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still; each physics step may be taken in so many parts."""
-        self.data.ctrl[self._drives] = self.q
+        self.data.ctrl[self._drives] = self.q + self._off
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._every):
             n = min(self._every, steps - done)
@@ -268,6 +279,17 @@ class Robot:
             self.model.eq_data[weld, :11] = (0, 0, 0, *T[:3, 3], *q, 1)
         self.data.eq_active[weld] = int(on)
 
+    def slip(self, operation: int) -> None:
+        """What is in the hand moves along the pads, if the robot's errors have it so; nobody is told."""
+        if self._error is None or not self._held or not self._error.slips(operation):
+            return
+        tip = self.scene.kinematics.forward(self.data.qpos[self._qpos])
+        after = tip @ self._error.in_hand[operation]
+        take_along(self.scene.work, self.data, self._held, (tip, after, after))
+        if self.scene.grasp == "weld":
+            mujoco.mj_forward(self.model, self.data)
+            self.weld(self._held[0], True)
+
     def steady(self, on: bool) -> None:
         """Keep all that is in the hand where it is in the hand, or no longer, where the scene asks for it.
 
@@ -328,7 +350,7 @@ class Robot:
         """Step through joint targets (n, joints), one physics step each; returns how many were run."""
         model, data, step, every = self.model, self.data, mujoco.mj_step, self._every
         rows = np.repeat(data.ctrl[None], len(targets), axis=0)
-        rows[:, self._drives] = targets
+        rows[:, self._drives] = targets + self._off
         ctrl = data.ctrl
         if guard is None:
             self._run_free(rows)
@@ -398,7 +420,7 @@ class Robot:
 
     def _hold_where_it_is(self) -> None:
         """After a guard: the measured joint positions become the command, which takes the pressure away."""
-        self.q = np.array(self.data.qpos[self._qpos])
+        self.q = self.data.qpos[self._qpos] - self._off
         self.T = self.scene.kinematics.forward(self.q)
         self.stand(0.06)
 

@@ -27,6 +27,7 @@ class CurveSetting(NamedTuple):
     grasp: str = "friction"
     fidelity: str = "full"
     looks: int = 0
+    robot_error: str = "none"
 
     def reference(self, method: str) -> CurveSetting:
         """The setting that this one is compared with: `none` asks for no relations, and few methods for looks."""

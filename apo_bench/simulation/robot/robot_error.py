@@ -1,0 +1,51 @@
+"""What is wrong with one robot during one trial: drawn before, and met only by the physics.
+
+Whoever plans, foretells or corrects knows the robot as it should be. Guards still act on the forces that are felt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.execution.transfer import Grip, Transfer
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RobotError:
+    """The errors of one trial."""
+
+    hand_eye: Array
+    """(4, 4): where the robot goes, in the world, for a pose in the world."""
+    joints: Array
+    """(joints,): by how much every joint is off what its encoder says, [rad]."""
+    tool: Array
+    """(4, 4): where the tip comes to be, in the frame of where the robot believes it."""
+    in_hand: Array
+    """(n, 4, 4): how the part of each operation slips when it was taken, in the frame of the tip."""
+
+    def plan(self, plan: Plan) -> Plan:
+        """The plan as the robot takes it: everything where a wrong base puts it."""
+        E = self.hand_eye
+        if np.array_equal(E, np.eye(4)):
+            return plan
+        start = {part: E @ T for part, T in plan.start.items()}
+        return replace(plan, start=start, goals=E @ plan.goals, targets=E @ plan.targets)
+
+    def transfer(self, t: Transfer) -> Transfer:
+        """The transfer with a tip that is not where the robot believes it."""
+        if np.array_equal(self.tool, np.eye(4)):
+            return t
+        return replace(t, grips=tuple(map(self._grip, t.grips)), centring=tuple(map(self._grip, t.centring)))
+
+    def slips(self, operation: int) -> bool:
+        """Whether the part of an operation moves in the hand."""
+        return not np.array_equal(self.in_hand[operation], np.eye(4))
+
+    def _grip(self, grip: Grip) -> Grip:
+        return Grip(grip.T_part_tip @ self.tool, grip.half_width)

@@ -1,0 +1,47 @@
+"""Names of what is wrong with the robot: spelled in one way, and one sentence where there is no such error."""
+
+from __future__ import annotations
+
+import pytest
+
+from apo_bench.errors import InputError
+from apo_bench.records.robot_error import Sigmas, checked_robot_error, robot_sigmas
+
+
+@pytest.mark.parametrize(
+    ("given", "spelled"),
+    [
+        ("none", "none"),
+        ("hand_eye:0", "none"),
+        ("tool:0.50+hand_eye:1.0/0", "hand_eye:1+tool:0.5"),
+        ("in_hand:0/2+joints:.05", "joints:0.05+in_hand:0/2"),
+    ],
+)
+def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str) -> None:
+    assert checked_robot_error(given) == spelled == checked_robot_error(spelled)
+    assert robot_sigmas(given) == robot_sigmas(spelled)
+
+
+def test_numbers_are_those_of_their_kinds() -> None:
+    asked = "hand_eye:1/0.2+joints:0.05+tool:0.5+in_hand:0.3/2"
+    assert robot_sigmas(asked) == Sigmas((1.0, 0.2), 0.05, 0.5, (0.3, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("elbow:1", "unknown kind of robot error 'elbow'. Known: hand_eye, in_hand, joints, none, tool."),
+        ("tool:1+tool:2", "the robot error 'tool:1+tool:2' was given, which has tool twice; say it once."),
+        (
+            "tool:1/2",
+            "the robot error 'tool:1/2' was given; standard deviations in mm from 0 to 20 are allowed: tool:0.5.",
+        ),
+        ("hand_eye", "the robot error 'hand_eye' was given; standard deviations in mm and degrees from 0 to 20"),
+        ("hand_eye:nan", "the robot error 'hand_eye:nan' was given;"),
+        ("joints:21", "the robot error 'joints:21' was given; standard deviations in degrees from 0 to 20"),
+    ],
+)
+def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        checked_robot_error(given)
+    assert str(refused.value).startswith(said)

@@ -1,0 +1,74 @@
+"""What is wrong with the robot is met by the physics, and by nobody who plans."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.records.row import Row, look_up
+from apo_bench.records.settings import TrialSettings
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.stages import draw_robot_error
+from apo_bench.trial.trial import run_trial
+
+SEED = 3
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario("block_on_block"))
+
+
+def row(scene: Scene, robot_error: str, **more: Any) -> Row:
+    asked = {"method": "none", "level_mm": 0.5, "level_deg": 0.5, "careless": 0.0, "fidelity": "contact"} | more
+    return run_trial(TrialSettings("block_on_block", seed=SEED, robot_error=robot_error, **asked), scene)
+
+
+def test_errors_are_in_proportion_and_each_has_its_own_chance(scene: Scene) -> None:
+    one, two = (draw_robot_error(f"tool:{mm}+joints:0.1+in_hand:1/2", scene, SEED) for mm in (1, 2))
+    alone = draw_robot_error("joints:0.1", scene, SEED)
+    assert one is not None
+    assert two is not None
+    assert alone is not None
+    np.testing.assert_allclose(two.tool[:3, 3], 2 * one.tool[:3, 3], rtol=1e-12)
+    np.testing.assert_array_equal(one.joints, alone.joints)
+    np.testing.assert_array_equal(one.in_hand, two.in_hand)
+    assert not one.in_hand[:, 0, 3].any(), "a part slips along the pads, not through them"
+    np.testing.assert_array_equal(alone.hand_eye, np.eye(4))
+    assert not any(map(alone.slips, range(len(scene.scenario.assembly))))
+    assert draw_robot_error("none", scene, SEED) is None
+
+
+def test_a_plan_is_the_same_whatever_is_wrong_with_the_robot_and_ends_elsewhere(scene: Scene) -> None:
+    right = row(scene, "none")
+    for wrong in ("hand_eye:1/0.2", "tool:1", "joints:0.1", "in_hand:0.5/1"):
+        found = row(scene, wrong)
+        for column in ("predicted", "gap_before_mm", "gap_after_mm", "chi_square", "freed"):
+            assert look_up(found, column) == look_up(right, column)
+        assert found["reached"] != right["reached"]
+        assert found["robot_error"] == wrong
+
+
+def test_a_wrong_base_moves_a_held_part_as_much(scene: Scene) -> None:
+    """Pads centre a part across; where it ends differs by no more than what the base is off."""
+    error = draw_robot_error("hand_eye:2", scene, SEED)
+    assert error is not None
+    right, wrong = (row(scene, name, method="oracle", grasp="friction")["reached"] for name in ("none", "hand_eye:2"))
+    assert right is not None
+    assert wrong is not None
+    moved = np.array([np.subtract(wrong[part], right[part])[:2] for part in right])
+    off = 1e3 * np.linalg.norm(error.hand_eye[:2, 3])
+    assert 0.2 < np.linalg.norm(moved, axis=1).max() < off + 0.2
+
+
+def test_a_part_slips_by_what_was_drawn(scene: Scene) -> None:
+    error = draw_robot_error("in_hand:0.5", scene, SEED)
+    moved = row(scene, "in_hand:0.5", method="oracle")["moved_in_hand"]
+    assert error is not None
+    assert moved
+    for each in moved:
+        drawn = 1e3 * np.linalg.norm(error.in_hand[each["operation"] - 1][:3, 3])
+        assert abs(each["carried_mm"] - drawn) < 0.2, "pads creep by up to 0.2 mm"
