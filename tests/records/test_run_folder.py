@@ -44,7 +44,7 @@ def run(**changed: Any) -> dict[str, Any]:
 
 
 def row(seed: int) -> dict[str, Any]:
-    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "given", "none", 0, seed)
+    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "none", "given", "none", 0, seed)
     ended = {"demonstration": "ok", **result(Outcome("done", "ok", None, "all was done"), success=True)}
     ended |= {"sim_seconds": 20.0, "extra_operations": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}

@@ -58,7 +58,7 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
 
 def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:
     usual = {info.column: info.default for info in SETTINGS.values() if not info.key}
-    unsaid = {**UNKNOWN, **UNCOUNTED, **usual}
+    unsaid = {**UNKNOWN, **UNCOUNTED, **usual, "robot_error": "none"}
     old = {k: v for k, v in row().items() if k not in unsaid} | {"schema": "apo-bench/row/2"}
     new = row() | {"seed": 1, "schema": "apo-bench/row/3"}
     folder = write(tmp_path / "old", [old, new])

@@ -19,6 +19,7 @@ from apo_bench.report.figures.levels import success_figure
 from apo_bench.report.figures.sheet import draw
 from apo_bench.report.figures.styles import OWN_STYLES, STYLES
 from apo_bench.report.report import report
+from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.confusion import prediction_summary
 from apo_bench.statistics.confusion import Confusion, confusions
 from apo_bench.statistics.effort import Effort, efforts
@@ -55,6 +56,7 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "fidelity": "full",
         "method": method,
         "looks": 0,
+        "robot_error": "none",
         "seed": seed,
         **UNKNOWN,
         "demonstration": "demonstration_failed" if success is None else "ok",
@@ -355,3 +357,16 @@ def test_effort_counts_what_was_right() -> None:
         Effort("stick_in_tower", "paper-track", 2, 3.0, 27.0, 0.3),
     )
     assert efforts([]) == ()
+
+
+def test_robot_errors_are_cells_of_their_own_and_a_column_where_there_are_any() -> None:
+    wrong = "hand_eye:0.5/0.1"
+    rows = [row("oracle"), row("oracle", 1), row("oracle", success=False, robot_error=wrong)]
+    right, other = tally(rows)
+    assert [(cell.robot_error, cell.trials, cell.successes) for cell in (right, other)] == [
+        ("none", 2, 2),
+        (wrong, 1, 0),
+    ]
+    both, alone = ("\n".join(cell_table(cells).markdown()) for cells in ((right, other), (right,)))
+    assert wrong in both
+    assert "robot" not in alone
