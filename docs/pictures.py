@@ -1,10 +1,13 @@
-"""Draw the picture at the top, and what is believed: `python docs/pictures.py` (half a minute, no display needed)."""
+"""Draw the picture at the top, what is believed, and two pictures of films: `python docs/pictures.py` (half a minute,
+no display needed)."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import imageio.v3 as imageio
 import matplotlib
 
 matplotlib.use("Agg")
@@ -19,9 +22,12 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.believed_picture import belief_panel, draw_beliefs
+from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.sweeps.one import Request, run_one
 from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
+from apo_bench.trial.story import Story
 
 HERE = Path(__file__).parent / "pictures"
 SEED, LEVEL = 7, 2.0
@@ -43,6 +49,8 @@ def main() -> None:
     draw_top(panels, HERE / "top.png")
     beliefs = [belief_panel("as seen", seen, seen.goals, 3), belief_panel("corrected by contact", seen, corrected, 3)]
     draw_beliefs(scene.scenario, 3, beliefs, HERE / "believed.png")
+    for method in ("none", "contact"):
+        draw_film(method, HERE / f"film_{method}.png")
 
 
 def deepest(scene: Scene, plan: Plan, reference: Array) -> Array:
@@ -91,6 +99,24 @@ def draw_top(panels: list[tuple[str, NDArray[np.uint8]]], path: Path) -> None:
         axis.axis("off")
     figure.savefig(path, dpi=100, bbox_inches="tight", pad_inches=0.1)
     plt.close(figure)
+
+
+def draw_film(method: str, path: Path) -> None:
+    """One picture of the film of a replay: how it ended where it failed, else the stick on its way in."""
+
+    def keep(story: Story) -> None:
+        replayed = story.chapters[-1]
+        inside = [m for m in replayed.moments if m.doing.operation == 2 and m.doing.macro.startswith("insert")]
+        shown = replayed.moments if method == "none" else inside[: 3 * len(inside) // 4]
+        *_, ended = pictures = [
+            picture
+            for picture, _ in frames(
+                story.scene.scenario.assembly, story.assembled, [replace(replayed, moments=tuple(shown[-6:]))]
+            )
+        ]
+        imageio.imwrite(path, ended if method == "none" else pictures[0])
+
+    run_one(Request("stick_in_tower", {"level": 1.0, "seed": SEED, "method": method}), keep)
 
 
 if __name__ == "__main__":

@@ -14,8 +14,9 @@ from benchmarks.lowest import lowest
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-BROUGHT = {"glfw": "mujoco", "OCP": "build123d"}
-"""What a dependency needs itself whenever we do: its viewer and its renderer without EGL; its kernel."""
+BROUGHT = {"glfw": "mujoco", "OCP": "build123d", "PIL": "imageio"}
+"""What a dependency needs itself whenever we do: its viewer and its renderer without EGL; its kernel;
+its pictures."""
 
 
 def imported() -> set[str]:

@@ -67,6 +67,6 @@ def replay(
     if video is not None and row["sim_seconds"] is None:
         typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
     elif video is not None:
-        typer.echo(f"Film: {video}", err=as_json)
+        typer.echo(f"Wrote {video}", err=as_json)
     if row["success"] is None:
         raise typer.Exit(NO_RESULT)

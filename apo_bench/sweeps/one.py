@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -22,17 +22,23 @@ from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
+from apo_bench.simulation.film.film import write_film
+from apo_bench.simulation.film.track import ReplayTrack
 from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.worker import lost, trial_row
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
+from apo_bench.trial.story import Story, told
 from apo_bench.trial.trial import MEASURED, noise_of, run_measured
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.local.alone import Say
+
+Show = Callable[[Story], None]
 
 MEASURED_AIR_M = 5e-3
 """A start that was measured may be wrong by so much: as far apart as `loose_success` lets faces be."""
@@ -58,8 +64,11 @@ class Request:
     """A folder where demonstrations are kept; the row is the same with and without it."""
 
 
-def run_one(request: Request) -> Row:
+def run_one(request: Request, show: Show | None = None) -> Row:
     """Run the trial, or the replay of a measured observation, that was asked for.
+
+    Args:
+        show: Called with what is to be seen of the trial, if anything was replayed.
 
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
@@ -69,31 +78,47 @@ def run_one(request: Request) -> Row:
     if request.cache is not None:
         KeptDemonstrations(request.cache)
     if request.limit_s is not None:
+        if show is not None:
+            raise InputError("--view was given together with --trial-limit; leave one of them out.")
         from apo_bench.sweeps.local.alone import run_alone
 
         return run_alone(partial(_run, request, spec), request.limit_s, partial(_lost, request, spec, scenario))
     found: list[Row] = []
-    _run(request, spec, lambda kind, *news: found.extend(news))
+    _run(request, spec, lambda kind, *news: found.extend(news), show)
     return found[0]
 
 
-def _run(request: Request, spec: TrialSettings, say: Say) -> None:
+def _run(request: Request, spec: TrialSettings, say: Say, show: Show | None = None) -> None:
     """Run it and say its row, then write the film."""
     with OwnCorrectors(request.corrector_limit_s) as own:
-        _run_by(own.find(parsed(spec.method).plan), request, spec, say)
+        _run_by(own.find(parsed(spec.method).plan), request, spec, say, show)
 
 
-def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say) -> None:
-    scene = scene_of(spec)
-    film = _film(scene) if request.video else None
+def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
+    scene, recording = scene_of(spec), None
+    track = ReplayTrack() if request.video or show else None
+    if request.video:
+        renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run
     say("began")
+    seen: Observation | None = None
     if request.observation:
-        row = _measured(request.observation, spec, scene, method, film)
+        from apo_bench.files.observation import read_stated
+
+        seen = read_stated(request.observation, scene.scenario)
+        row = _measured(request.observation, seen, spec, scene, method, track)
     else:
-        row = _drawn(request, spec, scene, method, film)
+        recording = _recording(request, spec, scene)
+        row = _drawn(request, spec, scene, recording, method, track)
+        if track is not None and row["sim_seconds"] is not None:
+            seen = look(spec, scene, recording)
     say("row", row)
-    if film is not None and row["sim_seconds"] is not None:
-        film.save(request.video)
+    if track is None or seen is None or row["sim_seconds"] is None:
+        return
+    story = told(spec, scene, seen, track, row, recording)
+    if request.video:
+        write_film(scene.scenario.assembly, story.assembled, story.chapters, request.video)
+    if show is not None:
+        show(story)
 
 
 def _lost(request: Request, spec: TrialSettings, scenario: Scenario, code: str) -> Row:
@@ -158,29 +183,27 @@ def look(spec: TrialSettings, scene: Scene, recording: Recording) -> Observation
     return observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
 
 
-def _drawn(request: Request, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
-    recording = (
-        record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-        if request.cache is None
-        else KeptDemonstrations(request.cache).recording(spec, scene)
-    )
+def _recording(request: Request, spec: TrialSettings, scene: Scene) -> Recording:
+    if request.cache is None:
+        return record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    return KeptDemonstrations(request.cache).recording(spec, scene)
+
+
+def _drawn(request: Request, spec: TrialSettings, scene: Scene, recording: Recording, method: Any, watch: Any) -> Row:
     if request.save_observation:
         from apo_bench.files.json_forms import observation_form, write_form
 
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
-    return trial_row(spec, scene, recording, content, method=method, watch=film)
+    return trial_row(spec, scene, recording, content, method=method, watch=watch)
 
 
-def _measured(path: Path, spec: TrialSettings, scene: Scene, method: Any, film: Any) -> Row:
-    from apo_bench.files.observation import read_stated
-
-    observation = read_stated(path, scene.scenario)
+def _measured(path: Path, observation: Observation, spec: TrialSettings, scene: Scene, method: Any, watch: Any) -> Row:
     aloft = in_the_air(observation.assembly, observation.start, MEASURED_AIR_M)
     if aloft is not None:
         raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-    return run_measured(spec, scene, observation, read_text(path, "observation file"), method=method, watch=film)
+    return run_measured(spec, scene, observation, read_text(path, "observation file"), method=method, watch=watch)
 
 
 def _spec(request: Request, clearance_mm: float) -> TrialSettings:
@@ -229,9 +252,3 @@ def _refuse_contradictions(request: Request, asked: Mapping[str, Any]) -> None:
 
 def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
-
-
-def _film(scene: Scene) -> Any:
-    from apo_bench.simulation.scene.render import Film
-
-    return Film(scene)

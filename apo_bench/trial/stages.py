@@ -82,6 +82,11 @@ def record_demonstration(
     return Recording(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
 
 
+def watch_again(scene: Scene, recording: Recording, careless: float, seed: int, salt: Salt | None, watch: Any) -> None:
+    """Let the human demonstrate once more, the same, before somebody who looks on."""
+    demonstrate(scene, recording.layout, careless, stream(seed, DEMONSTRATION, salt), watch)
+
+
 def range_sensor(scene: Scene, recording: Recording, level_mm: float) -> RangeSensor:
     """The range finder that recorded a demonstration, as a noise model; `level_mm` is the noise of a ray."""
     from apo_bench.depth_camera.range_sensor import RangeSensor

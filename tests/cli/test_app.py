@@ -219,12 +219,12 @@ def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp
 
 
 def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path = tmp_path / "replay.gif"
+    path = tmp_path / "replay.mp4"
     trial = ("replay", "block_on_block", "--careless", "0", "--method", "none", *HOPELESS)
     code, out, err = run(capsys, *trial, "--video", str(path))
     assert (code, err) == (0, "")
-    assert out.endswith(f"Film: {path}\n")
-    assert path.read_bytes().startswith(b"GIF8")
+    assert out.endswith(f"Wrote {path}\n")
+    assert path.read_bytes()[4:8] == b"ftyp"
 
 
 def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

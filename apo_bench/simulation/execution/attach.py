@@ -37,6 +37,7 @@ def attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
 
     Those that lead along the line of attach are one motion, which ends where the last of them does.
     """
+    robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
     if t.into.level:
         left, grip = _insert(robot, t, grip, second)
     else:
@@ -101,6 +102,7 @@ def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -
         touched: Towards sides that it touches already, which it leaves by less: along one that it rubs on friction
             would pass for the next.
     """
+    robot.macro = "slide-to-contact"
     robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
     if touched:
         robot.follow(smooth(robot.T, shifted(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))

@@ -14,6 +14,7 @@ from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, moves, unreachable
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
+from apo_bench.simulation.robot.doing import Inspector
 from apo_bench.simulation.robot.hold_watch import HoldWatch
 from apo_bench.simulation.robot.robot import Halt, Robot, Watch
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -64,6 +65,8 @@ def replay(
     ended = None if refused or not way or most_s < math.inf else cache.ended(way[-1])
     if ended is not None:
         return ended
+    if isinstance(watch, Inspector):
+        watch.begin(plan)
     robot, after = Robot(scene, start, watch, fidelity, error), list[Snapshot | None]([None] * len(plan.assembly))
     timeline = list[tuple[Step, float]]()
     with sleeping(scene.work, scene.grasp == "friction"):
@@ -122,6 +125,7 @@ def _carry_out(
     for i, (step, t) in list(enumerate(todo))[done // 2 :]:
         if robot.data.time > most_s:
             return _late(plan, "pick", step)
+        robot.step = step
         try:
             if kept is None or done <= 2 * i:
                 grip = take(robot, t)

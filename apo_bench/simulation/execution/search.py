@@ -44,7 +44,9 @@ def press_in(
         if left <= near or aside >= RADIUS_M:
             break
         stopped = shifted(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
+        macro, robot.macro = robot.macro, "search"
         more = search_hole(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
+        robot.macro = macro
         if more is None:
             break
         guard = Guard(more[:3, :3] @ guard.way, guard.newton)

@@ -42,6 +42,7 @@ def demonstrate(
     with sleeping(scene.shown, True):
         hands.wait(0.05)
         for k, operation in enumerate(scenario.assembly.operations):
+            hands.begin(k)
             target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
             late = error.left if k == len(scenario.assembly) - 1 else ()
             perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -39,6 +39,13 @@ class Watcher(Protocol):
     def __call__(self, data: Any) -> None: ...
 
 
+@runtime_checkable
+class Audience(Watcher, Protocol):
+    """A watcher that is told which operation begins, counted from 0."""
+
+    def begin(self, operation: int) -> None: ...
+
+
 class Hands:
     """Two hands and the parts before them; one demonstration long."""
 
@@ -53,6 +60,11 @@ class Hands:
         self._mocap = [int(self.world.model.body(hand).mocapid[0]) for hand in HANDS]
         self._at = [np.eye(4) for _ in HANDS]
         self._held: list[dict[str, Array]] = [{} for _ in HANDS]
+
+    def begin(self, operation: int) -> None:
+        """Say which operation begins, counted from 0, to who wants to know."""
+        if isinstance(self._watch, Audience):
+            self._watch.begin(operation)
 
     def pose(self, part: str) -> Array:
         """Where a movable part is, (4, 4)."""

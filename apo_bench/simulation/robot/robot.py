@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.goals import Poses, Step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.doing import Doing, Inspector
 from apo_bench.simulation.robot.fast_forward import fast_forward, take_along
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.hold_watch import HoldWatch
@@ -78,7 +79,9 @@ class Robot:
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
         self.model, self.arm = scene.work.model, scene.arm
-        self.stage = "plan"
+        self._inspect = watch.inspect if isinstance(watch, Inspector) else None
+        self.stage, self.macro = "plan", ""
+        self.step: Step | None = None
         self._held: tuple[str, ...] = ()
         self.hold_watch = HoldWatch()
         self._kept: dict[str, Array] = {}
@@ -392,7 +395,11 @@ class Robot:
             struck, force = self._hardest_blow()
             if force > _COLLISION_N:
                 raise Halt(self.stage, "collision", struck)
-        if self.watch is not None:
+        if self._inspect is not None:
+            said = self.macro if self.stage == "attach" else self.stage
+            k, undoes = self.step or (None, False)
+            self._inspect(self.data, Doing(k, said, float(np.linalg.norm(self._felt)), undoes))
+        elif self.watch is not None:
             self.watch(self.data)
 
     def _feel(self) -> list[float]:

@@ -1,0 +1,140 @@
+"""A trial as a film: demonstration, then replay, with captions; near the parts, and the whole table beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.geometry.solid import world_bounds
+from apo_bench.simulation.film.captions import Caption, captioned, ending_lines, one_line
+from apo_bench.simulation.film.track import BY_HAND, Chapter, Moment
+from apo_bench.simulation.scene.graphics import renderer
+from apo_bench.simulation.scene.render import camera_view, save_film
+from apo_bench.simulation.scene.world import World, initial_state
+
+_WIDTH, _HEIGHT = 720, 480
+_INSET = (192, 128)
+SPEED = 2.0
+_FPS, _GIF_FPS = 20.0, 8.0
+_ENDING_S = 2.5
+"""So long the end of a chapter stands still, with what came of it."""
+_AZIMUTH_DEG, _ELEVATION_DEG = 128.0, -24.0
+_NEAREST_M, _FARTHER, _ROOM_M = 0.12, 1.1, 0.04
+"""How far the camera stands off: this and so many diagonals of what it looks at; room above it for what comes down."""
+
+
+def write_film(
+    assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], path: str | Path, speed: float = SPEED
+) -> None:
+    """Write chapters one after the other as MP4 or GIF, by the ending of `path`.
+
+    Args:
+        assembled: Where the parts are when all is done: the camera looks at them.
+        speed: How many times as fast as it was it is shown; stated in the picture.
+
+    Raises:
+        InputError: Another ending, a place that cannot be written, or there is nothing to draw with.
+    """
+    fps = _GIF_FPS if Path(path).suffix.lower() == ".gif" else _FPS
+    shown = frames(assembly, assembled, chapters, speed, fps)
+    save_film((picture for picture, seconds in shown for _ in range(round(seconds * fps))), path, fps)
+
+
+def frames(
+    assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], speed: float = SPEED, fps: float = _FPS
+) -> Iterator[tuple[NDArray[np.uint8], float]]:
+    """The pictures of a film one after the other, and how long each is shown, [s]."""
+    near = _looks_at(assembly, [assembled])
+    for chapter in chapters:
+        wide = _looks_at(assembly, [assembled, chapter.start])
+        yield from _chapter(assembly, chapter, near, wide, speed, fps)
+
+
+def _chapter(
+    assembly: Assembly, chapter: Chapter, near: Any, wide: Any, speed: float, fps: float
+) -> Iterator[tuple[NDArray[np.uint8], float]]:
+    data, model = initial_state(chapter.world, chapter.start), chapter.world.model
+    pace = "real time" if speed == 1.0 else f"x {speed:g}"
+    with ExitStack() as stack:
+        large = stack.enter_context(renderer(model, _WIDTH, _HEIGHT))
+        small = stack.enter_context(renderer(model, *_INSET))
+
+        def drawn(moment: Moment, caption: Caption) -> NDArray[np.uint8]:
+            put(chapter.world, data, moment)
+            pictures = []
+            for draws, camera in ((large, near), (small, wide)):
+                draws.update_scene(data, camera=camera)
+                draws.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+                pictures.append(draws.render())
+            return captioned(pictures[0], pictures[1], caption)
+
+        for moment, force_n, most_n in sampled(chapter.moments, speed / fps):
+            said = "" if moment.doing.macro == BY_HAND else f"force {force_n:.1f} N, most {most_n:.1f} N"
+            yield drawn(moment, Caption(chapter.title, pace, _lines(assembly, moment), said)), 1.0 / fps
+        yield (
+            drawn(chapter.moments[-1], Caption(chapter.title, pace, ending_lines(chapter.ending), "", chapter.good)),
+            _ENDING_S,
+        )
+
+
+def sampled(moments: Sequence[Moment], every_s: float) -> Iterator[tuple[Moment, float, float]]:
+    """Moments about so far apart in time, the last among them; each with the greatest force since the one before it and
+    since its operation began, [N]: a guard stops a motion within a tick, which few pictures would meet."""
+    at, force, most, operation = -np.inf, 0.0, 0.0, moments[0].doing.operation
+    for moment in moments:
+        if moment.doing.operation != operation:
+            operation, most = moment.doing.operation, 0.0
+        force = max(force, moment.doing.force_n)
+        most = max(most, force)
+        if moment.time_s >= at or moment is moments[-1]:
+            yield moment, force, most
+            at, force = moment.time_s + every_s - 1e-9, 0.0
+
+
+def put(world: World, data: Any, moment: Moment) -> None:
+    """Bring a state of a world to a moment."""
+    data.qpos[:] = moment.qpos
+    if len(moment.hands):
+        data.mocap_pos[:] = moment.hands
+    mujoco.mj_kinematics(world.model, data)
+    mujoco.mj_comPos(world.model, data)
+    mujoco.mj_camlight(world.model, data)
+
+
+def operation_words(assembly: Assembly, moment: Moment) -> str:
+    """`operation 2 of 3, castle2: pick`."""
+    k = moment.doing.operation
+    if k is None:
+        return "at the start"
+    what = f"operation {k + 1} of {len(assembly)}{' undone' * moment.doing.undoes}, {_moved(assembly.operations[k])}"
+    return f"{what}: {moment.doing.macro}"
+
+
+def _lines(assembly: Assembly, moment: Moment) -> tuple[str, ...]:
+    k, said = moment.doing.operation, operation_words(assembly, moment)
+    if k is None:
+        return (said,)
+    contacts = "; ".join(map(str, assembly.operations[k].contacts))
+    return (said, one_line(contacts))
+
+
+def _moved(operation: Operation) -> str:
+    carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
+    return f"{operation.main}{carried}"
+
+
+def _looks_at(assembly: Assembly, states: Sequence[Poses]) -> Any:
+    """A camera that sees all parts that are ever moved, where they are in these states."""
+    posed = [(assembly.solids[p], poses[p]) for poses in states for p in assembly.solids if p not in assembly.fixed]
+    low, high = world_bounds(posed)
+    high = high + np.array([0.0, 0.0, _ROOM_M])
+    far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
+    return camera_view((low + high) / 2, far, _AZIMUTH_DEG, _ELEVATION_DEG)

@@ -1,0 +1,77 @@
+"""What was seen of a demonstration or a replay, kept moment by moment: a state and what was done in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Plan, Poses
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.doing import Doing
+from apo_bench.simulation.robot.robot import TICK_S
+from apo_bench.simulation.scene.world import World
+
+BY_HAND = "by hand"
+
+
+class Moment(NamedTuple):
+    """A state of a world, and what is done in it."""
+
+    time_s: float
+    qpos: Array
+    doing: Doing
+    hands: Array
+    """Where the hands of the human are, (2, 3), [m]; of a replay (0, 3)."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Chapter:
+    """A demonstration or a replay from its beginning to its end."""
+
+    title: str
+    world: World
+    start: Poses
+    """Before the first moment; what is fixed stays there."""
+    moments: tuple[Moment, ...]
+    ending: str
+    """What came of it, in a sentence."""
+    good: bool | None
+    """Whether that is a success; None where nobody asks."""
+
+
+@final
+@dataclass(eq=False)
+class ReplayTrack:
+    """Keeps a replay: pass it as `watch`."""
+
+    plan: Plan | None = None
+    moments: list[Moment] = field(default_factory=list)
+
+    def begin(self, plan: Plan) -> None:
+        self.plan = plan
+
+    def inspect(self, data: Any, doing: Doing) -> None:
+        self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, np.zeros((0, 3))))
+
+    def __call__(self, data: Any) -> None:
+        self.inspect(data, Doing(None, "", 0.0))
+
+
+@final
+@dataclass(eq=False)
+class HandTrack:
+    """Keeps a demonstration: pass it as `watch`."""
+
+    period_s: float = TICK_S
+    moments: list[Moment] = field(default_factory=list)
+    _operation: int | None = None
+
+    def begin(self, operation: int) -> None:
+        self._operation = operation
+
+    def __call__(self, data: Any) -> None:
+        doing = Doing(self._operation, BY_HAND, 0.0)
+        self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))

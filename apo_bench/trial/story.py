@@ -1,0 +1,92 @@
+"""A trial to be looked at: what was demonstrated and replayed, and the goals as seen, as corrected and as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.placement import placements
+from apo_bench.geometry.arrays import Array
+from apo_bench.records.row import Row
+from apo_bench.records.settings import TrialSettings
+from apo_bench.simulation.film.track import Chapter, HandTrack, ReplayTrack
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.trial.stages import Recording, watch_again
+
+AS_SEEN, AS_CORRECTED, AS_TRUE = "as seen", "as corrected", "true"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Story:
+    """One trial, or what a scenario asks for."""
+
+    scene: Scene
+    chapters: tuple[Chapter, ...]
+    assembled: Poses
+    """Where the parts should be when all is done."""
+    goals: Mapping[str, Array] = field(default_factory=dict)
+    """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
+
+
+def told(
+    spec: TrialSettings,
+    scene: Scene,
+    seen: Observation,
+    track: ReplayTrack,
+    row: Row,
+    recording: Recording | None = None,
+) -> Story:
+    """What is to be seen of a trial that was replayed.
+
+    Args:
+        track: What watched the replay.
+        recording: Its demonstration, which is run once more; None of a measured observation, whose truth is not known.
+    """
+    plan = track.plan
+    assert plan is not None
+    assembly, method = scene.scenario.assembly, row["method"]
+    start, goals = plan.start, {AS_SEEN: seen.goals, AS_CORRECTED: plan.goals}
+    if method == "none" or np.array_equal(seen.goals, plan.goals):
+        del goals[AS_CORRECTED]
+    chapters = []
+    if recording is not None:
+        goals[AS_TRUE], start = recording.layout.goals, recording.layout.start
+        chapters.append(_demonstration(spec, scene, recording))
+    reached = Chapter(
+        title=f"{scene.scenario.name}: replay, method {method}",
+        world=scene.work,
+        start=start,
+        moments=tuple(track.moments),
+        ending=ending(row),
+        good=row["success"],
+    )
+    true = goals.get(AS_TRUE, plan.goals)
+    return Story(scene, (*chapters, reached), placements(assembly, start, true)[-1], goals)
+
+
+def ending(row: Row) -> str:
+    """How a replay ended: `failure at operation 3 (force_stop): the motion .. was stopped`."""
+    if row["success"]:
+        return f"success: {row['sentence']}"
+    operation = row["failure_operation"]
+    where = "" if operation is None else f" at operation {operation}"
+    return f"failure{where} ({row['failure_code']}): {row['sentence']}"
+
+
+def _demonstration(spec: TrialSettings, scene: Scene, recording: Recording) -> Chapter:
+    track = HandTrack()
+    watch_again(scene, recording, spec.careless, spec.seed, spec.salt, track)
+    size = f"{spec.level_mm:g} mm, {spec.level_deg:g} degrees"
+    return Chapter(
+        title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",
+        world=scene.shown,
+        start=recording.layout.start,
+        moments=tuple(track.moments),
+        ending=f"demonstrated; this is seen with errors of {size}, then planned and replayed",
+        good=None,
+    )

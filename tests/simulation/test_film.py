@@ -1,0 +1,64 @@
+"""What happened in a replay, kept moment by moment and written around the pictures of a film."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.film.captions import ABOVE_PX, BELOW_PX, Caption, captioned
+from apo_bench.simulation.film.film import frames, operation_words, sampled
+from apo_bench.simulation.film.track import BY_HAND, Chapter, HandTrack, Moment, ReplayTrack
+from apo_bench.simulation.human.demonstration import demonstrate
+from apo_bench.simulation.robot.doing import Doing
+from apo_bench.simulation.scene.scene import build_scene
+
+
+def moments(*forces: float) -> list[Moment]:
+    """Moments of operations 1, 1, .., 2, 20 ms apart."""
+    operations = [0] * (len(forces) - 1) + [1]
+    made = zip(operations, forces, strict=True)
+    return [Moment(0.02 * i, np.zeros(1), Doing(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(made)]
+
+
+def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
+    found = [(round(m.time_s / 0.02), f, most) for m, f, most in sampled(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
+    assert found == [(0, 0, 0), (4, 7, 7), (6, 0.5, 0.5)]
+
+
+def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
+    scene = build_scene(load_scenario("block_on_block"))
+    layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
+    assembly, track, hands = scene.scenario.assembly, ReplayTrack(), HandTrack()
+    plan = Plan(assembly, layout.start, layout.goals)
+    assert replay(plan, scene, track, fidelity="contact").outcome.code == "ok"
+    assert track.plan is plan
+    order = list(dict.fromkeys((m.doing.operation, m.doing.macro) for m in track.moments if m.doing.operation == 1))
+    assert order == [(1, stage) for stage in ("pick", "lift", "carry", "move-to-contact", "release", "depart")]
+    landed = [m.doing for m in track.moments if m.doing.macro == "move-to-contact"]
+    assert max(doing.force_n for doing in landed) > 1.0
+    assert operation_words(assembly, track.moments[-1]).startswith("operation 2 of 2")
+
+    demonstrate(scene, layout, 0.0, np.random.default_rng(1), hands)
+    assert {m.doing for m in hands.moments} == {Doing(k, BY_HAND, 0.0) for k in (None, 0, 1)}
+    end = np.array(hands.moments[-1].qpos)
+    chapter = Chapter("shown", scene.shown, layout.start, (hands.moments[0], hands.moments[-1]), "done", None)
+    drawn = [picture for picture, _ in frames(assembly, layout.start, [chapter])]
+    assert drawn[0].shape == drawn[-1].shape
+    assert np.abs(drawn[0].astype(int) - drawn[1]).max() > 50
+    assert np.array_equal(end, hands.moments[-1].qpos)
+
+
+def test_words_stand_around_the_picture() -> None:
+    picture, inset = np.zeros((240, 480, 3), np.uint8), np.full((40, 60, 3), 128, np.uint8)
+    plain = captioned(picture, inset, Caption("a", "x 2", ("done",), ""))
+    failed = captioned(picture, inset, Caption("a", "x 2", ("done",), "", good=False))
+    assert plain.shape == (240 + ABOVE_PX + BELOW_PX, 480, 3)
+    inside = plain[ABOVE_PX:-BELOW_PX]
+    assert not inside[50:].any()
+    assert (inside[10, -10] == 128).all()
+    below = failed[-BELOW_PX:].astype(int)
+    assert (below[..., 0] - below[..., 1]).max() > 100
+    assert np.array_equal(plain[:-BELOW_PX], failed[:-BELOW_PX])
