@@ -19,7 +19,9 @@ from apo_bench.simulation.arms.building import read_arm
 from apo_bench.simulation.arms.checking import check_arm
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, within_speed
+from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
+from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.trial import run_trial
 
 ARMS = folder("assets") / "arms"
@@ -119,6 +121,20 @@ def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) 
     np.testing.assert_allclose(q, arm.home, atol=1e-3)
 
 
+def test_fingers_are_as_fast_as_the_file_says() -> None:
+    assert {name: find_arm(name).limits.fingers_m_s for name in ("panda_primitive", "ur5e_primitive", "six_axis")} == {
+        "panda_primitive": 0.05,
+        "ur5e_primitive": 0.075,
+        "six_axis": 0.28,
+    }
+    scene = build_scene(load_scenario("block_on_block"), arm=find_arm("panda_primitive"))
+    robot = Robot(scene, scene.scenario.start)
+    before, opening = robot.data.time, robot.opening()
+    robot.fingers(opening - 0.02)
+    assert opening - robot.opening() > 0.019
+    assert robot.data.time - before >= 0.02 / 0.05
+
+
 def test_a_line_takes_as_long_as_the_joints_need() -> None:
     arm = find_arm("ur5e_primitive")
     kinematics, q = Kinematics(arm), np.array(arm.home)
@@ -152,6 +168,7 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
         (GOOD + "joint = 1", "unknown key 'joint'; did you mean 'joints'"),
         (GOOD + "payload_kg = -1", "payload_kg"),
         (GOOD + "speed_deg_s = [0, 1]", "above 0"),
+        (GOOD + "[gripper]\nspeed_mm_s = 0", "above 0"),
         (GOOD + "[gripper]\nopen = [1]", "'open' and 'closed' are given together"),
         ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"', "No such file"),
         ('schema = "apo-bench/arm/1"\nmjcf = "broken.xml"', "MuJoCo cannot read this MJCF file of the arm"),

@@ -25,6 +25,9 @@ _GRIPPER = "gripper/"
 _USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment")
 _FINGER_ARMATURE, _FINGER_DAMPING = 1e-4, 0.02
 """Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
+_USUAL_FINGERS_M_S = 0.05
+"""As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
+less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
 _MOST_JOINTS, _MOST_BUILT = 8, 8
 _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
@@ -263,6 +266,7 @@ def _limits(said: ArmDescription, joints: Sequence[str], drives: Any) -> Limits:
         payload_kg=said.payload_kg,
         speed_rad_s=None if speed is None else np.array(np.broadcast_to(speed, len(joints))),
         torque_nm=np.array([drives[name].torque for name in joints]),
+        fingers_m_s=said.gripper.speed_m_s or _USUAL_FINGERS_M_S,
     )
 
 

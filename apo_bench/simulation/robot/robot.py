@@ -32,8 +32,6 @@ TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
-_FINGERS_M_S = 0.28
-"""How fast the command of the fingers moves."""
 _REST_RAD_S, _REST_M_S = 2e-3, 3e-3
 """Joints and fingers that move slower than this rest."""
 _CREEP_M = 5e-5
@@ -213,7 +211,7 @@ class Robot:
     def fingers(self, to: float) -> None:
         """Command both fingers to an opening [m] until they rest; beyond the part's surface the force limit rules."""
         start = self._nearest_command(to)
-        ticks = max(1, round(abs(to - start) / _FINGERS_M_S / TICK_S))
+        ticks = max(1, round(abs(to - start) / self.arm.limits.fingers_m_s / TICK_S))
         if self.fidelity == "contact" and not self._held and self._may_open(to):
             self._fingers.put(self.data, to)
             return self._pass(ticks * TICK_S)

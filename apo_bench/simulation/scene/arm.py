@@ -31,6 +31,8 @@ class Limits:
     """(joints,), the fastest each may turn."""
     torque_nm: Array | None = None
     """(joints,), the most each can push; infinite where nothing is said."""
+    fingers_m_s: float = 0.28
+    """How fast the command of each finger moves at most."""
 
 
 @final
