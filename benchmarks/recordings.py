@@ -28,8 +28,9 @@ from apo_bench.judging.verdict import judge
 from apo_bench.observation.models.camera import WORKSPACE_MIDDLE_M
 from apo_bench.recording.camera_file import read_camera
 from apo_bench.recording.formats import read_log
-from apo_bench.recording.importing import Stated, import_recording
+from apo_bench.recording.importing import import_recording
 from apo_bench.recording.objects_file import part_tracks, read_objects
+from apo_bench.recording.ordering import Stated
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay

@@ -92,7 +92,7 @@ def _import(
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
-    found = import_recording(tracks, camera, loaded, _stated(*said, len(loaded.assembly)), log.file)
+    found = import_recording(tracks, camera, loaded, _stated(*said, len(loaded.assembly)), log.file, objects.models)
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [one.rest for one in found.operations]
     X, times = found.camera.T_world_camera, {part: track.t for part, track in tracks.items()}
@@ -140,7 +140,7 @@ def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, pi
 
 
 def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
-    from apo_bench.recording.importing import Stated
+    from apo_bench.recording.ordering import Stated
 
     hidden = whole_numbers(unseen, "--unseen") if unseen else ()
     if not all(1 <= k <= operations for k in hidden):

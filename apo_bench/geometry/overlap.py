@@ -75,6 +75,12 @@ def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     return float(sum(piece.area for piece in _common(face, T_face, on, T_on)[1]))
 
 
+def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
+    """How far `face`, projected onto the plane of `on`, lies beside it, [m]; 0 if one covers some of the other."""
+    upper = face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face)
+    return float(upper.distance(_own_shape(on)))
+
+
 def face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
     return float(_own_shape(face).area)

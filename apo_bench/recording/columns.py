@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.camera_file import ANGLES, LENGTHS, TIMES, Conventions
@@ -45,15 +45,32 @@ class Column(NamedTuple):
     unit: str
 
 
-def column(name: str, renamed: Mapping[str, str]) -> Column | None:
+def column(name: str) -> Column | None:
     """What a column of this name is; None if it is nobody's business."""
     name = name.strip().lower()
-    name = renamed.get(name, name)
     stem, _, unit = name.rpartition("_")
     if not stem or unit not in _UNITS:
         stem, unit = name, ""
     meaning = _SAME.get(stem, stem)
     return Column(meaning, unit) if meaning in KNOWN else None
+
+
+def check_renamed(names: Sequence[str], renamed: Mapping[str, str], known: Callable[[str], bool], file: str) -> None:
+    """Refuse names that the camera file gives to columns that are not there, or that nothing is called.
+
+    Args:
+        names: Of the columns of the file.
+        known: Whether a name means something.
+    """
+    there = {name.strip().lower() for name in names}
+    for theirs, ours in renamed.items():
+        if theirs not in there:
+            raise InputError(f"{file}: the camera file, log.columns, {ours}: {unknown('column', theirs, there)}")
+        if not known(ours):
+            raise InputError(
+                f"{file}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
+                "of columns such as id, t_s, x_mm, qw."
+            )
 
 
 def times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:
@@ -127,10 +144,10 @@ def _rotations(
 
     given = [kind for kind, names in _ROTATIONS.items() if all(name in cells for name in names)]
     if len(given) != 1:
-        found = f"{len(given)} ({' and '.join(given)}) are" if given else "none is"
+        found = f"{len(given)} ({' and '.join(given)}) are there" if given else _lacking(cells)
         raise InputError(
-            f"{file}: columns of one rotation are needed, {found} there: qw to qz, q0 to q3, rx to rz, ax to az with "
-            "angle, roll, pitch and yaw, e1 to e3, or r11 to r33."
+            f"{file}: columns of one rotation are needed, {found}; allowed are qw to qz, q0 to q3, rx to rz, ax to az "
+            "with angle, roll, pitch and yaw, e1 to e3, or r11 to r33, or other names by `columns` of the camera file."
         )
     kind = given[0]
     numbers = np.column_stack([cells[name] for name in _ROTATIONS[kind]])
@@ -161,6 +178,13 @@ def _rotations(
     about = "fixed" if how.euler.islower() else "moving"
     R = Rotation.from_euler(how.euler, numbers * ANGLES[called]).as_matrix()
     return R, f"Euler angles in {called}, {how.euler} about {about} axes, as stated"
+
+
+def _lacking(cells: Mapping[str, Array]) -> str:
+    """What is missing of the rotation of which most columns are there."""
+    names = max(_ROTATIONS.values(), key=lambda names: sum(name in cells for name in names) / len(names))
+    there, missing = ([name for name in names if (name in cells) is has] for has in (True, False))
+    return f"{', '.join(missing)} is missing beside {', '.join(there)}" if there else "none is there"
 
 
 def _matrices(R: Array, places: Sequence[str]) -> Array:

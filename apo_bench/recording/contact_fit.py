@@ -10,7 +10,7 @@ from apo_bench.assembly.facing import height
 from apo_bench.assembly.facing_round import measure_round
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry.overlap import face_area
+from apo_bench.geometry.overlap import beside, face_area
 from apo_bench.geometry.round_face import RoundFace
 
 
@@ -18,7 +18,7 @@ class ContactFit(NamedTuple):
     """The worst of some contacts."""
 
     gap_m: float
-    """From the middle of the smaller face to the plane of the other one, or between axes."""
+    """From the middle of the smaller face to the plane of the other one and from beside it to it, or between axes."""
     angle_rad: float
     """Between the normal of one and the opposite of the other, or between axes."""
 
@@ -42,4 +42,5 @@ def _fit(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
     if face_area(a) > face_area(b):
         (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
     cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))
-    return ContactFit(abs(height(a, T_a, b, T_b)), float(np.arccos(np.clip(-cosine, -1.0, 1.0))))
+    apart = float(np.hypot(height(a, T_a, b, T_b), beside(a, T_a, b, T_b)))
+    return ContactFit(apart, float(np.arccos(np.clip(-cosine, -1.0, 1.0))))

@@ -15,7 +15,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
 from apo_bench.recording.camera_file import Conventions
-from apo_bench.recording.columns import Column, column, poses, times
+from apo_bench.recording.columns import Column, check_renamed, column, poses, times
 from apo_bench.recording.log import LARGEST_BYTES, MOST_ROWS, Rows
 
 _LONGEST_LINE = 16384
@@ -33,20 +33,25 @@ class Numbers(NamedTuple):
 
 def read_csv_log(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
     """The rows of a file whose columns name what they are; without a column of ids, its name is the id of all."""
-    table = read_numbers(path, lambda name: column(name, how.columns))
+    table = read_numbers(path, column, how.columns)
     places = [f"{path}, line {line}" for line in table.lines]
     T, notes = poses(table.cells, table.units, how, str(path), places)
     return Rows(table.ids, times(table.cells, table.units, how, str(path)), T, places), notes
 
 
-def read_numbers(path: Path, meaning: Callable[[str], Column | None]) -> Numbers:
-    """The columns of a file that mean something."""
+def read_numbers(path: Path, meaning: Callable[[str], Column | None], renamed: Mapping[str, str]) -> Numbers:
+    """The columns of a file that mean something.
+
+    Args:
+        renamed: Column of the file -> a name that means something.
+    """
     lines = text_lines(path)
     line, names = next(lines, (0, []))
     if not names:
         raise InputError(f"{path}: the file is empty; its first line names the columns, such as t_s,id,x_mm,y_mm,z_mm.")
     check_separator(f"{path}, line {line}", names)
-    found = [meaning(name) for name in names]
+    check_renamed(names, renamed, lambda name: meaning(name) is not None, str(path))
+    found = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
     used = [(i, one) for i, one in enumerate(found) if one is not None]
     meanings = [one.meaning for _, one in used]
     for name in meanings:

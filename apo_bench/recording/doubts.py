@@ -5,44 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.camera_pose import CameraPose
-from apo_bench.recording.contact_fit import ContactFit
-from apo_bench.recording.ordering import NoOrder, Order
+from apo_bench.recording.arranging import Arrange, Arrangement
+from apo_bench.recording.ordering import NoOrder
 from apo_bench.recording.rests import Rest
-from apo_bench.recording.stays import Stay
+from apo_bench.recording.stays import Stay, Stays
 
-Stays = Mapping[str, tuple[Stay, ...]]
 _FITS_MM = 20.0
 """A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""
 _MENDS = 0.4
 """What mends a recording leaves at most this part of what was wrong."""
+_HELPLESS = (
+    "neither another order of the quaternions, mirrored axes, inverted poses, another unit nor reversed time mends it, "
+    "so check the frames of the parts in the objects file, the ids, the pose of the camera, and that the log goes on "
+    "until the last part was put down"
+)
 
 
-class Arrangement(NamedTuple):
-    """A camera and an order, and how well they fit."""
-
-    camera: CameraPose
-    order: Order | None
-    fit: ContactFit
-    """The worst contact."""
-
-    @property
-    def wrong_mm(self) -> float:
-        return max(self.fit.wrong_mm, self.camera.off_mm, self.camera.off_deg)
-
-
-def check_arrangement(found: Arrangement, arrange: Callable[[Stays], Arrangement], stays: Stays, file: str) -> None:
+def check_arrangement(
+    found: Arrangement, arrange: Arrange, stays: Stays, models: Mapping[str, Array], file: str
+) -> None:
     """Refuse a recording in which no contact fits, with what would mend it.
 
     Args:
-        arrange: Says how well other stays would fit.
+        models: Part -> where its frame lies in the tracker's model, (4, 4), [m]; the identity if it is missing.
 
     Raises:
         InputError: It does not fit.
@@ -50,7 +41,7 @@ def check_arrangement(found: Arrangement, arrange: Callable[[Stays], Arrangement
     if found.wrong_mm <= _FITS_MM:
         return
     best, said = found.wrong_mm * _MENDS, ""
-    for sentence, other in mistakes(stays):
+    for sentence, other in mistakes(stays, models):
         try:
             wrong = arrange(other).wrong_mm
         except (NoOrder, np.linalg.LinAlgError):
@@ -60,7 +51,7 @@ def check_arrangement(found: Arrangement, arrange: Callable[[Stays], Arrangement
     raise InputError(f"{file}: no contact fits as it is stated ({_wrong(found)}); {said or _HELPLESS}.")
 
 
-def check_direction(arrange: Callable[[Stays], Arrangement], stays: Stays, file: str) -> None:
+def check_direction(arrange: Arrange, stays: Stays, file: str) -> None:
     """Refuse a recording that is played backwards.
 
     Raises:
@@ -75,12 +66,6 @@ def check_direction(arrange: Callable[[Stays], Arrangement], stays: Stays, file:
             f"{file}: time seems to run backwards: played the other way, all is within {wrong:.1f} mm of the scenario; "
             "give the log as it was recorded."
         )
-
-
-_HELPLESS = (
-    "neither another order of the quaternions, mirrored axes, inverted poses, another unit nor reversed time mends it, "
-    "so check the frames of the parts in the objects file, the ids, and the pose of the camera"
-)
 
 
 def reversed_in_time(stays: Stays) -> Stays:
@@ -98,29 +83,41 @@ def reversed_in_time(stays: Stays) -> Stays:
     }
 
 
-def mistakes(stays: Stays) -> Iterator[tuple[str, Stays]]:
-    """What to do about each usual mistake, and the stays that it gives."""
+def mistakes(stays: Stays, models: Mapping[str, Array]) -> Iterator[tuple[str, Stays]]:
+    """What to do about each usual mistake, and the stays that it gives.
+
+    Mistakes in a log are made in the poses of the tracker's models, not in those of parts.
+    """
+
+    def log(change: Callable[[Array], Array]) -> Stays:
+        return _changed(stays, lambda part, T: change(T @ pose.inverse(M(part))) @ M(part))
+
+    def M(part: str) -> Array:
+        return models.get(part, _SAME)
+
     for order, shift in (("xyzw", 1), ("wxyz", -1)):
         sentence = (
             f"its quaternions seem to be in the order {order}: name their columns so, or state it in the camera file"
         )
-        yield sentence, _changed(stays, partial(_reordered, shift=shift))
+        yield sentence, log(partial(_reordered, shift=shift))
     for axis in "xyz":
         sentence = f'its axes seem to be mirrored (left-handed): state `mirror = "{axis}"` in the camera file'
         flip = np.where(np.array(list("xyz1")) == axis, -1.0, 1.0)
-        yield sentence, _changed(stays, partial(_mirrored, flip=flip))
+        yield sentence, log(partial(_mirrored, flip=flip))
     sentence = "its poses seem to be those of the camera in the model: state `inverted = true` in the camera file"
-    yield sentence, _changed(stays, pose.inverse)
-    yield (
-        "its axes seem to be those of OpenGL: turn the pose of the camera by 180 deg about x",
-        _changed(stays, lambda T: _GL @ T),
-    )
-    for factor, fault in ((1e3, "metres that were read as mm"), (1e-3, "mm that were read as metres")):
-        yield f"its lengths seem to be {fault}: state their unit", _changed(stays, partial(_scaled, factor=factor))
+    yield sentence, log(pose.inverse)
+    sentence = "its axes seem to be those of OpenGL: turn the pose of the camera by 180 deg about x"
+    yield sentence, log(lambda T: _GL @ T)
+    for factor in (10.0, 0.1, 1e3, 1e-3):
+        sentence = f"its lengths seem to be {_times(factor)} those that were read: state their unit"
+        yield sentence, log(partial(_scaled, factor=factor))
     yield "its time seems to run backwards: give the log as it was recorded", reversed_in_time(stays)
+    if models:
+        sentence = "the frames in the objects file seem to be those of the models in the parts: state them inverted"
+        yield sentence, _changed(stays, lambda part, T: T @ pose.inverse(M(part) @ M(part)))
 
 
-_GL = np.diag([1.0, -1.0, -1.0, 1.0])
+_GL, _SAME = np.diag([1.0, -1.0, -1.0, 1.0]), np.eye(4)
 
 
 def _wrong(found: Arrangement) -> str:
@@ -130,14 +127,20 @@ def _wrong(found: Arrangement) -> str:
     return ", ".join(said)
 
 
-def _changed(stays: Stays, change: Callable[[Array], Array]) -> Stays:
-    def other(rest: Rest) -> Rest:
-        return replace(rest, mean=replace(rest.mean, T=change(rest.T)))
+def _changed(stays: Stays, change: Callable[[str, Array], Array]) -> Stays:
+    """The stays of the same parts at other poses."""
+
+    def other(part: str, rest: Rest) -> Rest:
+        return replace(rest, mean=replace(rest.mean, T=change(part, rest.T)))
 
     return {
-        part: tuple(replace(stay, rests=tuple(map(other, stay.rests))) for stay in known)
+        part: tuple(replace(stay, rests=tuple(other(part, rest) for rest in stay.rests)) for stay in known)
         for part, known in stays.items()
     }
+
+
+def _times(factor: float) -> str:
+    return f"{factor:g} times" if factor > 1.0 else f"1/{1.0 / factor:g} of"
 
 
 def _reordered(T: Array, shift: int) -> Array:

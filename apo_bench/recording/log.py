@@ -17,6 +17,8 @@ MOST_ROWS = 1_000_000
 LARGEST_BYTES = 200_000_000
 _NEAR_M, _FAR_M = 0.02, 20.0
 """Models whose median distance to the camera is less or more were given in another unit."""
+_FAST_S, _SLOW_S = 2e-4, 2.0
+"""Frames whose median distance in time is less or more have times in another unit."""
 
 
 class Track(NamedTuple):
@@ -59,7 +61,7 @@ def made_log(file: str, rows: Rows, notes: Sequence[str]) -> Log:
     """The tracks of a log, each with increasing times.
 
     Raises:
-        InputError: Nothing stands in it, a time stands twice or runs backwards, or the unit of lengths is another one.
+        InputError: Nothing stands in it, a time stands twice or runs backwards, or a unit is another one.
     """
     if not len(rows.t):
         raise InputError(f"{file}: no pose stands in the file; give a log with one row per pose.")
@@ -71,6 +73,7 @@ def made_log(file: str, rows: Rows, notes: Sequence[str]) -> Log:
         _check_times(rows, name, at)
         tracks[name] = Track(rows.t[at] - first, rows.T[at])
     _check_unit(file, rows.T)
+    _check_rate(file, tracks)
     return Log(file, MappingProxyType(tracks), tuple(notes))
 
 
@@ -99,4 +102,15 @@ def _check_unit(file: str, T: Array) -> None:
     raise InputError(
         f"{file}: the median distance to the camera is {distance * 1e3:.3g} mm, so these seem to be {fault}; "
         "state the unit: columns such as x_mm or x_m, or `length` in the camera file."
+    )
+
+
+def _check_rate(file: str, tracks: Mapping[str, Track]) -> None:
+    """Refuse milliseconds read as seconds, and the other way round."""
+    steps = np.concatenate([np.diff(track.t) for track in tracks.values()])
+    if not len(steps) or _FAST_S <= float(np.median(steps)) <= _SLOW_S:
+        return
+    raise InputError(
+        f"{file}: the median time between two frames of a track is {float(np.median(steps)):.3g} s, so its times seem "
+        "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file."
     )

@@ -37,6 +37,11 @@ class ObjectsFile:
     ignored: frozenset[str]
     """Ids that are no parts."""
 
+    @property
+    def models(self) -> Mapping[str, Array]:
+        """Part -> where its frame lies in the tracker's model, (4, 4), [m]."""
+        return {part: one.T_model_part for part, one in self.parts.items()}
+
 
 def read_objects(path: str | Path) -> ObjectsFile:
     """What an objects file states.
@@ -73,7 +78,8 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
     for name in log.tracks:
         if name not in known:
             raise InputError(
-                f"{log.file}: the id '{one_line(name, 60)}' is no part; name its part in {objects.file}, "
+                f"{log.file}: the id '{one_line(name, 60)}'{_of_file(name, log)} is no part; name its part in "
+                f"{objects.file}, "
                 f"or add it to its key `ignore`. Known: {', '.join(sorted(known))}."
             )
     found: dict[str, Track] = {}
@@ -85,6 +91,10 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
         track = log.tracks[one.id]
         found[part] = Track(track.t, track.T @ one.T_model_part)
     return found
+
+
+def _of_file(name: str, log: Log) -> str:
+    return ", the name of the file because it has no column of ids," if name == Path(log.file).stem else ""
 
 
 def _tracked(node: JsonNode) -> TrackedPart:

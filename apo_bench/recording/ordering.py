@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -28,6 +28,15 @@ _OVERLAP_S = 0.3
 """A part may be taken so long before the one before it is seen to rest."""
 _CLOSE = 0.3
 """Two choices whose worth differs by less are not told apart."""
+
+
+class Stated(NamedTuple):
+    """What a person states because the log does not say it."""
+
+    ends: tuple[float, ...] = ()
+    """Times at which the operations ended, [s]."""
+    unseen: tuple[int, ...] = ()
+    """Operations that the log does not show, counted from 0."""
 
 
 class NoOrder(InputError):
@@ -149,6 +158,16 @@ def taken(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], before: Seque
         return left.ends
     earlier = [other for other in stays[part] if other.begins < stay.begins]
     return earlier[-1 if carried else 0].ends if earlier else 0.0
+
+
+def quiet(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], chosen: Sequence[Stay | None], k: int) -> float:
+    """When operation k, which was seen, was over: when the next one took its part, else the end of its stay, [s]."""
+    stay = chosen[k]
+    assert stay is not None
+    for j, one in enumerate(chosen):
+        if j > k and one is not None:
+            return float(np.clip(taken(assembly, stays, chosen[:j], one), stay.begins, stay.ends))
+    return stay.ends
 
 
 def _between(

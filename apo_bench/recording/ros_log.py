@@ -34,7 +34,7 @@ _NANO = 1e15
 
 def read_ros_csv(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
     """Columns such as `field.header.stamp`, `pose.position.x`; without child_frame_id one file is one object."""
-    table = read_numbers(path, lambda name: _field(how.columns.get(name.strip().lower(), name)))
+    table = read_numbers(path, _field, how.columns)
     cells = dict(table.cells)
     if "seconds" in cells:
         t = cells["seconds"] + 1e-9 * cells.get("nanoseconds", np.zeros(len(cells["seconds"])))

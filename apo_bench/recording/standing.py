@@ -1,14 +1,36 @@
-"""Where parts stand before the first operation: as the scenario's do, where they were seen."""
+"""Where parts stand before the first operation: on known places, as the scenario's do where they were seen, or else."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
 _HIGH_M, _TILTED_DEG = 0.01, 10.0
 """A part that was seen so much higher or more tilted stands otherwise."""
+
+
+def starts(seen: Poses, known: Mapping[str, Array | None], planned: Poses) -> tuple[Poses, Mapping[str, str]]:
+    """Where every part starts, and whence that is known: `known`, `seen`, `otherwise` or `scenario`.
+
+    Args:
+        seen: Of tracked parts, world, [m].
+        known: Places that were stated; None: as planned.
+        planned: Of all parts.
+    """
+    start, whence = dict(planned), dict.fromkeys(planned, "scenario")
+    for part, T in seen.items():
+        if part in known:
+            place = known[part]
+            start[part], whence[part] = planned[part] if place is None else place, "known"
+            continue
+        stands = standing(planned[part], T)
+        start[part], whence[part] = (T, "otherwise") if stands is None else (stands, "seen")
+    return start, whence
 
 
 def standing(planned: Array, seen: Array) -> Array | None:

@@ -44,6 +44,10 @@ class Stay:
         return before[-1] if before else self.rests[0]
 
 
+Stays = Mapping[str, tuple[Stay, ...]]
+"""Part -> where it stayed, in order of time."""
+
+
 def stays_of(part: str, rests: Sequence[Rest]) -> tuple[Stay, ...]:
     """The stays of a part, in order of time."""
     found: list[list[Rest]] = []

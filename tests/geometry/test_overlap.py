@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NOTHING, face_area, overlap
+from apo_bench.geometry.overlap import NOTHING, beside, face_area, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.parts import load_part
 
@@ -146,3 +146,9 @@ def test_the_area_is_that_of_counted_points(T_face: Array):
     in_u = (np.maximum(abs(u), abs(v)) < 0.03) & ~((abs(u) < 0.01) & (v > 0))
     counted = step**2 * np.count_nonzero(in_ring & in_u)
     assert overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)
+
+
+def test_a_face_lies_beside_another_by_their_distance_in_its_plane_at_any_height() -> None:
+    square = rectangle(0.01, 0.01)
+    assert beside(square, OVER @ pose.at((0.015, 0.0, 0.3), (0.0, 0.0, 0.0)), square, EYE) == 0.0
+    assert np.isclose(beside(square, pose.at((0.05, 0.0, 0.3), (0.0, 0.0, 0.0)) @ OVER, square, EYE), 0.03)

@@ -67,6 +67,8 @@ WRONG: dict[str, tuple[str, str]] = {
     "cells": (HEAD + "0.1,a,0,0\n", "line 2: 9 cells are needed, 4 were given"),
     "euler": ("t_s,id,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0.1,a,0,0,900,1,0,0\n", "do not say their order"),
     "no time": ("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,0,0,900,1,0,0,0\n", "the column of the time is missing"),
+    "milliseconds": (HEAD + ROW + "33.4,a,0,0,900,1,0,0,0\n", "33.3 s, so its times seem to be in another unit"),
+    "lacking": (HEAD.replace("qz", "q") + ROW, "qz is missing beside qw, qx, qy"),
     "semicolons": (HEAD.replace(",", ";"), "columns are separated by commas; this file uses ';'"),
 }
 
@@ -80,6 +82,20 @@ def test_what_is_wrong_with_a_log_is_one_sentence(what: str, tmp_path: Path) -> 
     assert sentence in str(found.value)
     assert str(found.value).startswith(str(tmp_path))
     assert str(found.value).endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("renamed", "sentence"),
+    [
+        ({"body": "id"}, "log.columns, id: unknown column 'body'"),
+        ({"id": "corpus"}, "log.columns: 'corpus' means nothing here"),
+    ],
+)
+def test_a_column_that_does_not_exist_is_named(renamed: dict[str, str], sentence: str, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
+    with pytest.raises(InputError) as found:
+        read_log(tmp_path / "log.csv", "csv", Conventions(columns=renamed))
+    assert sentence in str(found.value)
 
 
 @pytest.mark.parametrize("form", FORMATS)

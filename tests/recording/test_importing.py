@@ -12,8 +12,9 @@ from apo_bench.geometry import pose
 from apo_bench.recording.averaging import average
 from apo_bench.recording.bare import bare_recording
 from apo_bench.recording.camera_file import CameraFile, Conventions
-from apo_bench.recording.importing import Imported, Stated, import_recording
+from apo_bench.recording.importing import Imported, import_recording
 from apo_bench.recording.log import Track
+from apo_bench.recording.ordering import Stated
 from apo_bench.recording.paths import Path, last_straight
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
@@ -118,10 +119,20 @@ def swapped(T: np.ndarray) -> np.ndarray:
     return pose.unpack(np.concatenate([packed[:, :3], np.roll(packed[:, 3:], 1, axis=1)], axis=1))
 
 
+def shortened(T: np.ndarray) -> np.ndarray:
+    out = np.array(T)
+    out[..., :3, 3] /= 10.0
+    return out
+
+
+MODEL = pose.at((0.01, -0.02, 0.03), (20.0, -40.0, 60.0))
+"""Where the frame of each part lies in the model of the tracker, whose poses the mistake is made in."""
 MISTAKES = {
     "quaternions": (swapped, "no contact fits .* order wxyz"),
-    "mirrored": (lambda T: T * FLIP, "no contact fits .* mirrored"),
+    "mirrored": (lambda T: T * FLIP, 'no contact fits .* mirrored .*mirror = "y"'),
     "inverted": (pose.inverse, "no contact fits .* camera in the model"),
+    "centimetres": (shortened, "no contact fits .* 10 times those that were read"),
+    "frames": (lambda T: T @ MODEL @ MODEL, "no contact fits .* the frames in the objects file .* inverted"),
 }
 
 
@@ -129,11 +140,18 @@ MISTAKES = {
 @pytest.mark.parametrize("camera", [GIVEN, KNOWN], ids=["given", "solved"])
 def test_a_usual_mistake_is_named_with_what_mends_it(mistake: str, camera: CameraFile) -> None:
     change, sentence = MISTAKES[mistake]
-    tracks = {part: Track(t, change(T)) for part, (t, T) in seen(NAME, 0.3).items()}
+    tracks = {part: Track(t, change(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
     with pytest.raises(InputError, match=sentence) as found:
-        imported(tracks, camera)
+        import_recording(tracks, camera, load_scenario(NAME), NOTHING, "log.csv", dict.fromkeys(tracks, MODEL))
     assert str(found.value).endswith(".")
     assert "\n" not in str(found.value)
+
+
+def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
+    tracks = seen(NAME, 0.3)
+    aside = Track(tracks["stick"].t, tracks["stick"].T @ pose.at((-0.155, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    assert imported(tracks).unclear == ()
+    assert "operation 3 (stick) leaves a contact open by 1" in imported({**tracks, "stick": aside}).unclear[0]
 
 
 def test_time_that_runs_backwards_is_named() -> None:

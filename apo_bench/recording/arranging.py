@@ -1,0 +1,100 @@
+"""The camera's pose and the order of operations that rests give, and how well all of it fits the scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly
+from apo_bench.errors import InputError, unknown
+from apo_bench.geometry.arrays import Array
+from apo_bench.recording.averaging import Mean
+from apo_bench.recording.camera_file import CameraFile
+from apo_bench.recording.camera_pose import CameraPose, solve_camera
+from apo_bench.recording.contact_fit import ContactFit, contact_fit
+from apo_bench.recording.ordering import Order, Stated, order_of, quiet, stated_order, world_poses
+from apo_bench.recording.standing import starts
+from apo_bench.recording.stays import Stays
+
+_CLOSED = ContactFit(0.0, 0.0)
+
+
+class Arrangement(NamedTuple):
+    """A camera and an order, and how well they fit."""
+
+    camera: CameraPose
+    order: Order
+    start: Poses
+    """Of all parts, world, [m]."""
+    whence: Mapping[str, str]
+    """Part -> where its start is from: `known`, `seen`, `scenario`, `otherwise`."""
+    fits: Mapping[int, ContactFit]
+    """Operation that was seen, counted from 0 -> its worst contact."""
+
+    @property
+    def fit(self) -> ContactFit:
+        """The worst contact of all."""
+        return max(self.fits.values(), key=lambda fit: fit.wrong_mm, default=_CLOSED)
+
+    @property
+    def wrong_mm(self) -> float:
+        return max(self.fit.wrong_mm, self.camera.off_mm, self.camera.off_deg)
+
+
+Arrange = Callable[[Stays], Arrangement]
+"""Says how well stays fit."""
+
+
+def arrange(stays: Stays, camera: CameraFile, assembly: Assembly, planned: Poses, stated: Stated) -> Arrangement:
+    """The camera's pose and the order that these stays give.
+
+    Args:
+        planned: Where the scenario starts every part, world, [m].
+
+    Raises:
+        NoOrder: The moves are not the operations.
+        InputError: Nothing says where the camera stands.
+    """
+    found = camera_pose(stays, camera, planned)
+    X = found.T_world_camera
+    start, whence = starts({part: X @ known[0].rests[0].T for part, known in stays.items()}, camera.known, planned)
+    order = (
+        stated_order(assembly, stays, stated.ends)
+        if stated.ends
+        else order_of(assembly, stays, start, X, stated.unseen)
+    )
+    fits = {
+        k: contact_fit(assembly, k, world_poses(stays, quiet(assembly, stays, order.stays, k), start, X))
+        for k, stay in enumerate(order.stays)
+        if stay is not None
+    }
+    return Arrangement(found, order, start, whence, fits)
+
+
+def camera_pose(stays: Stays, camera: CameraFile, planned: Poses) -> CameraPose:
+    """Where the camera stands: as stated, or solved from the first rests of parts on known places.
+
+    Raises:
+        InputError: Neither is stated, or a known part is not tracked.
+    """
+    if camera.T_world_camera is not None:
+        return CameraPose(camera.T_world_camera)
+    if not camera.known:
+        raise InputError(
+            "the camera file states neither where the camera stands nor a part on a known place; add a table [pose], "
+            'or [known] with parts such as castle1 = "start".'
+        )
+    for part in camera.known:
+        if part not in stays:
+            raise InputError(f"the camera file, known: {unknown('tracked part', part, stays)}")
+    known = {part: planned[part] if T is None else T for part, T in camera.known.items()}
+    seen = {part: stays[part][0].rests[0].mean for part in known}
+    return solve_camera(known, seen, staying(camera, next(iter(seen.values()))))
+
+
+def staying(camera: CameraFile, mean: Mean) -> Array:
+    """The covariance of an error that stays while a part rests, (6, 6); as large as that of one frame if not stated."""
+    return mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2)
