@@ -80,6 +80,7 @@ def _import(
     from apo_bench.recording.bare import deviations
     from apo_bench.recording.importing import import_recording
     from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.recording_drawn import drawing_of, unfit_drawing
     from apo_bench.show.recording_picture import draw_recording
     from apo_bench.show.recording_text import (
         PATH_HEAD,
@@ -92,7 +93,14 @@ def _import(
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
-    found = import_recording(tracks, camera, loaded, _stated(*said, len(loaded.assembly)), log.file, objects.models)
+    stated = _stated(*said, len(loaded.assembly))
+    try:
+        found = import_recording(tracks, camera, loaded, stated, log.file, objects.models)
+    except InputError:
+        if picture is not None:
+            draw_recording(unfit_drawing(log, tracks, camera, loaded), picture)
+            typer.echo(f"Wrote {picture}, as it was read")
+        raise
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [one.rest for one in found.operations]
     X, times = found.camera.T_world_camera, {part: track.t for part, track in tracks.items()}
@@ -112,13 +120,13 @@ def _import(
         write_csv(paths, PATH_HEAD, path_rows(found))
         typer.echo(f"Wrote {paths}")
     if picture is not None:
-        ended = [(main, rest.begins) for main, rest in zip(mains, rests, strict=True) if rest is not None]
-        draw_recording(tracks, found.stays, X, picture, ended, loaded.assembly.solids, f"{log.file}, {loaded.name}")
+        draw_recording(drawing_of(found, log, tracks, camera), picture)
         typer.echo(f"Wrote {picture}")
 
 
 def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
     from apo_bench.recording.bare import bare_recording, deviations, goals_of
+    from apo_bench.show.recording_drawn import bare_drawing
     from apo_bench.show.recording_picture import draw_recording
     from apo_bench.show.recording_text import camera_lines, observation_table, put_lines, rest_lines
 
@@ -133,9 +141,7 @@ def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, pi
     )
     typer.echo(f"\nWrote {out}")
     if picture is not None:
-        draw_recording(
-            tracks, found.stays, X, picture, [(put.part, put.rest.begins) for put in found.puts], None, log.file
-        )
+        draw_recording(bare_drawing(found, log, tracks), picture)
         typer.echo(f"Wrote {picture}")
 
 

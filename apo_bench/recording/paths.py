@@ -16,6 +16,8 @@ _STRAIGHT = 4.0
 _LEAST_M = 5e-3
 """A line that is shorter says no direction."""
 _FEWEST = 4
+_SPIKE_M = 0.015
+"""A frame that is so far from the median of its neighbours is wrong: no hand turns off so fast."""
 
 
 @final
@@ -50,7 +52,7 @@ def last_straight(path: Path, goal: Array) -> Straight | None:
 
     Noise is that of the frames themselves: what neighbours differ by beside their common motion.
     """
-    points = pose.apply(pose.inverse(goal), path.T[:, :3, 3])
+    points = _without_spikes(pose.apply(pose.inverse(goal), path.T[:, :3, 3]))
     if len(points) < _FEWEST:
         return None
     jerks = np.diff(points, 3, axis=0)
@@ -71,3 +73,11 @@ def last_straight(path: Path, goal: Array) -> Straight | None:
             axis = Vt[0] if Vt[0] @ way > 0.0 else -Vt[0]
             found = Straight(axis, float(away))
     return found
+
+
+def _without_spikes(points: Array) -> Array:
+    """Points (n, 3) without frames that are far from the median of the five about them, which the next two are not."""
+    if len(points) < 5:
+        return points
+    five = np.pad(points, ((2, 2), (0, 0)), mode="edge")[np.arange(len(points))[:, None] + np.arange(5)]
+    return np.asarray(points[np.linalg.norm(points - np.median(five, axis=1), axis=1) < _SPIKE_M])

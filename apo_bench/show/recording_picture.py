@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.recording.log import Track
-from apo_bench.recording.stays import Stay
+from apo_bench.recording.stays import Stays
 from apo_bench.show.save import save_figure
 
 _AXES = ("#c0392b", "#2e8b57", "#2456a6")
@@ -21,53 +22,84 @@ _AXIS_M = 0.03
 _EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if bin(i ^ j).count("1") == 1]
 
 
-def draw_recording(
-    tracks: Mapping[str, Track],
-    stays: Mapping[str, Sequence[Stay]],
-    X: Array,
-    out: Path,
-    ended: Sequence[tuple[str, float]] = (),
-    solids: Mapping[str, Solid] | None = None,
-    title: str = "",
-) -> None:
-    """Write the picture as PNG.
+class Straight(NamedTuple):
+    """The last straight piece of a path."""
 
-    Args:
-        tracks: Of parts, camera from part.
-        X: (4, 4), world from camera, [m].
-        ended: Part of each operation, and when it came to rest.
-        solids: To draw the box around each part.
-    """
+    part: str
+    label: str
+    begin: Array
+    """(3,), world, [m]."""
+    end: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """What is drawn of a recording."""
+
+    title: str
+    tracks: Mapping[str, Track]
+    """Of parts, camera from part."""
+    stays: Stays
+    T_world_camera: Array | None
+    """(4, 4), [m]; None: not known, and all is drawn in the frame of the camera."""
+    ended: Sequence[tuple[str, float]] = ()
+    """Part of each operation, and when it came to rest, [s]."""
+    solids: Mapping[str, Solid] = field(default_factory=dict)
+    """For the box around each part."""
+    places: Mapping[str, Array] = field(default_factory=dict)
+    """Part -> the known place on which it should start, (4, 4), world, [m]."""
+    straight: Sequence[Straight] = ()
+
+
+def draw_recording(drawing: Drawing, out: Path) -> None:
+    """Write the picture as PNG: all frames, the parts from near, and when each part rested."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13.0, 6.2), layout="constrained")
+    figure = Figure(figsize=(17.0, 6.4), layout="constrained")
     FigureCanvasAgg(figure)
-    room = figure.add_subplot(1, 2, 1, projection="3d")
-    clock = figure.add_subplot(1, 2, 2)
-    _draw_frame(room, np.eye(4), 0.08, "world")
-    _draw_frame(room, X, 0.08, "camera")
-    points = [np.zeros(3), X[:3, 3]]
-    for color, (part, track) in zip(_colors(len(tracks)), tracks.items(), strict=True):
-        path = (X @ track.T)[:, :3, 3]
-        room.plot(*path.T, color=color, linewidth=0.8, alpha=0.7, label=part)
-        for stay in (stays[part][0], stays[part][-1]) if stays[part] else ():
-            T = X @ stay.rests[-1].T
-            _draw_frame(room, T, _AXIS_M, "")
-            points.append(T[:3, 3])
-            if solids is not None and part in solids:
-                _draw_box(room, solids[part], T, color)
-    _level(room, np.array(points))
+    grid = figure.add_gridspec(1, 3, width_ratios=[1.0, 1.35, 1.15])
+    room, near = (figure.add_subplot(grid[i], projection="3d") for i in (0, 1))
+    X = np.eye(4) if drawing.T_world_camera is None else drawing.T_world_camera
+    if drawing.T_world_camera is not None:
+        _draw_frame(room, np.eye(4), 0.12, "world")
+    _draw_frame(room, X, 0.12, "camera")
+    for axes, reach in ((room, 0.05), (near, _AXIS_M)):
+        _draw_parts(axes, drawing, X, reach, axes is near)
+    ends = [(X @ track.T)[i] for track in drawing.tracks.values() for i in (0, -1)]
+    rests = [X @ known[i].rests[-1].T for known in drawing.stays.values() if known for i in (0, -1)]
+    places = np.array([T[:3, 3] for T in (*(rests or ends), *drawing.places.values())])
+    _level(room, np.concatenate([places, X[None, :3, 3], np.zeros((1, 3))]), 0.1)
+    _level(near, places, 0.06)
     room.set_title("frames: x red, y green, z blue; mm", fontsize=10)
-    room.legend(loc="upper left", fontsize=8, frameon=False)
-    _draw_times(clock, tracks, stays, ended)
-    figure.suptitle(title, fontsize=11)
+    near.set_title("first and last place; dashed: known place; thick: last straight piece", fontsize=10)
+    near.legend(loc="upper left", fontsize=8, frameon=False)
+    _draw_times(figure.add_subplot(grid[2]), drawing)
+    figure.suptitle(drawing.title, fontsize=11)
     save_figure(figure, out, given="--picture ")
 
 
-def _draw_times(
-    axis: Any, tracks: Mapping[str, Track], stays: Mapping[str, Sequence[Stay]], ended: Sequence[tuple[str, float]]
-) -> None:
+def _draw_parts(axes: Any, drawing: Drawing, X: Array, reach: float, close: bool) -> None:
+    for color, (part, track) in zip(_colors(len(drawing.tracks)), drawing.tracks.items(), strict=True):
+        path = (X @ track.T)[:, :3, 3]
+        axes.plot(*path.T, color=color, linewidth=0.8, alpha=0.7, label=part)
+        known = drawing.stays[part]
+        for stay, name in zip((known[0], known[-1]) if known else (), (part, ""), strict=False):
+            T = X @ stay.rests[-1].T
+            _draw_frame(axes, T, reach, name if close else "")
+            if part in drawing.solids:
+                _draw_box(axes, drawing.solids[part], T, color, "-")
+        if close and part in drawing.places and part in drawing.solids:
+            _draw_box(axes, drawing.solids[part], drawing.places[part], "black", ":")
+        for piece in drawing.straight if close else ():
+            if piece.part == part:
+                ends = np.array([piece.begin, piece.end])
+                axes.plot(*ends.T, color=color, linewidth=4.0, alpha=0.6, label=piece.label)
+
+
+def _draw_times(axis: Any, drawing: Drawing) -> None:
+    tracks, stays = drawing.tracks, drawing.stays
     rows = {part: i for i, part in enumerate(tracks)}
     for color, (part, track) in zip(_colors(len(tracks)), tracks.items(), strict=True):
         first = stays[part][0].rests[0].T if stays[part] else track.T[0]
@@ -76,7 +108,7 @@ def _draw_times(
         for stay in stays[part]:
             for rest in stay.rests:
                 axis.barh(rows[part], rest.ends - rest.begins, left=rest.begins, height=0.8, color=color, alpha=0.25)
-    for k, (part, t) in enumerate(ended, 1):
+    for k, (part, t) in enumerate(drawing.ended, 1):
         axis.text(t, rows[part] + 0.42, f"{k}", fontsize=10, ha="left", va="bottom", fontweight="bold")
         axis.plot([t, t], [rows[part] - 0.4, rows[part] + 0.5], color="black", linewidth=0.8)
     axis.set_yticks(list(rows.values()), list(rows))
@@ -93,23 +125,29 @@ def _draw_frame(axis: Any, T: Array, size: float, name: str) -> None:
         axis.text(*T[:3, 3], f" {name}", fontsize=9)
 
 
-def _draw_box(axis: Any, solid: Solid, T: Array, color: str) -> None:
+def _draw_box(axis: Any, solid: Solid, T: Array, color: str, style: str) -> None:
     low = np.min([piece.center - piece.half for piece in solid.pieces], axis=0)
     high = np.max([piece.center + piece.half for piece in solid.pieces], axis=0)
     corners = np.array([[(low, high)[(i >> axis_) & 1][axis_] for axis_ in range(3)] for i in range(8)])
     world = pose.apply(T, corners)
     for i, j in _EDGES:
-        axis.plot(*world[[i, j]].T, color=color, linewidth=0.7, alpha=0.8)
+        axis.plot(*world[[i, j]].T, color=color, linestyle=style, linewidth=0.9, alpha=0.8)
 
 
-def _level(axis: Any, points: Array) -> None:
-    """The same scale in all directions, in mm."""
-    middle, reach = (points.max(axis=0) + points.min(axis=0)) / 2, max(float(np.ptp(points, axis=0).max()) / 2, 0.1)
+def _level(axis: Any, points: Array, least: float) -> None:
+    """The same scale in all directions, in mm; at least so much, [m], to each side."""
+    from matplotlib.ticker import MaxNLocator
+
+    middle, reach = (
+        (points.max(axis=0) + points.min(axis=0)) / 2,
+        max(0.55 * float(np.ptp(points, axis=0).max()), least),
+    )
     axis.set_xlim(middle[0] - reach, middle[0] + reach)
     axis.set_ylim(middle[1] - reach, middle[1] + reach)
     axis.set_zlim(middle[2] - reach, middle[2] + reach)
     axis.set_box_aspect((1, 1, 1))
     for each in (axis.xaxis, axis.yaxis, axis.zaxis):
+        each.set_major_locator(MaxNLocator(5))
         each.set_major_formatter(lambda x, _: f"{1e3 * x:.0f}")
     axis.view_init(elev=28.0, azim=-60.0)
 

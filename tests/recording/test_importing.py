@@ -88,6 +88,7 @@ def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> No
     noise = 3e-4 * np.random.default_rng(0).standard_normal((60, 3))
     T = np.tile(np.eye(4), (60, 1, 1))
     T[:, :3, 3] = np.concatenate([bent, down]) + noise
+    T[50, :3, 3] += [0.0, 0.08, 0.0]  # a frame that is wrong
     found = last_straight(Path(np.arange(60.0), T), np.eye(4))
     assert found is not None
     assert found.direction @ [0.0, 0.0, -1.0] > np.cos(np.radians(5.0))
