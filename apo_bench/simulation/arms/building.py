@@ -16,7 +16,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.description import ArmDescription, read_description
 from apo_bench.simulation.arms.home import find_home
 from apo_bench.simulation.arms.loading import compiled, files_of, load_model
-from apo_bench.simulation.arms.measuring import PROBE, Measured, measure
+from apo_bench.simulation.arms.measuring import Measured, measure
+from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
 from apo_bench.simulation.scene.arm import Arm, Limits
 

@@ -1,0 +1,80 @@
+"""Which surfaces of a gripper hold: of the two groups that move towards each other, what reaches farthest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.rig import Rig, below, frame_of
+
+_MOVES_M, _TIP_M = 0.001, 0.012
+"""What moves less than the first is no finger; what ends within the second of the farthest end is of a pad."""
+_SNAP = np.cos(np.radians(1.0))
+
+
+def pads_of(
+    rig: Rig, said: GripperDescription, way: Array, flange: int
+) -> tuple[tuple[list[int], list[int]], Array, Array]:
+    """The pads of both sides, by geom; the closing direction and the way ahead, unit vectors, world."""
+    model, data = rig.model, rig.data
+    hanging = below(model, flange)
+    touching = [
+        g
+        for g in range(model.ngeom)
+        if int(model.geom_bodyid[g]) in hanging and (model.geom_contype[g] or model.geom_conaffinity[g])
+    ]
+    moving = [g for g in touching if np.linalg.norm(way[g]) > _MOVES_M]
+    if said.pads is not None:
+        named = [[g for g in touching if _is(model, g, name)] for name in said.pads]
+        for name, found in zip(said.pads, named, strict=True):
+            if not found:
+                raise InputError(f"{rig.path}, gripper: nothing that could touch a part is called '{name}'.")
+        moving = named[0] + named[1]
+    if len(moving) < 2:
+        raise InputError(
+            f"{rig.path}: nothing of the gripper moves between its ends of command; state 'open' and 'closed'."
+        )
+    _, _, axes = np.linalg.svd(way[moving], full_matrices=False)
+    across = axes[0]
+    first = [g for g in moving if way[g] @ across > 0.3 * np.linalg.norm(way[g])]
+    second = [g for g in moving if way[g] @ across < -0.3 * np.linalg.norm(way[g])]
+    if said.pads is not None:
+        first, second = named
+    if not first or not second:
+        raise InputError(f"{rig.path}: the fingers do not close on each other; name both 'pads' in 'gripper'.")
+    across = _snapped(across, frame_of(rig, flange)[:3, :3])
+    middle = np.mean([data.geom_xpos[g] for g in first + second], axis=0) - data.xpos[flange]
+    ahead = middle - (middle @ across) * across
+    if np.linalg.norm(ahead) < 1e-3:
+        raise InputError(f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.")
+    ahead = _snapped(ahead / np.linalg.norm(ahead), frame_of(rig, flange)[:3, :3], np.cos(np.radians(10.0)))
+    if said.pads is None:
+        most = max(reach_of(model, data, g, ahead) for g in first + second)
+        first = [g for g in first if reach_of(model, data, g, ahead) > most - _TIP_M]
+        second = [g for g in second if reach_of(model, data, g, ahead) > most - _TIP_M]
+    if not first or not second:
+        raise InputError(f"{rig.path}: one finger is longer than the other; name both 'pads' in 'gripper'.")
+    return (first, second), across, ahead
+
+
+def reach_of(model: Any, data: Any, geom: int, ahead: Array) -> float:
+    """How far the box around a geom reaches along a direction, world, [m]."""
+    along = data.geom_xmat[geom].reshape(3, 3).T @ ahead
+    centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+    return float(data.geom_xpos[geom] @ ahead + centre @ along + half @ np.abs(along))
+
+
+def _is(model: Any, geom: int, name: str) -> bool:
+    """Whether a geom, or a body that it is fixed to, has a name."""
+    return name in (model.geom(geom).name, model.body(int(model.geom_bodyid[geom])).name)
+
+
+def _snapped(direction: Array, R: Array, near: float = float(_SNAP)) -> Array:
+    """An axis of a frame where a direction is as good as that, else the direction."""
+    along = R.T @ direction
+    k = int(np.abs(along).argmax())
+    return np.asarray(np.sign(along[k]) * R[:, k] if abs(along[k]) > near else direction)

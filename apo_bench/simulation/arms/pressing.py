@@ -1,0 +1,65 @@
+"""How hard the pads of a gripper push on a part between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.rig import STEP_S, Rig
+
+PROBE = "probe"
+"""The body between the pads on which their force is measured; it stands elsewhere until then."""
+PROBE_WIDE = 0.5
+"""How wide it is, as a part of the opening."""
+_AWAY_M = 1.0
+_SQUEEZES_M, _MOST_N = (0.03, 0.015, 0.008, 0.004), 60.0
+"""How far inside a part fingers are sent at most: less where they press harder than this."""
+_PROBE_HIGH_M, _STEPS, _SLOWLY_S, _LOOKS = 0.006, 16, 0.02, 100
+"""Half of its height, about the tip; in how many steps a gripper is closed on it, and how long each takes; steps over
+which the force is averaged."""
+
+
+def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, Array]]) -> tuple[float, float]:
+    """How hard each pad pushes on a part between them, [N], and how far inside it they are sent for that, [m].
+
+    Farther means harder where the drive is soft; it is not more than a part should be pressed by.
+    """
+    model, data = rig.model, rig.data
+    opening, opened = table[-1][0], table[-1][1]
+    body = model.body(PROBE).id
+    geom = int(model.body_geomadr[body])
+    half = np.array([PROBE_WIDE * opening, 0.02, _PROBE_HIGH_M])
+    model.geom_size[geom], model.geom_rbound[geom] = half, float(np.linalg.norm(half))
+    model.geom_aabb[geom, 3:] = half
+    mocap = int(model.body_mocapid[body])
+    data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
+    force = squeeze = 0.0
+    for squeeze in _SQUEEZES_M:
+        rig.settle(opened)
+        data.mocap_pos[mocap] = at
+        mujoco.mju_mat2Quat(data.mocap_quat[mocap], np.ascontiguousarray(R).ravel())
+        wanted, openings = half[0] - squeeze, [row[0] for row in table]
+        closed = np.array([np.interp(wanted, openings, column) for column in np.array([row[1] for row in table]).T])
+        force = _pressed(rig, opened, closed, R[:, 0])
+        data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
+        if force <= _MOST_N:
+            break
+    return force, squeeze
+
+
+def _pressed(rig: Rig, opened: Array, closed: Array, across: Array) -> float:
+    """The mean force of a pad while it presses, [N]."""
+    data = rig.data
+    for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
+        rig.settle(opened + part * (closed - opened), _SLOWLY_S)
+    rig.settle(closed)
+    total, wrench = 0.0, np.zeros(6)
+    for _ in range(_LOOKS):
+        rig.settle(closed, STEP_S)
+        for c in range(data.ncon):
+            mujoco.mj_contactForce(rig.model, data, c, wrench)
+            total += abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
+    return total / 2 / _LOOKS

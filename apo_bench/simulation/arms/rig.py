@@ -1,0 +1,144 @@
+"""A compiled arm in which only the gripper moves: no gravity, the arm stands still."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.scene.physics import physics
+from apo_bench.simulation.scene.world import Ints
+
+STEP_S = 0.001
+_LONGEST_S, _STILL, _QUIET = 1.5, 2e-3, 20
+"""Longest time of one command; joints slower than the second rest after so many steps."""
+_MOST_ACTUATORS = 4
+
+
+class Rig(NamedTuple):
+    """A model in which only the gripper moves."""
+
+    model: Any
+    data: Any
+    arm: Ints
+    """Addresses of the arm's joints in `qpos`."""
+    arm_dof: Ints
+    home: Array
+    actuators: Ints
+    joints: Ints
+    path: Path
+
+    def settle(self, command: Array, most_s: float = _LONGEST_S) -> float:
+        """Drive until nothing moves; returns how long it took, [s]."""
+        model, data = self.model, self.data
+        data.ctrl[self.actuators] = command
+        dof = model.jnt_dofadr[self.joints]
+        quiet = 0
+        steps, most = 0, round(most_s / STEP_S)
+        while steps < most and quiet < _QUIET:
+            steps += 1
+            mujoco.mj_step(model, data)
+            data.qpos[self.arm], data.qvel[self.arm_dof] = self.home, 0.0
+            quiet = quiet + 1 if np.abs(data.qvel[dof]).max() < _STILL else 0
+        if not np.isfinite(data.qpos).all() or data.warning.number.any():
+            raise InputError(f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.")
+        mujoco.mj_kinematics(model, data)
+        return STEP_S * steps
+
+
+def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, said: GripperDescription) -> Rig:
+    arm = [model.joint(name).id for name in joints]
+    hanging = below(model, flange)
+    own = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in hanging and j not in arm]
+    scalar = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    if not own or any(int(model.jnt_type[j]) not in scalar for j in own):
+        what = "no joint" if not own else "a joint that neither turns nor slides"
+        raise InputError(
+            f"{path}: the gripper has {what}; give its MJCF in 'gripper', with hinges or slides and what drives them."
+        )
+    model.opt.timestep, model.opt.gravity[:] = STEP_S, 0.0
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    hard = physics(STEP_S)
+    model.geom_solref[:], model.geom_solimp[:] = hard.solref, hard.solimp
+    model.opt.cone, model.opt.impratio = int(mujoco.mjtCone.mjCONE_ELLIPTIC), hard.impratio
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+    data = mujoco.MjData(model)
+    at = np.array([model.jnt_qposadr[j] for j in arm])
+    data.qpos[at] = home
+    mujoco.mj_forward(model, data)
+    actuators = _actuators(model, data, path, own, said)
+    return Rig(model, data, at, np.array([model.jnt_dofadr[j] for j in arm]), home, actuators, np.array(own), path)
+
+
+def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], said: GripperDescription) -> Ints:
+    """Those that are named, or that push a joint of the gripper."""
+    if said.actuators is not None:
+        known = [model.actuator(i).name for i in range(model.nu)]
+        if missing := [name for name in said.actuators if name not in known]:
+            raise InputError(f"{path}: there is no actuator '{missing[0]}'; known are {', '.join(known) or 'none'}.")
+        return np.array([model.actuator(name).id for name in said.actuators])
+    moment = np.zeros((model.nu, model.nv))
+    if model.nu:
+        mujoco.mju_sparse2dense(
+            moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
+        )
+    pushes = np.abs(moment[:, [int(model.jnt_dofadr[j]) for j in own]]).max(axis=1, initial=0.0) > 0.0
+    found: Ints = np.flatnonzero(pushes)
+    if not 0 < len(found) <= _MOST_ACTUATORS:
+        raise InputError(
+            f"{path}: {len(found)} actuators move the gripper; name the 1 to {_MOST_ACTUATORS} that open it in "
+            "'gripper', 'actuators'."
+        )
+    return found
+
+
+def ends_of(rig: Rig, said: GripperDescription) -> list[tuple[float, ...]]:
+    """Every combination of the ends of the commands."""
+    for given in (said.open, said.closed):
+        if given is not None and len(given) != len(rig.actuators):
+            raise InputError(
+                f"{rig.path}, gripper: 'open' and 'closed' have one number for each of {len(rig.actuators)} actuators."
+            )
+    if said.open is not None and said.closed is not None:
+        return [tuple(said.open), tuple(said.closed)]
+    model = rig.model
+    ranges = []
+    for a in rig.actuators:
+        low, high = model.actuator_ctrlrange[a]
+        if not model.actuator_ctrllimited[a]:
+            name = model.actuator(int(a)).name
+            raise InputError(
+                f"{rig.path}: the command of the actuator '{name}' has no range; state 'open' and 'closed' in "
+                "'gripper'."
+            )
+        ranges.append((float(low), float(high)))
+    return list(product(*ranges))
+
+
+def poses_after(rig: Rig, command: Array) -> Array:
+    """Where the shapes of the gripper are after a command, (k, 3), [m]."""
+    rig.settle(command)
+    bodies = rig.model.jnt_bodyid[rig.joints]
+    return np.array(rig.data.xipos[bodies])
+
+
+def frame_of(rig: Rig, body: int) -> Array:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rig.data.xmat[body].reshape(3, 3), rig.data.xpos[body]
+    return T
+
+
+def below(model: Any, body: int) -> set[int]:
+    """A body and what hangs on it."""
+    found = {body}
+    for b in range(body + 1, model.nbody):
+        if int(model.body_parentid[b]) in found:
+            found.add(b)
+    return found
