@@ -31,6 +31,7 @@ from apo_bench.cli import report as cli_report
 from apo_bench.cli import scenario as cli_scenario
 from apo_bench.cli import show as cli_show
 from apo_bench.cli import sweep_command as cli_sweep
+from apo_bench.cli import view as cli_view
 from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import Interrupted
@@ -153,6 +154,7 @@ for commands in (
         cli_show,
         cli_sweep,
         cli_report,
+        cli_view,
     ),
 ):
     commands.register(app)

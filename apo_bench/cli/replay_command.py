@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from apo_bench.cli.arguments import NO_RESULT, check_writable
 from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import interrupted
+from apo_bench.cli.view import Port
+from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
+
+if TYPE_CHECKING:
+    from apo_bench.trial.story import Story
 
 
 def register(app: typer.Typer) -> None:
@@ -32,6 +38,8 @@ def replay(
     ] = None,
     corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     cache: CacheFolder = None,
+    view: Annotated[bool, typer.Option("--view", help="Then look at it and step through it, as `view` does.")] = False,
+    port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
     **asked: Any,
 ) -> None:
@@ -45,6 +53,12 @@ def replay(
     ):
         if path is not None:
             check_writable(path, option, endings)
+    if view:
+        from apo_bench.show.viewing import choose_place
+
+        place = choose_place(port)
+    elif port is not None:
+        raise InputError(f"--port {port}, which is for --view, was given without it; leave it out.")
     request = Request(
         scenario=scenario,
         asked=asked,
@@ -55,9 +69,10 @@ def replay(
         corrector_limit_s=corrector_limit,
         cache=cache,
     )
+    stories: list[Story] = []
     try:
         with redirect_output(as_json):
-            row = run_one(request)
+            row = run_one(request, stories.append if view else None)
     except KeyboardInterrupt as error:
         raise interrupted(error) from error
     if as_json:
@@ -68,5 +83,11 @@ def replay(
         typer.echo(f"apo-bench: nothing was replayed, so {video} was not written.", err=True)
     elif video is not None:
         typer.echo(f"Wrote {video}", err=as_json)
+    if view and not stories:
+        typer.echo("apo-bench: nothing was replayed, so there is nothing to view.", err=True)
+    elif view:
+        from apo_bench.show.viewing import view as look_at
+
+        look_at(stories[0], place, port, partial(typer.echo, err=as_json))
     if row["success"] is None:
         raise typer.Exit(NO_RESULT)

@@ -13,6 +13,8 @@ from apo_bench.assembly.placement import placements
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.row import Row
 from apo_bench.records.settings import TrialSettings
+from apo_bench.scenario.layout import layout_at
+from apo_bench.simulation.film.still import stages
 from apo_bench.simulation.film.track import Chapter, HandTrack, ReplayTrack
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import Recording, watch_again
@@ -31,6 +33,13 @@ class Story:
     """Where the parts should be when all is done."""
     goals: Mapping[str, Array] = field(default_factory=dict)
     """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
+
+
+def asked_for(scene: Scene) -> Story:
+    """What a scenario asks for, operation by operation."""
+    layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
+    chapter = stages(scene, layout.start, layout.goals)
+    return Story(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.goals)[-1])
 
 
 def told(

@@ -43,6 +43,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"replay .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
     r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
     r"eye ": "many depth images; tests/depth_camera runs them",
+    r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/show steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",

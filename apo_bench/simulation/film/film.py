@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import world_bounds
 from apo_bench.simulation.film.captions import Caption, captioned, ending_lines, one_line
 from apo_bench.simulation.film.track import BY_HAND, Chapter, Moment
@@ -26,7 +27,7 @@ SPEED = 2.0
 _FPS, _GIF_FPS = 20.0, 8.0
 _ENDING_S = 2.5
 """So long the end of a chapter stands still, with what came of it."""
-_AZIMUTH_DEG, _ELEVATION_DEG = 128.0, -24.0
+AZIMUTH_DEG, ELEVATION_DEG = 128.0, -24.0
 _NEAREST_M, _FARTHER, _ROOM_M = 0.12, 1.1, 0.04
 """How far the camera stands off: this and so many diagonals of what it looks at; room above it for what comes down."""
 
@@ -131,10 +132,14 @@ def _moved(operation: Operation) -> str:
     return f"{operation.main}{carried}"
 
 
-def _looks_at(assembly: Assembly, states: Sequence[Poses]) -> Any:
-    """A camera that sees all parts that are ever moved, where they are in these states."""
+def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:
+    """What to look at, (3,), and from how far, [m], to see all parts that are ever moved, in these states."""
     posed = [(assembly.solids[p], poses[p]) for poses in states for p in assembly.solids if p not in assembly.fixed]
     low, high = world_bounds(posed)
     high = high + np.array([0.0, 0.0, _ROOM_M])
     far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
-    return camera_view((low + high) / 2, far, _AZIMUTH_DEG, _ELEVATION_DEG)
+    return (low + high) / 2, far
+
+
+def _looks_at(assembly: Assembly, states: Sequence[Poses]) -> Any:
+    return camera_view(*framing(assembly, states), AZIMUTH_DEG, ELEVATION_DEG)

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.simulation.robot.doing import Doing
 from apo_bench.simulation.robot.robot import TICK_S
 from apo_bench.simulation.scene.world import World
 
 BY_HAND = "by hand"
+NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
 
 
 class Moment(NamedTuple):
@@ -54,7 +55,7 @@ class ReplayTrack:
         self.plan = plan
 
     def inspect(self, data: Any, doing: Doing) -> None:
-        self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, np.zeros((0, 3))))
+        self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, NO_HANDS))
 
     def __call__(self, data: Any) -> None:
         self.inspect(data, Doing(None, "", 0.0))

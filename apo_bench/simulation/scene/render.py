@@ -57,14 +57,19 @@ def picture_with_arm(
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
     data = _at(scene.work, scene, poses)
-    for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
-        data.joint(f"arm/{joint}").qpos = q
-    for finger, at in zip(scene.arm.fingers, scene.arm.finger_joints(scene.arm.opening_m), strict=True):
-        data.joint(f"arm/{finger}").qpos = at
+    arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
     mujoco.mj_forward(scene.work.model, data)
     return _drawn(scene.work, data, width, height, camera, more)
+
+
+def arm_home(scene: Scene, data: Any) -> None:
+    """Put the arm at home in a state of its world, its fingers open."""
+    for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):
+        data.joint(f"arm/{joint}").qpos = q
+    for finger, at in zip(scene.arm.fingers, scene.arm.finger_joints(scene.arm.opening_m), strict=True):
+        data.joint(f"arm/{finger}").qpos = at
 
 
 def camera_view(

@@ -1,0 +1,71 @@
+"""A finished trial of a sweep, run again to be looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from apo_bench.errors import InputError
+from apo_bench.io.reading import each_line
+from apo_bench.records.asked import settings_of
+from apo_bench.records.row import Row
+from apo_bench.records.run.checked import row_of
+from apo_bench.records.run.own_code import own_code
+from apo_bench.records.run.run_file import read_run
+from apo_bench.records.salt import read_salt
+from apo_bench.report.run_facts import scenario_files
+from apo_bench.simulation.film.track import ReplayTrack
+from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.scene import scene_of
+from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.story import Story, told
+from apo_bench.trial.trial import noise_of, run_trial
+
+
+def trial_again(folder: Path, number: int | None, salt_file: Path | None = None) -> tuple[Row, Story]:
+    """A trial of a sweep and its row.
+
+    Args:
+        number: Of its line in `trials.jsonl`, from 1; None: the first failure, or the first trial.
+        salt_file: Of a salted sweep.
+
+    Raises:
+        InputError: No such trial.
+        RuntimeError: It cannot be run again, or had nothing to see.
+    """
+    number, row = _chosen(folder, number)
+    if named := own_code(row):
+        raise RuntimeError(
+            f"trial {number} names code that does not come with the package ({', '.join(named)}), which no file makes "
+            "run; give it to `apo-bench replay .. --view` yourself."
+        )
+    name = row["scenario"]
+    salt = None if salt_file is None else read_salt(salt_file)
+    spec = replace(settings_of(row, scenario_files(read_run(folder)).get(name, name)), salt=salt)
+    scene = scene_of(spec)
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
+    if spec_hash(spec, content) != row["spec_hash"]:
+        secret = row["salt"] is not None and salt is None
+        why = "its salt was not given; name its file by --salt-file" if secret else "other code or assets made it"
+        raise RuntimeError(f"trial {number} of {folder} cannot be run again: {why}.")
+    recording, track = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt), ReplayTrack()
+    again = run_trial(spec, scene, recording=recording, content=content, watch=track)
+    if again["sim_seconds"] is None:
+        raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")
+    seen = observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
+    return again, told(spec, scene, seen, track, again, recording)
+
+
+def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:
+    path, first, k = folder / "trials.jsonl", None, 0
+    for k, line in each_line(path, "table of trials"):
+        if number is not None and k != number:
+            continue
+        row = row_of(line, f"{path}, line {k}")
+        if number is not None or (row["success"] is False and row["sim_seconds"] is not None):
+            return k, row
+        first = first or (k, row)
+    if first is None:
+        wanted = "there is no trial" if number is None else f"--trial {number} was given; 1 to {k} are there"
+        raise InputError(f"{path}: {wanted}.")
+    return first

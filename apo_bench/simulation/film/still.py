@@ -1,0 +1,127 @@
+"""What is shown at one moment of a trial: parts, arm and hands in one world, and what is laid over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.placement import placements
+from apo_bench.assembly.topology import PartFace
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.solid import Face
+from apo_bench.simulation.film.track import NO_HANDS, Chapter, Moment
+from apo_bench.simulation.robot.doing import Doing
+from apo_bench.simulation.scene.render import arm_home
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import initial_state, place
+
+Color = tuple[float, float, float]
+IN_PLACE = "in place"
+HAND_M, HAND_COLOR = 0.012, (0.90, 0.70, 0.60)
+GHOST_OPACITY = 0.4
+_OFF_M = 0.004
+"""How far before a flat face its name stands."""
+
+
+class Ghost(NamedTuple):
+    """Parts drawn once more, where they are believed or should be."""
+
+    name: str
+    poses: Poses
+    color: Color
+
+
+class Still(NamedTuple):
+    """One moment with what is laid over it."""
+
+    chapter: Chapter
+    moment: Moment
+    words: tuple[str, ...]
+    faces: tuple[PartFace, ...]
+    """Whose names are written on them."""
+    ghosts: tuple[Ghost, ...]
+
+
+def stages(scene: Scene, start: Poses, goals: Array) -> Chapter:
+    """What a scenario asks for: the parts before the first operation and after each, a second apart."""
+    world = scene.work
+    data, made = initial_state(world, start), list[Moment]()
+    arm_home(scene, data)
+    for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
+        for part in world.free:
+            place(world, data, part, poses[part])
+        doing = Doing(None if k < 0 else k, IN_PLACE, 0.0)
+        made.append(Moment(k + 1.0, np.array(data.qpos), doing, NO_HANDS))
+    return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(made), "", None)
+
+
+def part_poses(chapter: Chapter, moment: Moment) -> Poses:
+    """Where every part is, world frame, [m]."""
+    world = chapter.world
+    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in world.qpos.items()}
+    return {**{part: chapter.start[part] for part in world.fixed}, **free}
+
+
+def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: Moment) -> None:
+    """Bring a state of the world of the robot to a moment; while a human demonstrates, the arm is at home."""
+    if chapter.world is scene.work:
+        data.qpos[:] = moment.qpos
+    else:
+        arm_home(scene, data)
+        for part, T in part_poses(chapter, moment).items():
+            if part in scene.work.qpos:
+                place(scene.work, data, part, T)
+    mujoco.mj_kinematics(scene.work.model, data)
+    mujoco.mj_comPos(scene.work.model, data)
+    mujoco.mj_camlight(scene.work.model, data)
+
+
+def draw_over(scene: Scene, still: Still, drawn: Any) -> None:
+    """Draw ghosts, hands and names of faces into an abstract scene of MuJoCo (`mjvScene`), after what it holds."""
+    for ghost in still.ghosts:
+        _draw_ghost(scene, still.chapter.start, ghost, drawn)
+    for hand in still.moment.hands:
+        _geom(drawn, mujoco.mjtGeom.mjGEOM_SPHERE, HAND_M, hand, (*HAND_COLOR, 0.8))
+    poses = part_poses(still.chapter, still.moment)
+    for face in still.faces:
+        at = pose.apply(poses[face.part], label_place(scene, face)[None])[0]
+        named = _geom(drawn, mujoco.mjtGeom.mjGEOM_LABEL, 0.01, at, (0.1, 0.1, 0.1, 1.0))
+        if named is not None:
+            named.label = str(face)
+
+
+def label_place(scene: Scene, of: PartFace) -> Array:
+    """Where the name of a face stands, (3,), frame of its part, [m]: before its middle, of a round one at its wall."""
+    face = scene.scenario.assembly.face_of(of)
+    if isinstance(face, Face):
+        return np.asarray(face.outline.mean(axis=0) + _OFF_M * face.normal)
+    return np.asarray(face.ends.mean(axis=0) + float(np.mean(face.radii)) * face.frame[:3, 0])
+
+
+def _draw_ghost(scene: Scene, start: Poses, ghost: Ghost, drawn: Any) -> None:
+    world, model = scene.work, scene.work.model
+    data = mujoco.MjData(model)
+    for part, T in ghost.poses.items():
+        if part in world.qpos:
+            place(world, data, part, T)
+    mujoco.mj_kinematics(model, data)
+    begin, wanted = drawn.ngeom, {world.free.index(part) for part in ghost.poses if part in world.qpos}
+    dynamic = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+    mujoco.mjv_addGeoms(model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), dynamic, drawn)
+    for geom in drawn.geoms[begin : drawn.ngeom]:
+        ours = geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and world.geom_part[geom.objid] in wanted
+        geom.rgba[:] = (*ghost.color, GHOST_OPACITY if ours else 0.0)
+
+
+def _geom(drawn: Any, kind: Any, size: float, at: Array, rgba: Sequence[float]) -> Any:
+    if drawn.ngeom >= drawn.maxgeom:
+        return None
+    geom = drawn.geoms[drawn.ngeom]
+    mujoco.mjv_initGeom(geom, kind, np.full(3, size), at, np.eye(3).ravel(), np.array(rgba, dtype=np.float32))
+    drawn.ngeom += 1
+    return geom

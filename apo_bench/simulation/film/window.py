@@ -1,0 +1,105 @@
+"""MuJoCo's window, in which a trial is stepped through with keys."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.errors import InputError
+from apo_bench.simulation.film.film import AZIMUTH_DEG, ELEVATION_DEG, framing
+from apo_bench.simulation.film.still import Still, draw_over, show_moment
+from apo_bench.simulation.scene.graphics import need_window
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import initial_state
+
+KEYS = {
+    32: "play",
+    262: "next",
+    263: "previous",
+    264: "next operation",
+    265: "previous operation",
+    267: "next chapter",
+    266: "previous chapter",
+    268: "faces",
+    269: "goals",
+}
+"""What keys mean, by their GLFW codes: letters and digits have a meaning for MuJoCo's window already."""
+_HELP = (
+    ("space", "play, stop"),
+    ("left, right", "a moment"),
+    ("up, down", "an operation"),
+    ("page up, page down", "demonstration, replay"),
+    ("home", "names of faces"),
+    ("end", "goals"),
+)
+_PICTURE_S = 1.0 / 30.0
+
+
+def no_window() -> str:
+    """Why no window can be opened here, empty where one can."""
+    try:
+        need_window()
+    except InputError as error:
+        return str(error).partition(";")[0]
+    import mujoco.viewer
+
+    if sys.platform == "darwin" and getattr(mujoco.viewer, "_MJPYTHON", None) is None:
+        return "no window can be opened here (on macOS that needs `mjpython`)"
+    return ""
+
+
+def step_in_window(
+    scene: Scene,
+    assembled: Poses,
+    now: Callable[[], Still],
+    press: Callable[[str], None],
+    pass_time: Callable[[float], None],
+) -> None:
+    """Open the window and show what is asked for until a person closes it.
+
+    Args:
+        assembled: What the camera looks at.
+        now: What is to be shown.
+        press: Told what a key means, one of `KEYS`.
+        pass_time: Told how many seconds have passed.
+    """
+    import mujoco.viewer
+
+    data = initial_state(scene.work, now().chapter.start)
+    pressed: list[str] = []
+
+    def on_key(code: int) -> None:
+        pressed.extend(filter(None, (KEYS.get(code),)))
+
+    with mujoco.viewer.launch_passive(
+        scene.work.model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
+    ) as window:
+        with window.lock():
+            window.cam.lookat[:], window.cam.distance = framing(scene.scenario.assembly, [assembled])
+            window.cam.azimuth, window.cam.elevation = AZIMUTH_DEG, ELEVATION_DEG
+        before = time.monotonic()
+        while window.is_running():
+            while pressed:
+                press(pressed.pop(0))
+            with window.lock():
+                _draw(scene, data, now(), window)
+            window.sync()
+            time.sleep(_PICTURE_S)
+            now_s = time.monotonic()
+            pass_time(now_s - before)
+            before = now_s
+
+
+def _draw(scene: Scene, data: Any, still: Still, window: Any) -> None:
+    show_moment(scene, data, still.chapter, still.moment)
+    window.user_scn.ngeom = 0
+    draw_over(scene, still, window.user_scn)
+    font, place = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
+    keys, meanings = ("\n".join(words) for words in zip(*_HELP, strict=True))
+    said = "\n".join((still.chapter.title, *still.words))
+    window.set_texts([(font, place.mjGRID_TOPLEFT, said, ""), (font, place.mjGRID_BOTTOMLEFT, keys, meanings)])
