@@ -12,7 +12,7 @@ from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.placement import placements
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.row import Row
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import stages
 from apo_bench.simulation.film.track import Chapter, HandTrack, ReplayTrack
@@ -90,12 +90,12 @@ def ending(row: Row) -> str:
 def _demonstration(spec: TrialSettings, scene: Scene, recording: Recording) -> Chapter:
     track = HandTrack()
     watch_again(scene, recording, spec.careless, spec.seed, spec.salt, track)
-    size = f"{spec.level_mm:g} mm, {spec.level_deg:g} degrees"
+    how = f"seen with errors of {spec.level_mm:g} mm and {spec.level_deg:g} deg"
     return Chapter(
         title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",
         world=scene.shown,
         start=recording.layout.start,
         moments=tuple(track.moments),
-        ending=f"demonstrated; this is seen with errors of {size}, then planned and replayed",
+        ending=f"demonstrated; {'seen by a range finder' if spec.eye == RANGE else how}, then planned and replayed",
         good=None,
     )
