@@ -21,11 +21,23 @@ def filled(mesh: Mesh, bore: Region) -> Any:
     return manifold3d.Manifold.hull_points(mesh.corners[np.unique(mesh.triangles[bore.triangles])])
 
 
-def bored(corners: Array, bores: Sequence[Region], flats: Array) -> list[Array]:
-    """A convex piece less round holes, as convex pieces."""
+def least_pieces(bores: Sequence[Region]) -> int:
+    """How many wedges stand around round holes at least."""
+    return sum(sides_of(1e-3 * max(bore.radii)) for bore in bores)
+
+
+def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> list[Array]:
+    """A convex piece less round holes, as convex pieces; no more holes are taken out when there are too many pieces.
+
+    Args:
+        most: Pieces that are allowed.
+    """
     import manifold3d
 
     parts = [manifold3d.Manifold.hull_points(corners)]
+    bores = [bore for bore in bores if _meets(parts[0], bore)]
+    if not bores:
+        return [corners]
     for a, b in combinations(bores, 2):
         plane = _between(a, b)
         if plane is not None:
@@ -37,9 +49,9 @@ def bored(corners: Array, bores: Sequence[Region], flats: Array) -> list[Array]:
                 )
             ]
     for bore in bores:
+        if len(parts) > most:
+            break
         parts = [piece for part in parts for piece in (_around(part, bore) if _meets(part, bore) else (part,))]
-    if len(parts) == 1 and not any(_meets(parts[0], bore) for bore in bores):
-        return [corners]
     found = []
     for part in parts:
         if not part.is_empty() and (points := once(corners_of(part))).shape[0] >= 4 and is_thick(points):
@@ -68,13 +80,13 @@ def _between(a: Region, b: Region) -> Array | None:
 
 def _meets(part: Any, bore: Region) -> bool:
     """Whether the box around a part, seen along the axis of a hole, comes near to the hole."""
-    if part.is_empty():
+    if part.is_empty() or _is_apart(part, bore):
         return False
     corners = corners_of(part)
     height, _, _ = bore.polar(corners)
     if height.max() < bore.span[0] + SAME_MM or height.min() > bore.span[1] - SAME_MM:
         return False
-    x, y = bore.frame()
+    x, y = bore.across
     assert bore.point is not None
     from shapely import MultiPoint, Point
 
@@ -82,11 +94,17 @@ def _meets(part: Any, bore: Region) -> bool:
     return bool(MultiPoint(flat).convex_hull.distance(Point(0.0, 0.0)) < max(bore.radii) - SAME_MM)
 
 
+def _is_apart(part: Any, bore: Region) -> bool:
+    """Whether the aligned boxes around a part and a hole are apart."""
+    low, high = np.array(part.bounding_box()).reshape(2, 3)
+    return bool((low > bore.box[1]).any() or (high < bore.box[0]).any())
+
+
 def _around(part: Any, bore: Region) -> Iterator[Any]:
     """A convex part less a round hole: what is below and above it, and wedges that touch its wall from outside."""
     assert bore.point is not None
     assert bore.axis is not None
-    axis, x, y = bore.axis, *bore.frame()
+    axis, x, y = bore.axis, *bore.across
     foot = float(bore.point @ axis)
     above, rest = part.split_by_plane(axis, foot + bore.span[1])
     slab, below = rest.split_by_plane(axis, foot + bore.span[0])

@@ -1,4 +1,4 @@
-"""Solids of a STEP file as build123d reads them: surface and triangles of each face; in a process of its own."""
+"""Solids of a STEP file as Open CASCADE reads them: surface and triangles of each face; in a process of its own."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.raw import Place
+from apo_bench.cad.step_tree import leaves_of, matrix_of, shapes_in
 from apo_bench.geometry.arrays import Array
 
-LIMIT_BYTES, LIMIT_S = 2_000_000_000, 50
-_ANGLE_RAD, _SAGITTA = 0.2, 1e-2
+LIMIT_BYTES, LIMIT_S = 2_000_000_000, 20
+ANGLE_RAD, _SAGITTA = 0.2, 1e-2
 """Of triangles: angle between neighbours, the same on walls around one axis; distance from the surface at most, as part
 of the size of the solid."""
 _MOST_SAMPLES = 600
@@ -57,64 +58,23 @@ class BrepSolid(NamedTuple):
 
 def solids_of(path: Path) -> list[BrepSolid]:
     """What a STEP file holds, each solid once with all of its places, in the order of the file."""
-    from build123d import import_step
-
-    found: dict[Any, list[Any]] = {}
-    for leaf, T in _leaves(import_step(path), np.eye(4)):
-        color = None if leaf.color is None else _rgb(leaf.color)
-        key = leaf.wrapped.TShape()
-        found.setdefault(key, [leaf, []])[1].append(Place(leaf.label, T, color))
-    return [
-        solid for leaf, places in found.values() for solid in _solids(leaf.label, _unplaced(leaf.wrapped), (*places,))
-    ]
-
-
-def _leaves(shape: Any, T: Array) -> Iterator[tuple[Any, Array]]:
-    """Shapes without children, and where they are."""
-    if shape.wrapped is None:
-        return
-    here = T @ _matrix(shape.wrapped.Location().Transformation())
-    if not shape.children:
-        yield shape, here
-    for child in shape.children:
-        yield from _leaves(child, here)
-
-
-def _rgb(color: Any) -> tuple[float, float, float]:
-    r, g, b = (float(np.clip(x, 0.0, 1.0)) for x in tuple(color)[:3])
-    return r, g, b
-
-
-def _matrix(transformation: Any) -> Array:
-    rows = [[transformation.Value(i, k) for k in range(1, 5)] for i in range(1, 4)]
-    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
-
-
-def _unplaced(shape: Any) -> Any:
-    from OCP.TopLoc import TopLoc_Location
-
-    return shape.Located(TopLoc_Location())
+    found: dict[Any, tuple[str, Any, list[Place]]] = {}
+    for leaf in leaves_of(path):
+        key = leaf.shape.TShape()
+        found.setdefault(key, (leaf.product, leaf.shape, []))[2].append(Place(leaf.name, leaf.T, leaf.color))
+    return [solid for name, shape, places in found.values() for solid in _solids(name, shape, (*places,))]
 
 
 def _solids(name: str, shape: Any, places: tuple[Place, ...]) -> Iterator[BrepSolid]:
     """The solids in a shape, and its shells that belong to none."""
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 
-    every = [*_all(shape, TopAbs_SOLID), *_all(shape, TopAbs_SHELL, TopAbs_SOLID)]
-    if not every and any(_all(shape, TopAbs_FACE)):
+    every = [*shapes_in(shape, TopAbs_SOLID), *shapes_in(shape, TopAbs_SHELL, TopAbs_SOLID)]
+    if not every and any(shapes_in(shape, TopAbs_FACE)):
         every = [shape]
     for i, each in enumerate(every, start=1):
         called = name if len(every) == 1 else f"{name}_{i}"
         yield BrepSolid(called, tuple(_faces(each)), *_matter(each), places)
-
-
-def _all(shape: Any, kind: Any, outside: Any = None) -> Iterator[Any]:
-    from OCP.TopExp import TopExp_Explorer
-
-    explorer = TopExp_Explorer(shape, kind) if outside is None else TopExp_Explorer(shape, kind, outside)
-    while explorer.More():
-        yield explorer.Current()
-        explorer.Next()
 
 
 def _matter(shape: Any) -> tuple[float, Array, Array]:
@@ -139,8 +99,8 @@ def _faces(shape: Any) -> Iterator[BrepFace]:
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
     size = float(np.sqrt(box.SquareExtent())) if not box.IsVoid() else 1.0
-    BRepMesh_IncrementalMesh(shape, _SAGITTA * size, False, _ANGLE_RAD, False)
-    for each in _all(shape, TopAbs_FACE):
+    BRepMesh_IncrementalMesh(shape, _SAGITTA * size, False, ANGLE_RAD, False)
+    for each in shapes_in(shape, TopAbs_FACE):
         yield _face(TopoDS.Face_s(each) if hasattr(TopoDS, "Face_s") else TopoDS.Face(each))
 
 
@@ -154,7 +114,7 @@ def _face(face: Any) -> BrepFace:
     if mesh is None:
         return BrepFace("none", np.zeros(3), np.zeros(3), 0.0, 0.0, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     nodes = [mesh.Node(i) for i in range(1, mesh.NbNodes() + 1)]
-    T = _matrix(location.Transformation())
+    T = matrix_of(location.Transformation())
     corners = np.array([(p.X(), p.Y(), p.Z()) for p in nodes]) @ T[:3, :3].T + T[:3, 3]
     triangles = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)], dtype=np.int64) - 1
     triangles = triangles.reshape(-1, 3)

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
 
-_MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 200
+_MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 160
 """Of a piece; of one that has more, the farthest corners are kept."""
 _FARTHEST, _IN_PLANE = (60, 40, 24, 12, 0), (16, 8, 4)
 """In how many directions: in space; in each flat face."""
@@ -20,6 +20,9 @@ SAME_MM = 2e-4
 _THIN_MM = 0.02
 """Pieces thinner than this across are left out."""
 _ON_MM = 2e-4
+_DIGITS = 9
+"""As they are written."""
+_NO_PLANES = np.zeros((0, 4))
 _MOST_TRIED = 500
 
 
@@ -28,15 +31,16 @@ def corners_of(part: Any) -> Array:
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
-def extremes(points: Array, flats: Array) -> Array:
+def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
     """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
 
     Args:
         flats: Planes of flat faces, (k, 4).
+        cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
     """
     from scipy.spatial import ConvexHull
 
-    points = once(points)
+    points = np.round(once(points), _DIGITS)
     corners = points[np.sort(ConvexHull(points).vertices)]
     hull = Hull("", 1e-3 * corners)
     for _ in range(4):
@@ -47,13 +51,14 @@ def extremes(points: Array, flats: Array) -> Array:
         hull = Hull("", 1e-3 * corners)
     if _is_simple(hull):
         return np.asarray(corners)
-    for many in _IN_PLANE:
-        on_flats = _on_flats(corners, flats, many)
-        for farthest in _FARTHEST:
-            kept = np.union1d(on_flats, _farthest(corners, farthest))
-            if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
-                return np.asarray(corners[kept])
-    return np.asarray(corners[_farthest(corners, _FARTHEST[0])])
+    for planes in (np.concatenate([flats, cuts]), flats, _NO_PLANES):
+        for many in _IN_PLANE:
+            on_planes = _on_flats(corners, planes, many)
+            for farthest in _FARTHEST:
+                kept = np.union1d(on_planes, _farthest(corners, farthest))
+                if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
+                    return np.asarray(corners[kept])
+    return np.asarray(corners[_farthest(corners, _FARTHEST[-2])])
 
 
 def _is_simple(hull: Hull) -> bool:

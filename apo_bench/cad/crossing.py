@@ -15,15 +15,22 @@ _INSIDE = 1e-6
 """Crossings nearer to an edge than this part of a triangle are touches."""
 
 
-def crossing(mesh: Mesh) -> Array | None:
-    """A point, (3,), at which two triangles without a common corner cross; None if none do."""
+def crossing(mesh: Mesh, off: Array | None = None) -> Array | None:
+    """A point, (3,), at which two triangles without a common corner cross; None if none do.
+
+    Args:
+        off: How far each triangle may be from the surface that it stands for, (t,): triangles that cross by no more
+            than that of both say nothing of the surfaces.
+    """
     pairs = _near(mesh)
     tolerance = 1e-6 * mesh.extent
     for first in range(0, len(pairs), _AT_ONCE):
-        a, b = mesh.triangles[pairs[first : first + _AT_ONCE].T]
+        some = pairs[first : first + _AT_ONCE]
+        a, b = mesh.triangles[some.T]
         apart = (a[:, :, None] != b[:, None, :]).all(axis=(1, 2))
+        least = np.full(int(apart.sum()), tolerance) + (0.0 if off is None else off[some[apart]].sum(axis=1))
         for one, other in ((a[apart], b[apart]), (b[apart], a[apart])):
-            found = _through(mesh.corners[one], mesh.corners[other], tolerance)
+            found = _through(mesh.corners[one], mesh.corners[other], least)
             if found is not None:
                 return found
     return None
@@ -63,14 +70,18 @@ def _in_space(points: Array) -> Any:
     return np.argsort(code, kind="stable")
 
 
-def _through(a: Array, b: Array, tolerance: float) -> Array | None:
-    """Where an edge of a triangle goes through the inside of another one; both (p, 3, 3)."""
+def _through(a: Array, b: Array, tolerance: Array) -> Array | None:
+    """Where an edge of a triangle goes through the inside of another one; both (p, 3, 3).
+
+    Args:
+        tolerance: What is nearer only touches, (p,).
+    """
     n = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
     size = np.linalg.norm(n, axis=1)
     n = n / np.maximum(size, 1e-300)[:, None]
     height = ((a - b[:, :1]) * n[:, None]).sum(axis=2)
     may = (height.max(axis=1) > tolerance) & (height.min(axis=1) < -tolerance) & (size > tolerance**2)
-    a, b, n, height, size = a[may], b[may], n[may], height[may], size[may]
+    a, b, n, height, size, tolerance = a[may], b[may], n[may], height[may], size[may], tolerance[may]
     for i in range(3):
         k = (i + 1) % 3
         through = ((height[:, i] > tolerance) & (height[:, k] < -tolerance)) | (
@@ -78,13 +89,20 @@ def _through(a: Array, b: Array, tolerance: float) -> Array | None:
         )
         if not through.any():
             continue
-        p, q, corners, m, area = a[through, i], a[through, k], b[through], n[through], size[through]
+        p, q, corners, m, area, near = (
+            a[through, i],
+            a[through, k],
+            b[through],
+            n[through],
+            size[through],
+            tolerance[through],
+        )
         share = height[through, i] / (height[through, i] - height[through, k])
         x = p + share[:, None] * (q - p)
         inside = np.ones(len(x), dtype=bool)
         for j in range(3):
             start, end = corners[:, j], corners[:, (j + 1) % 3]
-            inside &= (np.cross(end - start, x - start) * m).sum(axis=1) > _INSIDE * area + tolerance * np.linalg.norm(
+            inside &= (np.cross(end - start, x - start) * m).sum(axis=1) > _INSIDE * area + near * np.linalg.norm(
                 end - start, axis=1
             )
         if inside.any():

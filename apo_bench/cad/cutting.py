@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.boring import bored, filled
+from apo_bench.cad.boring import bored, filled, least_pieces
 from apo_bench.cad.corners import corners_of, extremes, is_thick, once, volume_of
 from apo_bench.cad.halving import at_shoulders, convex_parts, settled
 from apo_bench.cad.raw import Mesh, RawSolid
@@ -14,6 +14,7 @@ from apo_bench.cad.shafts import as_cylinders, rounded
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
+from apo_bench.parts.allowed import MOST_PIECES
 
 _MOST_TRIANGLES = 20_000
 _LOSS = 1e-3
@@ -32,10 +33,19 @@ class Cut(NamedTuple):
 
 
 def cut(raw: RawSolid) -> Cut:
-    """The convex pieces of a solid: flat ones exact, round holes as wedges that touch the fitted wall."""
+    """The convex pieces of a solid: flat ones exact, round holes as wedges that touch the fitted wall.
+
+    Raises:
+        InputError: The mesh makes no solid, or there are more pieces than a part may have.
+    """
     size = raw.mesh.extent
     whole = manifold_of(raw.mesh)
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
+    if least_pieces(bores) > MOST_PIECES:
+        raise InputError(
+            f"its {len(bores)} round holes take {least_pieces(bores):,} convex pieces; {MOST_PIECES:,} are the most "
+            "in a part, so leave out small ones."
+        )
     for bore in bores:
         whole = whole + filled(raw.mesh, bore)
     if whole.num_tri() > _MOST_TRIANGLES:
@@ -45,17 +55,25 @@ def cut(raw: RawSolid) -> Cut:
     pieces: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
     for part in at_shoulders(convex_parts(whole, size, flats), shafts, size):
-        corners = once(settled(corners_of(part.body), part.planes, size))
-        if len(corners) < 4 or not is_thick(corners):
+        given = once(settled(corners_of(part.body), part.planes, size))
+        if len(given) < 4 or not is_thick(given):
             continue
-        corners = extremes(corners, flats)
-        volume, true = volume_of(corners), part.body.volume()
-        if abs(volume - true) > _LOSS * true:
-            grown, hulls = grown + volume - true, hulls + 1
+        fine = rounded(given, shafts)
+        corners = extremes(fine, flats, part.planes)
+        true = part.body.volume()
+        more = volume_of(given) - true + volume_of(corners) - volume_of(fine)
+        if abs(more) > _LOSS * true:
+            grown, hulls = grown + more, hulls + 1
         pieces.append(corners)
     found: list[Hull] = []
     for corners in pieces:
-        found += [Hull("", 1e-3 * each) for each in bored(rounded(corners, shafts), bores, flats)]
+        more = bored(corners, bores, flats, MOST_PIECES - len(found))
+        found += [Hull("", 1e-3 * each) for each in more]
+        if len(found) > MOST_PIECES:
+            raise InputError(
+                f"the part takes more than {MOST_PIECES:,} convex pieces, which are the most; leave out small holes "
+                "and fillets."
+            )
     return Cut(tuple(as_cylinders(found, shafts)), grown, hulls)
 
 

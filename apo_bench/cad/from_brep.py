@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.brep import BrepFace, BrepSolid
+from apo_bench.cad.brep import ANGLE_RAD, BrepFace, BrepSolid
 from apo_bench.cad.facets import facets_of
 from apo_bench.cad.naming import with_names
 from apo_bench.cad.raw import Mesh, RawSolid, Region
 from apo_bench.cad.round_region import plane_region, round_region
-from apo_bench.cad.shells import check_closed
+from apo_bench.cad.shells import check_closed, check_uncrossed
 from apo_bench.cad.strips import wall_strips
 from apo_bench.cad.surfaces import Flat, Wall, same, surface_of
 from apo_bench.errors import InputError
@@ -36,14 +36,29 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
         raise InputError(f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
     mesh, owner = _mesh(solid.faces)
     check_closed(path, mesh)
+    surfaces = [surface_of(face) for face in solid.faces]
+    check_uncrossed(path, mesh, _off(solid.faces, surfaces)[owner])
     said: tuple[str, ...] = ()
     if mesh.volume < 0.0:
         mesh, said = Mesh(mesh.corners, mesh.triangles[:, ::-1]), ("it was inside out, and was turned",)
-    surfaces = [surface_of(face) for face in solid.faces]
     groups = _joined(mesh, owner, surfaces)
     mesh, owner = _in_strips(mesh, owner, groups, surfaces)
     regions = with_names(mesh, _regions(mesh, owner, groups, surfaces))
     return RawSolid(solid.name, mesh, regions, facets_of(mesh).of, solid.places, said, _moments(solid))
+
+
+def _off(faces: tuple[BrepFace, ...], surfaces: list[Flat | Wall | None]) -> Array:
+    """How far triangles of each face may be from it, (f,), [mm]: the sagitta of the angle between neighbours."""
+    found = []
+    for face, surface in zip(faces, surfaces, strict=True):
+        size = float(np.ptp(face.corners, axis=0).max())
+        if isinstance(surface, Flat):
+            found.append(0.0)
+        elif isinstance(surface, Wall):
+            found.append((1.0 - np.cos(ANGLE_RAD / 2.0)) * (surface.surface.radius + abs(surface.surface.slope) * size))
+        else:
+            found.append((1.0 - np.cos(ANGLE_RAD / 2.0)) * size)
+    return np.array(found)
 
 
 def _moments(solid: BrepSolid) -> Moments:

@@ -52,22 +52,41 @@ def _cut(part: Part, size: float, flats: Array, only_flats: bool, cuts: list[int
     open_, least, hair = [part], 1e-7 * volume, _HAIR * size
     while open_:
         found, along = open_.pop()
-        for body in found.decompose():
+        for body in _without_cavities(found, least):
             if body.volume() < least:
                 continue
             halves = None
-            if cuts[0] > 0:
-                for n, d in _planes_to_cut(body, size, flats, only_flats)[:_TRIES]:
-                    one, other = body.trim_by_plane(n, d + hair), body.trim_by_plane(-n, hair - d)
-                    if min(one.volume(), other.volume()) > least:
-                        used = np.concatenate([along, [[*n, d]]])
-                        halves = [Part(one, used), Part(other, used)]
-                        break
+            planes = _planes_to_cut(body, size, flats, only_flats) if cuts[0] > 0 else []
+            for n, d in [*planes[:_TRIES], *_through_cavity(body, least)]:
+                one, other = body.trim_by_plane(n, d + hair), body.trim_by_plane(-n, hair - d)
+                if min(one.volume(), other.volume()) > least:
+                    used = np.concatenate([along, [[*n, d]]])
+                    halves = [Part(one, used), Part(other, used)]
+                    break
             if halves is None:
                 yield Part(body, along)
             else:
                 cuts[0] -= 1
                 open_ += halves
+
+
+def _without_cavities(body: Any, least: float) -> list[Any]:
+    """The bodies that one consists of; the whole, if there is a cavity in one of them.
+
+    Args:
+        least: A cavity that is smaller is rounding.
+    """
+    found = body.decompose()
+    return [body] if any(each.volume() < -least for each in found) else found
+
+
+def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
+    """Planes through the middle of a cavity, if there is one."""
+    for each in body.decompose():
+        if each.volume() < -least:
+            low, high = np.array(each.bounding_box()).reshape(2, 3)
+            for axis in np.argsort(high - low):
+                yield np.eye(3)[axis], float(low[axis] + high[axis]) / 2.0
 
 
 def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> list[tuple[Array, float]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
@@ -12,6 +14,7 @@ import numpy as np
 from apo_bench.cad.cutting import Cut, cut
 from apo_bench.cad.matter import matter
 from apo_bench.cad.naming import renamed, with_names
+from apo_bench.cad.patience import in_time
 from apo_bench.cad.raw import RawSolid
 from apo_bench.cad.reading import CadFile, read_meshes
 from apo_bench.cad.regions import regions_of
@@ -26,7 +29,7 @@ from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 from apo_bench.parts import load_part
 from apo_bench.parts.agreement import check_faces, supported
-from apo_bench.parts.allowed import MOST_CORNERS_IN_ALL, MOST_FACES, MOST_PIECES
+from apo_bench.parts.allowed import MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.parts.making import Body, solid_of, write_part
 
 _RAYS = 720
@@ -57,15 +60,16 @@ def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
     """
-    if path.suffix.lower() in STEP_KINDS:
-        return read_step(path, unit)
-    file = read_meshes(path, unit)
-    found = []
-    for each in closed_solids(path, file.shapes):
-        regions, facets = regions_of(each.mesh)
-        named = with_names(each.mesh, regions)
-        found.append(RawSolid(each.name, each.mesh, named, facets, each.places, each.said))
-    return file, found
+    with in_time(f"{path}: finding the faces", "save it with fewer triangles"):
+        if path.suffix.lower() in STEP_KINDS:
+            return read_step(path, unit)
+        file = read_meshes(path, unit)
+        found = []
+        for each in closed_solids(path, file.shapes):
+            regions, facets = regions_of(each.mesh)
+            named = with_names(each.mesh, regions)
+            found.append(RawSolid(each.name, each.mesh, named, facets, each.places, each.said))
+        return file, found
 
 
 def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: float = 1000.0) -> Imported:
@@ -77,12 +81,20 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
     """
-    found = cut(raw)
+    with in_time(f"{source}: cutting the part into convex pieces", "leave out small holes, fillets and free surfaces"):
+        return _imported(raw, name, folder, source, density)
+
+
+def _imported(raw: RawSolid, name: str, folder: Path, source: str, density: float) -> Imported:
+    try:
+        found = cut(raw)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
     corners = sum(len(piece.corners) for piece in found.pieces)
-    if len(found.pieces) > MOST_PIECES or corners > MOST_CORNERS_IN_ALL:
+    if corners > MOST_CORNERS_IN_ALL:
         raise InputError(
-            f"{source}: the part takes {len(found.pieces)} convex pieces with {corners:,} corners; {MOST_PIECES} and "
-            f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets."
+            f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the most, "
+            "so leave out small holes and fillets."
         )
     flats, rounds, refused = _faces(raw)
     if len(flats) + len(rounds) > MOST_FACES:
@@ -109,18 +121,42 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
             f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
         )
     color = {"color": raw.places[0].color} if raw.places[0].color else {}
-    path = write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
-    try:
-        solid = load_part(path)
-    except InputError as error:
-        path.unlink()
-        path.with_suffix(".toml").unlink(missing_ok=True)
-        why = str(error).removeprefix(f"{path}: ").rstrip(".")
-        raise InputError(
-            f"{source}: what the solid was cut into makes no part ({why}); leave out fillets and free surfaces."
-        ) from error
+
+    def write(body: Body) -> Path:
+        return write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
+
+    path, solid = _as_read(write, body, refused, source)
     free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
     return Imported(path, raw, solid, found, refused, shares, free)
+
+
+def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str], source: str) -> tuple[Path, Solid]:
+    """The part as its files are read, which are a little rounded; a face that they no longer have can make no contact.
+
+    Args:
+        refused: Is added to.
+    """
+    while True:
+        path = write(body)
+        try:
+            return path, load_part(path)
+        except InputError as error:
+            why = str(error).replace(f"{path.parent}{os.sep}", "").removeprefix(f"{path.name}: ")
+            path.unlink()
+            path.with_suffix(".toml").unlink(missing_ok=True)
+            face = re.match(r"\S+, faces, (\w+): ([^;]*)", why)
+            left = [f.name for faces in (body.flats, body.rounds) for f in faces]
+            if face is None or face[1] not in left or len(left) == 1:
+                raise InputError(
+                    f"{source}: what the solid was cut into makes no part ({why.split('; ')[0].rstrip('.')}); leave "
+                    "out fillets and free surfaces."
+                ) from error
+            refused[face[1]] = face[2]
+            body = replace(
+                body,
+                flats=tuple(f for f in body.flats if f.name != face[1]),
+                rounds=tuple(f for f in body.rounds if f.name != face[1]),
+            )
 
 
 def with_new_names(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:

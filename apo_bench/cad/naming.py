@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,6 +63,14 @@ def part_name(text: str) -> str:
     """A name that a part may have, from any text."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in text)[:48]
     return plain if plain[:1].isalpha() else f"part_{plain}"
+
+
+def free_name(name: str, used: Container[str]) -> str:
+    """The name, or with a number behind it that makes it one that nothing else has."""
+    free, n = name, 2
+    while free in used:
+        free, n = f"{name}_{n}", n + 1
+    return free
 
 
 def _plain(name: str) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from apo_bench.cad.naming import part_name
+import numpy as np
+
+from apo_bench.cad.naming import free_name, part_name
 from apo_bench.cad.raw import Place
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
 
 NAME = "poses.toml"
 
@@ -23,10 +24,7 @@ def named_places(parts: Mapping[str, Iterable[Place]]) -> list[tuple[str, str, P
     found = []
     for part, places in parts.items():
         for place in places:
-            stem = part_name(place.name)
-            name, number = stem, 2
-            while name in used:
-                name, number = f"{stem}{number}", number + 1
+            name = free_name(part_name(place.name), used)
             used.add(name)
             found.append((part, name, place))
     return found
@@ -36,17 +34,14 @@ def write_places(places: Iterable[tuple[str, str, Place]], folder: Path, source:
     """Write `poses.toml`, which `scenario new` reads beside the part files."""
     lines = [f"# where {source} has its parts".replace("\n", " ")]
     for part, name, place in places:
-        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"', f"at_mm = {_list(place.T[:3, 3])}"]
-        lines.append(f"quaternion_wxyz = {_list(_quaternion(place.T))}")
+        packed = pose.pack(place.T)
+        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"', f"at_mm = {_list(packed[:3])}"]
+        lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
         if place.color is not None:
-            lines.append(f"color = {_list(place.color)}")
+            lines.append(f"color = {_list(np.round(place.color, 4))}")
     path = folder / NAME
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
-
-
-def _quaternion(T: Array) -> Array:
-    return pose.pack(T)[3:]
 
 
 def _list(values: Iterable[float]) -> str:

@@ -14,6 +14,8 @@ from apo_bench.geometry.round_face import WHOLE_TURN
 from apo_bench.parts.making.moments import Moments
 
 Kind = Literal["plane", "cylinder", "cone", "other"]
+Rgb = tuple[float, float, float]
+"""0 to 1."""
 
 
 @final
@@ -111,7 +113,8 @@ class Region:
         """By how much the radius grows along the axis."""
         return (self.radii[1] - self.radii[0]) / (self.span[1] - self.span[0])
 
-    def frame(self) -> tuple[Array, Array]:
+    @cached_property
+    def across(self) -> tuple[Array, Array]:
         """Two directions across the axis."""
         assert self.axis is not None
         x = np.eye(3)[int(np.abs(self.axis).argmin())]
@@ -119,11 +122,20 @@ class Region:
         x /= np.linalg.norm(x)
         return x, np.cross(self.axis, x)
 
+    @cached_property
+    def box(self) -> Array:
+        """The aligned box around a round one: its lowest and highest corner, (2, 3)."""
+        assert self.axis is not None
+        assert self.point is not None
+        ends = self.point + np.outer(self.span, self.axis)
+        reach = max(self.radii) * np.sqrt(np.maximum(1.0 - self.axis**2, 0.0))
+        return np.array([ends.min(axis=0) - reach, ends.max(axis=0) + reach])
+
     def polar(self, points: Array) -> tuple[Array, Array, Array]:
         """Height along the axis, distance from it, angle around it, of points (k, 3)."""
         assert self.axis is not None
         assert self.point is not None
-        x, y = self.frame()
+        x, y = self.across
         off = points - self.point
         return off @ self.axis, np.hypot(off @ x, off @ y), np.arctan2(off @ y, off @ x)
 
@@ -137,8 +149,7 @@ class Place(NamedTuple):
     name: str
     T: Array
     """Of the frame of the solid in that of the file, (4, 4), [mm]."""
-    color: tuple[float, float, float] | None = None
-    """Red, green, blue, 0 to 1."""
+    color: Rgb | None = None
 
 
 @final

@@ -11,6 +11,7 @@ from apo_bench.cad.corners import SAME_MM, once
 from apo_bench.cad.raw import Region
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull, sides_of
+from apo_bench.parts.allowed import THINNEST_M
 
 
 def rounded(corners: Array, shafts: Sequence[Region]) -> Array:
@@ -64,7 +65,7 @@ def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
 def _ring(shaft: Region, height: float, angles: Array) -> Array:
     assert shaft.point is not None
     assert shaft.axis is not None
-    x, y = shaft.frame()
+    x, y = shaft.across
     out = np.outer(np.cos(angles), x) + np.outer(np.sin(angles), y)
     return np.asarray(shaft.point + height * shaft.axis + shaft.radius_at(height) * out)
 
@@ -74,11 +75,11 @@ def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]
     for piece in pieces:
         corners = 1e3 * piece.corners
         for shaft in shafts:
-            if shaft.kind != "cylinder":
+            if shaft.kind != "cylinder" or 1e-3 * shaft.radii[0] < THINNEST_M:
                 continue
             height, distance, _ = shaft.polar(corners)
             low, high = float(height.min()), float(height.max())
-            level = (np.minimum(height - low, high - height) < SAME_MM).all()
+            level = 5e-4 * (high - low) >= THINNEST_M and (np.minimum(height - low, high - height) < SAME_MM).all()
             if (
                 level
                 and len(corners) >= 16

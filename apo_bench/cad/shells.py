@@ -41,12 +41,7 @@ def closed_solids(path: Path, shapes: tuple[Shape, ...]) -> list[Closed]:
         turned = _alike(path, mesh)
         if turned is not mesh:
             said = (*said, "triangles that looked the other way than their neighbours were turned")
-        where = crossing(turned)
-        if where is not None:
-            x, y, z = where
-            raise InputError(
-                f"{path}: the surface crosses itself at ({x:.4g}, {y:.4g}, {z:.4g}) mm; mend it where it was drawn."
-            )
+        check_uncrossed(path, turned)
         solids = _apart(path, turned)
         for i, (solid, flipped) in enumerate(solids, start=1):
             name = shape.name if len(solids) == 1 else f"{shape.name}_{i}"
@@ -95,6 +90,23 @@ def check_closed(path: Path, mesh: Mesh) -> None:
         raise InputError(
             f"{path}: {(counts > 2).sum():,} edges have more than two triangles: solids touch there, or a sheet ends; "
             "save each solid as a file of its own."
+        )
+
+
+def check_uncrossed(path: Path, mesh: Mesh, off: Array | None = None) -> None:
+    """Raise an `InputError` if the surface crosses itself.
+
+    Args:
+        off: How far each triangle may be from the surface that it stands for, (t,), [mm].
+    """
+    try:
+        where = crossing(mesh, off)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    if where is not None:
+        x, y, z = where
+        raise InputError(
+            f"{path}: the surface crosses itself at ({x:.4g}, {y:.4g}, {z:.4g}) mm; mend it where it was drawn."
         )
 
 

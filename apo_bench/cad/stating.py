@@ -102,7 +102,7 @@ def _circle(raw: RawSolid, region: Region, beside: set[int], hole: bool) -> Arra
     r = float(wall.radius_at(height))
     n = max(sides_of(1e-3 * max(wall.radii)), COARSE_SIDES)
     angle = 2.0 * np.pi * (np.arange(n) + 0.5) / n
-    x, y = wall.frame()
+    x, y = wall.across
     reach = r / np.cos(np.pi / n) if hole else r
     ring = wall.point + height * wall.axis + reach * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y))
     return np.asarray(ring)

@@ -49,7 +49,7 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
         raise InputError(f"{path}: the file is empty; save the part again.")
     if b"ISO-10303-21" not in raw[:2000]:
         raise InputError(f"{path}: this is no STEP file (it does not begin with ISO-10303-21); save the part again.")
-    if find_spec("build123d") is None:
+    if find_spec("OCP") is None:
         raise InputError(f"{path}: reading STEP needs the extra cad; run: pip install 'apo_bench[cad]'")
     used = _unit(raw)
     solids = _asked(path)

@@ -79,7 +79,7 @@ def _written(
 ) -> tuple[list[Imported], list[str]]:
     """Parts with their pictures; and why others of the file became none."""
     from apo_bench.cad.importing import import_part
-    from apo_bench.cad.naming import part_name
+    from apo_bench.cad.naming import free_name, part_name
     from apo_bench.show.part_picture import draw_part
     from apo_bench.show.part_text import import_lines
 
@@ -87,9 +87,7 @@ def _written(
     left_out: list[str] = []
     used: set[str] = set()
     for raw in raws:
-        called = part_name(raw.name)
-        while called in used:
-            called += "_"
+        called = free_name(part_name(raw.name), used)
         used.add(called)
         try:
             each = import_part(raw, called, out, file.name, density)

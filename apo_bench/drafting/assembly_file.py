@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.cad.importing import import_part, raw_solids
-from apo_bench.cad.naming import part_name
-from apo_bench.cad.raw import Mesh, RawSolid, Region
-from apo_bench.drafting.posed import free_name
+from apo_bench.cad.naming import free_name, part_name
+from apo_bench.cad.places import named_places, write_places
+from apo_bench.cad.raw import Mesh, Place, RawSolid, Region
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-
-POSES = "poses.toml"
 
 
 def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: int = 2) -> tuple[Path, tuple[str, ...]]:
@@ -33,25 +31,21 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
     Raises:
         InputError: The file cannot be read, a solid makes no part, or there are too few.
     """
-    _, raws = raw_solids(file, unit)
+    source, raws = raw_solids(file, unit)
+    if source.left_out:
+        raise InputError(f"{file}: {len(source.left_out)} of its solids can be no parts: {' '.join(source.left_out)}")
     if sum(len(raw.places) for raw in raws) < fewest:
         raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
     folder.mkdir(parents=True, exist_ok=True)
-    tables, said, used, copies = list[str](), list[str](), set[str](), set[str]()
+    places, said = dict[str, list[Place]](), list[str]()
     for raw in raws:
-        called = free_name(part_name(raw.name), used)
-        used.add(called)
+        called = free_name(part_name(raw.name), places)
         foot = _foot(raw.mesh)
         done = import_part(_shifted(raw, -foot), called, folder, f"{file.name}, {raw.name}")
         said.append(f"{called}: {len(done.solid.faces)} flat and {len(done.solid.rounds)} round faces")
         said += [f"{called}.{face} can make no contact: {why}" for face, why in done.refused.items()]
-        for place in raw.places:
-            name = free_name(called, copies)
-            copies.add(name)
-            tables.append(_table(called, name, place.T @ pose.at(foot)))
-    written = folder / POSES
-    written.write_text(f"# The parts of {file.name}, in its frame.\n" + "".join(tables), encoding="utf-8")
-    return written, tuple(said)
+        places[called] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
+    return write_places(named_places(places), folder, file.name), tuple(said)
 
 
 def _foot(mesh: Mesh) -> Array:
@@ -76,10 +70,3 @@ def _moved(region: Region, by: Array) -> Region:
         return replace(region, point=point)
     along = float(point @ region.axis)
     return replace(region, point=point - along * region.axis, span=(region.span[0] + along, region.span[1] + along))
-
-
-def _table(part: str, name: str, T: Array) -> str:
-    """One copy of a part; [mm]."""
-    packed = pose.pack(T)
-    at, turn = (", ".join(f"{x:.12g}" for x in np.asarray(v) + 0.0) for v in (packed[:3], packed[3:]))
-    return f'\n[[pose]]\npart = "{part}"\nname = "{name}"\nat_mm = [{at}]\nquaternion_wxyz = [{turn}]\n'

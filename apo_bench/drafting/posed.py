@@ -9,6 +9,7 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.cad.naming import free_name
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -72,7 +73,7 @@ def _posed(
     file = given.get(part, folder / f"{part}.xml")
     if file not in solids:
         solids[file] = load_part(file)
-    name = free_name(name, used)
+    name = free_name(name, {*used, *_TAKEN})
     if not FACE_OR_PART_NAME.fullmatch(name):
         keys.get("name", keys["part"]).fail("a letter, then letters, digits and underscores are needed")
     T = np.eye(4)
@@ -84,14 +85,6 @@ def _posed(
         r, g, b = (float(x) for x in np.clip(keys["color"].numbers(3), 0.0, 1.0))
         color = (r, g, b)
     return PosedPart(name, file, solids[file], T, color)
-
-
-def free_name(name: str, used: set[str]) -> str:
-    """The name, or one that nothing else has."""
-    free, n = name, 2
-    while free in used or free in _TAKEN:
-        free, n = f"{name}_{n}", n + 1
-    return free
 
 
 def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:

@@ -10,7 +10,7 @@ FACE_OR_PART_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""
 LONGEST_NAME = 64
 _LARGEST_M = 10.0
-_THINNEST_M = 0.0005
+THINNEST_M = 0.0005
 """Half of the least thickness of a box or a cylinder."""
 _FILE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*\.stl")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -98,7 +98,7 @@ class ElementRule(NamedTuple):
 
 _NAMED = NameRule()
 _POINT = NumbersRule(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
-_HALF_SIZES = NumbersRule(((_THINNEST_M, _LARGEST_M),) * 3, 2, " m")
+_HALF_SIZES = NumbersRule(((THINNEST_M, _LARGEST_M),) * 3, 2, " m")
 _DIRECTION = NumbersRule(((-1.0, 1.0),) * 3, 3)
 _COLOR = NumbersRule((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
 """What cannot be seen, a range finder of MuJoCo would not see."""

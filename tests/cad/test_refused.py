@@ -11,10 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
+from apo_bench.cad.brep import BrepFace, BrepSolid
+from apo_bench.cad.from_brep import raw_of
 from apo_bench.cad.importing import import_part, raw_solids
+from apo_bench.cad.patience import in_time
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
+from apo_bench.geometry.convex import piece_corners
 from tests.cad.made import block, rod, write_stl, write_triangles
 
 
@@ -216,3 +221,49 @@ def test_triangles_without_an_area_change_nothing(tmp_path: Path) -> None:
     _, (raw,) = raw_solids(write_triangles(np.concatenate([given[1:], more]), tmp_path / "a.stl"), None)
     assert sum(region.kind == "plane" for region in raw.regions) == 6
     assert dict(import_part(raw, "a", tmp_path, "a.stl").refused) == {}
+
+
+def test_a_cavity_stays_empty_also_behind_a_round_hole(tmp_path: Path) -> None:
+    mesh = block(40, 30, 20) - block(30, 20, 12, (0, 0, 4)) - rod(3, 4, (0, 0, 16))
+    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    done = import_part(raw, "a", tmp_path, "a.stl")
+    pieces = sum(ConvexHull(1e3 * piece_corners(piece)).volume for piece in done.solid.pieces)
+    assert pieces == pytest.approx(1e9 * done.solid.volume, rel=1e-3)
+    assert dict(done.refused) == {}
+
+
+def test_a_brep_that_crosses_itself_is_refused_and_rounding_of_arcs_is_not(tmp_path: Path) -> None:
+    def solid(kind: str, given: Any) -> BrepSolid:
+        index, none = np.array([[0, 1, 2]]), np.zeros(3)
+        across = np.cross(given[:, 1] - given[:, 0], given[:, 2] - given[:, 0])
+        normals = across / np.linalg.norm(across, axis=1)[:, None]
+        faces = (BrepFace(kind, p[0], n, 0.0, 0.0, p, index) for p, n in zip(given, normals, strict=True))
+        return BrepSolid("a", tuple(faces), 1.0, none, np.eye(3), ())
+
+    crossed = np.concatenate([triangles(block(20, 20, 20)), triangles(block(10, 10, 40, (3, 2, -7)))])
+    with pytest.raises(InputError, match="the surface crosses itself"):
+        raw_of(tmp_path / "a.step", solid("plane", crossed))
+    thin = np.concatenate([triangles(rod(10, 20, n=30)), triangles(rod(9.97, 20, n=31))[:, ::-1]])
+    with pytest.raises(InputError, match="the surface crosses itself"):
+        raw_of(tmp_path / "a.step", solid("plane", thin))
+    raw_of(tmp_path / "a.step", solid("sphere", thin))
+
+
+def test_more_holes_than_a_part_may_have_pieces_are_refused_at_once(tmp_path: Path) -> None:
+    from manifold3d import Manifold, OpType
+
+    holes = [rod(1.5, 5, (5 * x, 5 * y, 0), n=16) for x in range(15) for y in range(10)]
+    plate = block(85, 60, 5, (35, 22.5, 0)) - Manifold.batch_boolean(holes, OpType.Add)
+    _, (raw,) = raw_solids(write_stl(plate, tmp_path / "a.stl"), None)
+    with pytest.raises(InputError, match=r"a.stl: its 150 round holes take [\d,]+ convex pieces; 2,000 are the most"):
+        import_part(raw, "a", tmp_path, "a.stl")
+
+
+def test_what_takes_too_long_is_given_up() -> None:
+    def wait() -> None:
+        with in_time("a.stl", "leave out holes", 0.05):
+            while True:
+                pass
+
+    with pytest.raises(InputError, match=r"a.stl takes more than 0.05 s; leave out holes\.$"):
+        wait()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -95,7 +96,7 @@ def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pyte
     pin = Cylinder(5, 40)
     pins = [pin.located(Location((5, -3, 10))), pin.located(Location((100, 0, 0), (0, 90, 0)))]
     for each in pins:
-        each.label, each.color = "pin", Color(0, 0, 1)
+        each.label, each.color = "pin", Color(0, 0.5, 1)
     inner = Compound(label="inner", children=[pins[0]])
     inner.location = Location((0, 0, 7), (0, 0, 90))
     path = write_step(Compound(label="all", children=[plate, inner, pins[1]]), tmp_path / "a.step")
@@ -105,10 +106,15 @@ def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pyte
     assert {each.name for each in out.glob("*.xml")} == {"plate.xml", "pin.xml"}
     first, second, third = tomllib.loads((out / "poses.toml").read_text())["pose"]
     assert (first["part"], first["color"]) == ("plate", [1, 0, 0])
-    assert (second["part"], second["name"], third["part"], third["name"]) == ("pin", "pin", "pin", "pin2")
+    assert (second["part"], second["name"], third["part"], third["name"]) == ("pin", "pin", "pin", "pin_2")
     assert second["at_mm"] == pytest.approx([3, 5, 17], abs=EXACT_MM)
     assert second["quaternion_wxyz"] == pytest.approx([0.5**0.5, 0, 0, 0.5**0.5], abs=1e-9)
-    assert third["color"] == [0, 0, 1]
+    assert third["color"] == [0, 0.5, 1]
+    text = re.sub(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\('(\d+)',)'[^']*'", r"\1'copy \2'", path.read_text())
+    path.write_text(text)
+    names = {place.name for solid in solids_of(path) for place in solid.places}
+    assert len(names) == 3
+    assert all(name.startswith("copy ") for name in names)
 
 
 def test_units_are_those_of_the_file(tmp_path: Path) -> None:
