@@ -1,21 +1,16 @@
-"""Assemblies of three to eight parts with random dimensions, from parts and poses to success rates without a hand.
+"""Assemblies of three to eight parts with random dimensions: part files, poses, and scenarios made without a hand.
 
-`python benchmarks/generated.py FOLDER [--assemblies 10] [--seeds 20]` writes the part files and poses of each, makes a
-scenario, checks it (five trials in which the robot knows the truth), and runs `contact` at 1 mm and 1 degree. Plates,
-pins, bushes, brackets, covers, slots and rings; lengths in mm.
+Plates, pins, bushes, brackets, covers, slots and rings; lengths in mm. `generated_rates.py` measures them.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
 from apo_bench.drafting.writing import scenario_text
@@ -218,33 +213,3 @@ def rate(path: Path, method: str, seeds: int, fidelity: str) -> tuple[int, int]:
     rows = [run_trial(each, scene) for each in asked]
     counted = [row["success"] for row in rows if row["success"] is not None]
     return sum(map(bool, counted)), len(counted)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--assemblies", type=int, default=10)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--fidelity", default="full")
-    asked = parser.parse_args()
-    print("| assembly | family | parts | checked | contact at 1 mm | seconds |\n|---|---|---|---|---|---|", flush=True)
-    for seed in range(asked.first, asked.first + asked.assemblies):
-        begun = time.monotonic()
-        path = scenario_of(seed, asked.folder / f"generated_{seed}")
-        found = check_file(path, fidelity=asked.fidelity)
-        wrong = [each.sentence for each in found if not each.ok]
-        right, counted = rate(path, "contact", asked.seeds, asked.fidelity)
-        cells = (
-            seed,
-            FAMILIES[seed % len(FAMILIES)].__name__,
-            len(generated(seed).places),
-            "; ".join(wrong) or found[-1].sentence,
-            f"{right} of {counted}",
-            f"{time.monotonic() - begun:.0f}",
-        )
-        print("| " + " | ".join(map(str, cells)) + " |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

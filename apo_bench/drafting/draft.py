@@ -26,8 +26,13 @@ _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
-_FINGER_M, _MOST_HOLDS = (0.012, 0.018, 0.035), 300
-"""Half the size of a finger with room to open, from 10 mm below its tip up; so many places are looked at."""
+_FINGER_M, _MOST_HOLDS = (0.013, 0.018, 0.035), 300
+"""Half the size of a finger with room to open and to go down, from 10 mm below its tip up; so many places are looked
+at."""
+_ROOM_M = 0.002
+"""Room that the robot asks for. On the side of the part always: a finger that goes down flush with a wall strikes it."""
+_OVER_M = 0.005
+"""How far tips may be over the top of a part that stands out little; pads hold its uppermost 5 mm then."""
 
 
 @final
@@ -132,8 +137,14 @@ def _holds(
     for placing in order:
         main = placing.moves[0]
         others = [part for part in there if part not in placing.moves]
-        offered = holds(solids[main], np.round(poses[main][2, :3], 9), _OPENING_M)
-        free = (hold for hold in offered[:_MOST_HOLDS] if not _struck(hold, poses[main], solids, poses, others))
+        up = np.round(poses[main][2, :3], 9)
+        offered = holds(solids[main], up, _OPENING_M)
+        free = (
+            hold
+            for over, below in ((0.0, 0.0), (_OVER_M, _ROOM_M))
+            for hold in holds(solids[main], up, _OPENING_M, over)[:_MOST_HOLDS]
+            if not _struck(hold, below, poses[main], solids, poses, others)
+        )
         found[main] = next(free, None)
         if offered and found[main] is None:
             found[main] = offered[0]
@@ -145,13 +156,14 @@ def _holds(
     return found, notes
 
 
-def _struck(hold: Hold, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]) -> bool:
-    """Whether a finger beside a part at T would be in one of the others."""
+def _struck(
+    hold: Hold, below_m: float, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]
+) -> bool:
+    """Whether a finger beside a part at T would be in one of the others, or so far below it."""
     up = T[2, :3]
-    fingers = tuple(
-        Box("", np.array([sign * (hold.half_width + _FINGER_M[0]), 0.0, 0.025]), np.array(_FINGER_M))
-        for sign in (-1.0, 1.0)
-    )
+    out, high = hold.half_width + _FINGER_M[0] - _ROOM_M, 0.025 - below_m / 2
+    half = np.array(_FINGER_M) + [0.0, 0.0, below_m / 2]
+    fingers = tuple(Box("", np.array([sign * out, 0.0, high]), half) for sign in (-1.0, 1.0))
     R = T[:3, :3] @ np.column_stack([hold.across, np.cross(up, hold.across), up])
     at = pose.apply(T, hold.point[None])
     return any(intrusion_depths(fingers, R, at, solids[part].pieces, poses[part])[0] > 0.0 for part in others)

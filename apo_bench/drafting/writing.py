@@ -125,12 +125,11 @@ def _grasp(hold: Hold | None, main: str, draft: Draft) -> Iterator[str]:
         across = R.T @ np.eye(3)[int(np.argmin(widths))]
         at = np.clip(solid.centroid, low, high)
         yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(across)} }}  # TOO WIDE for the gripper"
-    elif ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
-        yield "# grasp: found from the shape; the tips end above the part, which is flat"
     else:
-        at = np.clip(hold.point, low, high)
-        wide = f"{2e3 * hold.half_width:.4g} mm"
-        yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(hold.across)} }}  # {wide} between the fingers"
+        wide = f"{2e3 * hold.half_width:.4g} mm between the fingers"
+        if ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
+            wide += ", whose tips end above the part"
+        yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)} }}  # {wide}"
 
 
 def _file_key(file: Path, folder: Path) -> str:

@@ -97,14 +97,15 @@ def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Arra
     return own is not None and own > (high - low) / 2 - _LESS_M
 
 
-def holds(solid: Solid, up: Array, opening_m: float) -> tuple[Hold, ...]:
+def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[Hold, ...]:
     """Places at which a gripper from above can hold a part, the best first: near the centre of mass, and not too low.
 
     Args:
         up: The vertical, unit vector, (3,), frame of the part.
         opening_m: Of each finger, [m].
+        over_m: So far over the top of the part tips may be; pads reach below them.
     """
-    return _holds(solid, tuple(map(float, up)), opening_m)
+    return _holds(solid, tuple(map(float, up)), opening_m, over_m)
 
 
 def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
@@ -114,12 +115,12 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
 
 
 @lru_cache(maxsize=64)
-def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float) -> tuple[Hold, ...]:
+def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float) -> tuple[Hold, ...]:
     up = np.array(vertical)
-    return _found(solid, up, opening_m, _RAY_M) or _found(solid, up, opening_m, _FINE_M)
+    return _found(solid, up, opening_m, over_m, _RAY_M) or _found(solid, up, opening_m, over_m, _FINE_M)
 
 
-def _found(solid: Solid, up: Array, opening_m: float, ray_m: float) -> tuple[Hold, ...]:
+def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: float) -> tuple[Hold, ...]:
     """With rows of rays so far apart, [m]."""
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
@@ -130,7 +131,7 @@ def _found(solid: Solid, up: Array, opening_m: float, ray_m: float) -> tuple[Hol
         t = _lines(low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _LEVEL])
         level = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _LEVEL]
         rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level, ray_m))
-        tips = _lines(bottom, max(top, best), [best])
+        tips = _lines(bottom, max(top + over_m, best), [best])
         for tip in tips[(tips >= bottom + _OVER_M) & (tips >= top - _PALM_M)]:
             for place in t:
                 for low, high, uneven in _offers(rays, place, tip, opening_m):

@@ -14,7 +14,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import all_boxes
-from apo_bench.geometry.holds import ROOM_M, holds, holds_whole
+from apo_bench.geometry.holds import PAD_M, ROOM_M, holds, holds_whole
 from apo_bench.geometry.solid import Solid, extent
 from apo_bench.insertion.line import Preference
 from apo_bench.io.strict_json import JsonNode
@@ -199,9 +199,12 @@ def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) 
     across, point = None, _above_middle(solid, before)
     if "at_mm" in keys:
         point = 1e-3 * keys["at_mm"].numbers(3)
-        if ((point < low) | (point > high)).any():
-            span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in (low, high))
-            keys["at_mm"].fail(f"a point of the part, from {span} mm, is needed")
+        over = PAD_M[1] * np.round(before[2, :3], 9)
+        ends = np.minimum(low, low + over), np.maximum(high, high + over)
+        if ((point < ends[0]) | (point > ends[1])).any():
+            span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in ends)
+            said = f"a point of the part, or up to {1e3 * PAD_M[1]:g} mm over it, from {span} mm, is needed"
+            keys["at_mm"].fail(said, "pads reach so far below the point")
     if "across" in keys:
         across = read_unit_axis(keys["across"])
         if abs((before[:3, :3] @ across)[2]) > _LEVEL:

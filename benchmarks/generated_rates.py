@@ -1,0 +1,149 @@
+"""Ten assemblies of random dimensions, without a hand: `python benchmarks/generated_rates.py FOLDER [--seeds 20]`.
+
+Writes part files, poses and a scenario of each assembly, checks it, and runs `oracle`, `contact` and `none` at 1 mm and
+1 degree, seed after seed, so that every assembly has as many. Rows are kept in FOLDER/rows.csv; what is there is not
+run again. At the end results/generated.csv and the tables of docs/results/generated.md are written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from apo_bench.drafting.checking import check_file
+from apo_bench.records.settings import TrialSettings
+from apo_bench.statistics.rates import wilson
+from apo_bench.trial.scene import scene_of
+from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.trial import run_trial
+from benchmarks.generated import FAMILIES, generated, scenario_of
+
+ROOT = Path(__file__).parents[1]
+KEPT, PAGE = ROOT / "benchmarks" / "results" / "generated.csv", ROOT / "docs" / "results" / "generated.md"
+FIRST, LAST = "<!-- rates -->", "<!-- end of rates -->"
+"""Around what is written into the page."""
+COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation", "sentence")
+CHECK = "check"
+"""In place of a method: all but the trials of `scenario check`."""
+FEW, METHODS = 5, ("oracle", "contact", "none")
+"""Seeds of all methods; of `contact` there are more."""
+
+Line = Mapping[str, str]
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("folder", type=Path)
+    asked.add_argument("--assemblies", type=int, default=10)
+    asked.add_argument("--seeds", type=int, default=20)
+    given = asked.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    rows = given.folder / "rows.csv"
+    if not rows.exists():
+        rows.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
+    for line in measured(given.folder, given.assemblies, given.seeds, lines_of(rows)):
+        with rows.open("a", encoding="utf-8", newline="") as file:
+            csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(line)
+        print(*line.values(), flush=True)
+    keep(lines_of(rows))
+
+
+def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -> Iterator[Line]:
+    """Checks, then trials seed by seed; nothing that is known already."""
+    there = {(line["assembly"], line["method"], line["seed"]) for line in known}
+    paths = {str(k): folder / f"generated_{k}" / f"generated_{k}.toml" for k in range(assemblies)}
+    for name, path in paths.items():
+        if not path.exists():
+            scenario_of(int(name), path.parent)
+        if (name, CHECK, "") not in there:
+            yield checked(name, path)
+    scenes = {name: scene_of(TrialSettings(str(path))) for name, path in paths.items()}
+    for seed in range(seeds):
+        for name, path in paths.items():
+            methods = METHODS if seed < FEW else ("contact",)
+            missing = [method for method in methods if (name, method, str(seed)) not in there]
+            asked = [TrialSettings(str(path), method=method, seed=seed) for method in missing]
+            if not asked:
+                continue
+            recording = record_demonstration(scenes[name], asked[0].careless, seed)
+            for settings in asked:
+                row = run_trial(settings, scenes[name], recording=recording)
+                said = row["failure_stage"], row["failure_code"], row["failure_operation"], row["sentence"]
+                success = "" if row["success"] is None else int(row["success"])
+                cells = (name, settings.method, seed, success, *said)
+                yield dict(zip(COLUMNS, ("" if cell is None else str(cell) for cell in cells), strict=True))
+
+
+def checked(name: str, path: Path) -> Line:
+    """What `scenario check` finds before any trial; if nothing is wrong, what the scenario has."""
+    found = check_file(path, seeds=0)
+    wrong = [each.sentence for each in found if not each.ok]
+    cells = (name, CHECK, "", str(int(not wrong)), "", "", "", "; ".join(wrong) or found[0].sentence)
+    return dict(zip(COLUMNS, cells, strict=True))
+
+
+def lines_of(path: Path) -> list[Line]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def keep(lines: Sequence[Line]) -> None:
+    """Write the rows in order, and the tables into the page."""
+    order = (CHECK, *METHODS)
+    lines = sorted(lines, key=lambda x: (int(x["assembly"]), order.index(x["method"]), int(x["seed"] or 0)))
+    with KEPT.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(lines)
+    before, rest = PAGE.read_text(encoding="utf-8").split(FIRST)
+    PAGE.write_text(f"{before}{FIRST}\n\n{tables(lines)}\n\n{LAST}{rest.split(LAST)[1]}", encoding="utf-8")
+    print(f"Wrote {KEPT} and {PAGE}")
+
+
+def tables(lines: Sequence[Line]) -> str:
+    made = [
+        "| assembly | kind | parts | contacts | checked | `oracle` | `contact` at 1 mm | `none` at 1 mm |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name in dict.fromkeys(line["assembly"] for line in lines):
+        own = [line for line in lines if line["assembly"] == name]
+        made.append(f"| {name} | {' | '.join(_cells(int(name), own))} |")
+    every = " | ".join(rate(lines, method) for method in METHODS)
+    made += [
+        f"| all | | | | {rate(lines, CHECK, False)} | {every} |",
+        "",
+        "Trials of `oracle` and `contact` that fail:",
+        "",
+    ]
+    wrong = [line for line in lines if line["method"] in METHODS[:2] and line["success"] != "1"]
+    made += [f"- {x['assembly']}, `{x['method']}`, seed {x['seed']}: {x['code']}, {x['sentence']}." for x in wrong]
+    return "\n".join(made if wrong else made[:-2])
+
+
+def _cells(assembly: int, own: Sequence[Line]) -> Iterator[str]:
+    yield FAMILIES[assembly % len(FAMILIES)].__name__
+    yield str(len(generated(assembly).places))
+    check = next(line for line in own if line["method"] == CHECK)
+    contacts = re.search(r"\((.*)\)", check["sentence"])
+    yield contacts[1] if check["success"] == "1" and contacts else ""
+    yield "yes" if check["success"] == "1" else check["sentence"]
+    yield from (rate(own, method) for method in METHODS)
+
+
+def rate(lines: Sequence[Line], method: str, interval: bool = True) -> str:
+    """Successes of those that count, with Wilson's 95 % interval."""
+    counted = [line["success"] == "1" for line in lines if line["method"] == method and line["success"]]
+    if not counted:
+        return ""
+    low, high = wilson(sum(counted), len(counted))
+    return f"{sum(counted)} of {len(counted)}" + (f" ({100 * low:.0f} to {100 * high:.0f} %)" if interval else "")
+
+
+if __name__ == "__main__":
+    main()
