@@ -16,8 +16,17 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import imageio.v3 as imageio
+import numpy as np
+
+from apo_bench.assembly.placement import placements
 from apo_bench.drafting.checking import check_file
+from apo_bench.drafting.posed import TABLE
 from apo_bench.records.settings import TrialSettings
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.replay_cache import ReplayCache
+from apo_bench.simulation.scene.render import camera_view, picture
+from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.statistics.rates import wilson
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import record_demonstration
@@ -26,6 +35,7 @@ from benchmarks.generated import FAMILIES, generated, scenario_of
 
 ROOT = Path(__file__).parents[1]
 KEPT, PAGE = ROOT / "benchmarks" / "results" / "generated.csv", ROOT / "docs" / "results" / "generated.md"
+PICTURE = ROOT / "docs" / "pictures" / "generated.png"
 FIRST, LAST = "<!-- rates -->", "<!-- end of rates -->"
 """Around what is written into the page."""
 COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation", "sentence")
@@ -52,6 +62,7 @@ def main() -> None:
             csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(line)
         print(*line.values(), flush=True)
     keep(lines_of(rows))
+    draw([given.folder / f"generated_{k}" / f"generated_{k}.toml" for k in range(len(FAMILIES))])
 
 
 def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -> Iterator[Line]:
@@ -71,9 +82,9 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
             asked = [TrialSettings(str(path), method=method, seed=seed) for method in missing]
             if not asked:
                 continue
-            recording = record_demonstration(scenes[name], asked[0].careless, seed)
+            recording, cache = record_demonstration(scenes[name], asked[0].careless, seed), ReplayCache()
             for settings in asked:
-                row = run_trial(settings, scenes[name], recording=recording)
+                row = run_trial(settings, scenes[name], recording=recording, cache=cache)
                 said = row["failure_stage"], row["failure_code"], row["failure_operation"], row["sentence"]
                 success = "" if row["success"] is None else int(row["success"])
                 cells = (name, settings.method, seed, success, *said)
@@ -104,6 +115,19 @@ def keep(lines: Sequence[Line]) -> None:
     before, rest = PAGE.read_text(encoding="utf-8").split(FIRST)
     PAGE.write_text(f"{before}{FIRST}\n\n{tables(lines)}\n\n{LAST}{rest.split(LAST)[1]}", encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
+
+
+def draw(paths: Sequence[Path]) -> None:
+    """The assemblies side by side, every part at its goal."""
+    views = []
+    for path in paths:
+        scene = build_scene(load_scenario(path))
+        scenario = scene.scenario
+        poses = placements(scenario.assembly, scenario.start, scenario.goals)[-1]
+        middle = np.mean([poses[part][:3, 3] for part in scenario.assembly.fixed if part != TABLE], axis=0)
+        view = camera_view(np.add(middle, (0.0, 0.0, 0.025)), 0.22, 150.0, -32.0)
+        views.append(picture(scene, poses, 300, 260, view))
+    imageio.imwrite(PICTURE, np.concatenate(views, axis=1))
 
 
 def tables(lines: Sequence[Line]) -> str:

@@ -110,7 +110,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "travel_mm": "length of the last motion",
         },
         "operations, grasp": {
-            "at_mm": "point between the fingers, frame of the part; at most 10 mm over it, for pads reach so far below the point",
+            "at_mm": "point between the fingers, frame of the part, at most 10 mm over it: pads reach so far down",
             "across": f"axis along which the fingers close, level when the part is picked; {SHIFT}",
         },
         "operations, vary": {"along": SHIFT, "mm": "lowest and highest shift"},

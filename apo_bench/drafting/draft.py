@@ -30,7 +30,7 @@ _FINGER_M, _MOST_HOLDS = (0.013, 0.018, 0.035), 300
 """Half the size of a finger with room to open and to go down, from 10 mm below its tip up; so many places are looked
 at."""
 _ROOM_M = 0.002
-"""Room that the robot asks for. On the side of the part always: a finger that goes down flush with a wall strikes it."""
+"""Room that the robot asks for; a finger that goes down flush with a wall strikes it."""
 _OVER_M = 0.005
 """How far tips may be over the top of a part that stands out little; pads hold its uppermost 5 mm then."""
 
@@ -162,7 +162,7 @@ def _struck(
     """Whether a finger beside a part at T would be in one of the others, or so far below it."""
     up = T[2, :3]
     out, high = hold.half_width + _FINGER_M[0] - _ROOM_M, 0.025 - below_m / 2
-    half = np.array(_FINGER_M) + [0.0, 0.0, below_m / 2]
+    half = np.add(_FINGER_M, (0.0, 0.0, below_m / 2))
     fingers = tuple(Box("", np.array([sign * out, 0.0, high]), half) for sign in (-1.0, 1.0))
     R = T[:3, :3] @ np.column_stack([hold.across, np.cross(up, hold.across), up])
     at = pose.apply(T, hold.point[None])

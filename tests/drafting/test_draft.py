@@ -16,7 +16,7 @@ from apo_bench.drafting.writing import scenario_text, turn_deg
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.parts import load_part
-from apo_bench.parts.making import Body, bore, extrude, join, rectangle, shaft, write_part
+from apo_bench.parts.making import Body, bore, extrude, join, polygon, rectangle, shaft, write_part
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
@@ -131,6 +131,14 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
     last = found.grasps[found.order[-1].moves[0]]
     assert last is not None
     assert abs(last.across[1]) == pytest.approx(1.0)
+
+    slot = polygon((-30, 0), (30, 0), (30, 20), (10, 20), (10, 8), (-10, 8), (-10, 20), (-30, 20))
+    rail = extrude(slot, -25, 25, bottom="front", top="back").moved(turn_deg=(90, 0, 0))
+    key = extrude(rectangle(19.4, 50), 0, 20, bottom="bottom", top="top")
+    flush = {"rail": ("rail", at(0, 0, 0)), "key": ("key", at(0, 0, 8))}
+    (grasp,) = loaded(made(tmp_path, {"rail": rail, "key": key}, flush), tmp_path).grasps
+    assert abs(grasp.across[0]) == pytest.approx(1.0)  # across its ends, fingers would go down flush with the rail's
+    assert grasp.point[2] - 0.010 > 0.012  # and else they would stand on its walls
     hole = extrude(rectangle(60, 60), 0, 20, holes=[rectangle(21, 21)], bottom="bottom", top="top")
     low = extrude(rectangle(20, 20), 0, 20, bottom="bottom", top="top")
     sunk = {"hole": ("hole", at(0, 0, 0)), "low": ("low", at(0, 0, 0))}
