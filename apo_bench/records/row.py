@@ -208,6 +208,9 @@ class Row(TypedDict, total=False):
     """Contacts that are there and that the corrector was not told."""
     contacts_false: _Count | None
     """Contacts that the corrector was told and that are not there."""
+    joint_control: str | None
+    """What moved the joints of the arm, its own actuators or servos made for it, and how much stronger the drive of its
+    gripper was made; null where nothing was carried out."""
     reached: dict[str, _Pose] | None
     """Part -> where it ended: x, y, z [mm], qw, qx, qy, qz, world frame."""
     pose_error_fixed_mm: _Size | None

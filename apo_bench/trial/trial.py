@@ -195,7 +195,8 @@ def _outcome(
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
     attempt = replay_and_judge(made.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
-    return end | _correction(made) | predicted | _physics(attempt, made.plan, truth)
+    driven: Row = {"joint_control": scene.arm.control}
+    return end | _correction(made) | predicted | driven | _physics(attempt, made.plan, truth)
 
 
 def _correction(made: MethodResult) -> Row:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -16,7 +18,8 @@ from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.arm_text import check_lines
 from apo_bench.simulation.arms.building import read_arm
-from apo_bench.simulation.arms.checking import check_arm
+from apo_bench.simulation.arms.checking import check_arm, unsaid
+from apo_bench.simulation.arms.home import find_home
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, within_speed
 from apo_bench.simulation.robot.robot import Robot
@@ -152,11 +155,13 @@ def test_a_line_takes_as_long_as_the_joints_need() -> None:
 
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
 def test_the_oracle_succeeds_with_the_arms_that_come_with_the_benchmark(name: str) -> None:
-    spec = TrialSettings("block_on_block", method="oracle", fidelity="contact", arm=name)
-    assert run_trial(spec)["success"]
+    row = run_trial(TrialSettings("block_on_block", method="oracle", fidelity="contact", arm=name))
+    assert row["success"]
+    assert row["joint_control"] == "position servos made from the model"
 
 
 GOOD = 'schema = "apo-bench/arm/1"\nmjcf = "ARMS/ur5e_primitive.xml"\n'
+HOME = "base = { at_mm = [-480, 0, 0] }\nhome_deg = [18, -79, -105, -86, 90, -72]\n"
 GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
 
 
@@ -169,6 +174,7 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
         (GOOD + "payload_kg = -1", "payload_kg"),
         (GOOD + "speed_deg_s = [0, 1]", "above 0"),
         (GOOD + "[gripper]\nspeed_mm_s = 0", "above 0"),
+        (GOOD + "[gripper]\nforce_n = 500", "force_n"),
         (GOOD + "[gripper]\nopen = [1]", "'open' and 'closed' are given together"),
         ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"', "No such file"),
         ('schema = "apo-bench/arm/1"\nmjcf = "broken.xml"', "MuJoCo cannot read this MJCF file of the arm"),
@@ -223,6 +229,55 @@ def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, mon
         find_arm("robosuite:UR9")
     with pytest.raises(InputError, match="fetch it with 'git clone"):
         find_arm("menagerie:universal_robots_ur5e")
+
+
+@pytest.mark.parametrize(("said", "force_n", "times"), [("", 20.0, 20.0 / 3.5), ("force_n = 14", 14.0, 4.0)])
+def test_a_gripper_that_hardly_pushes_is_made_stronger_and_this_is_said(
+    tmp_path: Path, said: str, force_n: float, times: float
+) -> None:
+    """The parallel gripper with a tenth of its strength: 70 N shared by two pads."""
+    weak = (ARMS / "parallel_gripper.xml").read_text().replace('kp="4000"', 'kp="400"').replace("-70 70", "-7 7")
+    (tmp_path / "weak.xml").write_text(weak)
+    arm = read_arm(described(tmp_path, said))
+    assert arm.hand is not None
+    assert arm.hand.force_n == pytest.approx(force_n, rel=0.02)
+    found = re.search("made from the model, gripper drive (.*) times as strong as in the model", arm.control)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(times, rel=0.04)
+
+
+def test_fingers_that_turn_on_hinges_hold_by_their_edges_and_this_is_said(tmp_path: Path) -> None:
+    """Two fingers on hinges, as long as they are apart, which turn by 40 degrees at most; told to within a command."""
+    finger = """<body pos="{0} 0 0"><joint name="j{1}" axis="0 {1} 0" range="-0.7 0" damping="0.1" armature="0.01"/>
+        <geom type="box" pos="0 0 0.06" size="0.004 0.01 0.04" mass="0.02"/></body>"""
+    drive = '<position joint="j{}" kp="30" ctrlrange="-0.7 0" forcerange="-2 2"/>'
+    (tmp_path / "weak.xml").write_text(
+        f"<mujoco><compiler angle='radian'/><worldbody><body>{finger.format(0.06, 1)}{finger.format(-0.06, -1)}</body>"
+        f"</worldbody><actuator>{drive.format(1)}{drive.format(-1)}</actuator></mujoco>"
+    )
+    arm = read_arm(described(tmp_path, ""))
+    assert arm.hand is not None
+    turned = np.degrees(np.abs(arm.hand.state(arm.opening_m / 2) - arm.hand.state(arm.opening_m)))
+    assert arm.hand.turns_deg == pytest.approx(turned[0], abs=1.5)
+    assert arm.hand.turns_deg > 10.0
+    assert any("hold by their edges" in each for each in unsaid(arm))
+
+
+def test_an_arm_waits_with_no_joint_wound_up() -> None:
+    """A Panda's tip may wait at any of four turns: the usual posture, elbow up, is among those."""
+    arm = replace(find_arm("panda_primitive"), base=(-0.48, 0.0, 0.0))
+    q, kinematics = find_home(arm), Kinematics(arm)
+    low, high = kinematics.range_of_joints
+    assert (np.minimum(q - low, high - q) > np.radians(15.0)).all()
+    assert (np.abs(q) <= np.pi).all()
+    assert kinematics.forward(q)[2, 2] == pytest.approx(-1.0, abs=1e-4)
+
+
+def described(folder: Path, said: str) -> Path:
+    """The arm of a UR5e with the gripper `weak.xml`, and what is said of it."""
+    path = folder / "arm.toml"
+    path.write_text(f'{GOOD.replace("ARMS", str(ARMS))}{HOME}[gripper]\nmjcf = "weak.xml"\n{said}\n')
+    return path
 
 
 def test_an_arm_can_be_given_as_a_file(six_axis_file: Path) -> None:

@@ -19,6 +19,7 @@ from apo_bench.simulation.arms.loading import compiled, files_of, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.arms.strength import with_force
 from apo_bench.simulation.scene.arm import Arm, Limits
 
 _TIP = "tip"
@@ -64,6 +65,7 @@ def build_arm(said: ArmDescription) -> Arm:
     joints = _joints(model, flange, said)
     if said.gripper.mjcf is not None:
         hand = load_model(said.gripper.mjcf, "gripper")
+        hand.option = spec.option
         T = T_flange @ said.gripper.mount
         frame = spec.body(model.body(flange).name).add_frame(pos=T[:3, 3], quat=_quaternion(T))
         spec.attach(hand, frame=frame, prefix=_GRIPPER)
@@ -76,7 +78,7 @@ def build_arm(said: ArmDescription) -> Arm:
     whole = compiled(spec, said.mjcf)
     drives = drives_of(whole, joints)
     usual = _usual_home(model, joints)
-    rig = _measuring_model(spec, said)
+    rig = _measuring_model(spec, said.mjcf)
     start = said.home if said.home is not None else usual
     if len(start) != len(joints):
         raise InputError(f"{said.file}: 'home_deg' has {len(start)} numbers; the arm has {len(joints)} joints.")
@@ -88,7 +90,13 @@ def build_arm(said: ArmDescription) -> Arm:
     if gripper.pads is not None and gripper.mjcf is not None:
         a, b = (name if _known(rig, name) else _GRIPPER + name for name in gripper.pads)
         gripper = replace(gripper, pads=(a, b))
-    found = measure(rig, said.gripper.mjcf or said.mjcf, joints, start, rig.body(last).id, gripper)
+    where, flange = said.gripper.mjcf or said.mjcf, rig.body(last).id
+    found, times = with_force(
+        spec,
+        said.gripper.force_n,
+        said.file,
+        lambda spec: measure(_measuring_model(spec, said.mjcf), where, joints, start, flange, gripper),
+    )
     own = _drive(spec, whole, joints, start, drives, found, said)
     text = _text(spec, found)
     arm = Arm(
@@ -107,7 +115,8 @@ def build_arm(said: ArmDescription) -> Arm:
         hand=found.hand,
         limits=_limits(said, joints, drives),
         files=_files(said),
-        control="own position actuators" if own else "position servos made from the model",
+        control=("own position actuators" if own else "position servos made from the model")
+        + (f", gripper drive {times:.3g} times as strong as in the model" if times != 1.0 else ""),
     )
     return arm if said.home is not None else replace(arm, home=find_home(arm))
 
@@ -217,12 +226,12 @@ def _turns(body: Any, joints: Sequence[str]) -> bool:
     return False
 
 
-def _measuring_model(spec: Any, said: ArmDescription) -> Any:
+def _measuring_model(spec: Any, mjcf: Path) -> Any:
     """The arm with a part to push on, which waits far away."""
     rig = spec.copy()
     probe = rig.worldbody.add_body(name=PROBE, mocap=True, pos=(0.0, 0.0, -1.0))
     probe.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.01, 0.01, 0.01), contype=0, conaffinity=1)
-    return compiled(rig, said.mjcf)
+    return compiled(rig, mjcf)
 
 
 def _drive(

@@ -13,8 +13,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.home import tip_down
+from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution.prepare import key_angles, moves
-from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady
+from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady, turn_from
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.arm import Arm, Kinematics
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -23,11 +24,11 @@ SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
 _TABLE_M, _TURNS = 0.03, (-1.2, 0.0, 1.2)
-"""Height of the tip, [m], and turns about the vertical, [rad], at which the table is to be reached."""
+"""Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
 _HIGH_M, _WAY_M, _PUSH_N, _STAND_S = 0.35, 0.15, 5.0, 0.3
 """Errors are looked at on a way of this length at this height, stiffness by this push, after so long a stand."""
 _LAYOUTS, _MOST_GIVING_M = 20, 0.002
-_LEAST_MARGIN_DEG, _LEAST_FORCE_N = 5.0, 10.0
+_LEAST_MARGIN_DEG, _MOST_TURN_DEG = 5.0, 5.0
 
 
 @final
@@ -75,7 +76,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     Args:
         layouts: How many layouts are looked at.
     """
-    missing = _unsaid(arm)
+    missing = unsaid(arm)
     try:
         scene = build_scene(scenario, arm=arm)
     except InputError as error:
@@ -96,8 +97,8 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
             f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; make "
             "the joints stiffer ('torque_nm' limits them) or the clearance larger."
         )
-    if force < _LEAST_FORCE_N:
-        missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {_LEAST_FORCE_N:g} N.")
+    if force < LEAST_FORCE_N:
+        missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {LEAST_FORCE_N:g} N.")
     if good < layouts:
         missing.append(
             f"{layouts - good} of {layouts} layouts are not reached; move 'base' nearer, or state another 'home_deg'."
@@ -124,8 +125,8 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     )
 
 
-def _unsaid(arm: Arm) -> list[str]:
-    """What a file could say and does not."""
+def unsaid(arm: Arm) -> list[str]:
+    """What a file could say and does not, and what is wrong with the gripper that was measured."""
     found = []
     if arm.limits.payload_kg is None:
         found.append("no payload is stated ('payload_kg'): all is lifted that friction holds.")
@@ -140,15 +141,20 @@ def _unsaid(arm: Arm) -> list[str]:
             f"the fingers give way by {1e3 * arm.hand.gives_m:.1f} mm on a part of half their opening, so it is lost; "
             "take a gripper whose linkage is stiff, or a softer 'closed'."
         )
+    if arm.hand is not None and arm.hand.turns_deg > _MOST_TURN_DEG:
+        found.append(
+            f"the pads turn by {arm.hand.turns_deg:.1f} degrees while the gripper closes to half, so that they hold by "
+            "their edges; take a gripper that keeps its pads parallel."
+        )
     return found
 
 
 def _reach(kinematics: Kinematics, arm: Arm) -> Array:
-    rows = []
+    rows, rest = [], turn_from(tip_down(np.zeros(3)), kinematics.forward(arm.home))
     for x, y in _GRID:
         q, reached = np.array(arm.home), 0
         for turn in _TURNS:
-            found = kinematics.inverse(tip_down(np.array([x, y, _TABLE_M]), turn), q, 25)
+            found = kinematics.inverse(tip_down(np.array([x, y, _TABLE_M]), rest + turn), q, 25)
             reached += found is not None
         rows.append((x, y, reached / len(_TURNS)))
     return np.array(rows)

@@ -16,6 +16,7 @@ from apo_bench.scenario.keys import read_pose
 
 _SCHEMA = "apo-bench/arm/1"
 _MOST_JOINTS, _MOST_PAYLOAD_KG, _MOST_NM, _MOST_DEG_S, _MOST_MM_S = 16, 1000.0, 1e5, 3600.0, 1000.0
+_MOST_FORCE_N = 60.0
 USUAL_BASE = np.array([[1.0, 0, 0, -0.45], [0, 1.0, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 1.0]])
 """Where a base stands that nothing is said of: behind the middle of the table, (4, 4), world, [m]."""
 USUAL_BASE.flags.writeable = False
@@ -38,6 +39,8 @@ class GripperDescription:
     """A body or geom of each side, whose surface holds a part."""
     speed_m_s: float | None = None
     """The fastest each pad moves; None: 0.05, as a Franka Hand."""
+    force_n: float | None = None
+    """How hard each pad pushes on a part of half the opening; None: as in the model, if that holds a part."""
 
 
 @final
@@ -91,7 +94,7 @@ def read_description(path: Path) -> ArmDescription:
 
 
 def _gripper(path: Path, node: JsonNode) -> GripperDescription:
-    keys = node.fields((), ("mjcf", "mount", "actuators", "open", "closed", "pads", "speed_mm_s"))
+    keys = node.fields((), ("mjcf", "mount", "actuators", "open", "closed", "pads", "speed_mm_s", "force_n"))
     if ("open" in keys) != ("closed" in keys):
         node.fail("'open' and 'closed' are given together, or neither")
     pads = _names(keys["pads"]) if "pads" in keys else None
@@ -105,6 +108,7 @@ def _gripper(path: Path, node: JsonNode) -> GripperDescription:
         closed=_row(keys["closed"]) if "closed" in keys else None,
         pads=None if pads is None else (pads[0], pads[1]),
         speed_m_s=1e-3 * keys["speed_mm_s"].number(0.0, _MOST_MM_S, above=True) if "speed_mm_s" in keys else None,
+        force_n=keys["force_n"].number(1.0, _MOST_FORCE_N) if "force_n" in keys else None,
     )
 
 

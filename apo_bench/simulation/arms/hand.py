@@ -35,8 +35,10 @@ class Hand:
     """How far inside the part its fingers are sent for that, each."""
     gives_m: float
     """How far the middle of each pad then gives way, beyond the surface of that part."""
+    turns_deg: float
+    """How far a pad turns while the empty hand closes to half of its opening."""
     friction: float
-    """Of the pads."""
+    """Of what pushes on that part."""
     seconds: float
     """How long it takes to close or open at most."""
     pads: tuple[str, str]

@@ -10,8 +10,8 @@ from apo_bench.simulation.scene.arm import Arm, Kinematics
 
 _AT = (-0.05, 0.0, 0.30)
 _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
-"""Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room."""
-_TURNS = (-1.6, 0.0, 1.6)
+"""Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room; ways it may wait."""
+_TURNS, _WAYS = (-1.6, 0.0, 1.6), (0.0, np.pi / 2, np.pi, -np.pi / 2)
 _TRIES, _WIDEST, _SAME_RAD = 40, 3.0, 0.2
 _TABLE_ROOM_M, _NEAR = 0.02, 0.4
 _ENOUGH_RAD = 0.3
@@ -35,43 +35,58 @@ def find_home(arm: Arm) -> Array:
     """
     kinematics, rng = Kinematics(arm, posture=False), np.random.default_rng(0)
     low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.range_of_joints)
-    found: list[Array] = []
+    found: list[tuple[Array, float]] = []
     for i in range(_TRIES):
         start = rng.uniform(low, high)
         near = _NEAR * (i > 0)
         start = start if i % 2 else (low + high) / 2 + near * (start - (low + high) / 2)
-        q = kinematics.inverse(tip_down(np.array(_AT)), start, 25)
-        if q is None or any(np.abs(q - other).max() < _SAME_RAD for other in found) or _in_table(kinematics, q):
+        way = _WAYS[i // 2 % len(_WAYS)]
+        q = kinematics.inverse(tip_down(np.array(_AT), way), start, 25)
+        if q is None:
             continue
-        found.append(q)
+        q = _unwound(q, *kinematics.range_of_joints)
+        if any(np.abs(q - other).max() < _SAME_RAD for other, _ in found) or _in_table(kinematics, q):
+            continue
+        found.append((q, way))
     if not found:
         at = ", ".join(f"{1e3 * x:g}" for x in _AT)
         raise InputError(
             f"{arm.mjcf}: the tip does not reach ({at}) mm looking down; move the 'base', which stands at "
             f"({', '.join(f'{1e3 * x:g}' for x in arm.base)}) mm."
         )
-    return max(found, key=lambda q: _worth(kinematics, q))
+    return max(found, key=lambda each: _worth(kinematics, *each))[0]
 
 
-def _worth(kinematics: Kinematics, q: Array) -> tuple[int, float, float]:
+def _worth(kinematics: Kinematics, q: Array, way: float) -> tuple[int, float, float]:
     """Places reached, room to the limits as far as it is needed, height of the joints."""
-    reached, least = room(kinematics, q)
+    reached, least = room(kinematics, q, way)
     kinematics.forward(q)
     moved = kinematics.model.body_jntnum > 0
     return reached, round(min(least, _ENOUGH_RAD), 2), float(kinematics.configuration.data.xpos[moved, 2].mean())
 
 
-def room(kinematics: Kinematics, home: Array) -> tuple[int, float]:
-    """How many places on the table are reached from home, and the least distance of a joint from its limit, [rad]."""
+def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
+    """How many places on the table are reached from home, and the least distance of a joint from its limit, [rad].
+
+    Args:
+        way: How the tip is turned there, [rad].
+    """
+    kinematics.keep_near(home)
     low, high = kinematics.range_of_joints
     reached, least = 0, np.inf
     for turn in _TURNS:
         for at in _TABLE:
-            q = kinematics.inverse(tip_down(np.array(at), turn), home, 25)
+            q = kinematics.inverse(tip_down(np.array(at), way + turn), home, 25)
             if q is not None:
                 reached += 1
                 least = min(least, float(np.minimum(q - low, high - q).min()))
     return reached, least
+
+
+def _unwound(q: Array, low: Array, high: Array) -> Array:
+    """The same place with every joint less than half a turn from zero, where its limits let it be."""
+    near = (q + np.pi) % (2 * np.pi) - np.pi
+    return np.where((near >= low) & (near <= high), near, q)
 
 
 def _in_table(kinematics: Kinematics, q: Array) -> bool:

@@ -80,7 +80,7 @@ def _table(
     flange: int,
 ) -> Measured:
     model, data, pads = rig.model, rig.data, sides[0] + sides[1]
-    rows, reach, middles = [], [], []
+    rows, reach, middles, turns = [], [], [], []
     closed, opened = ends
     for part in np.linspace(1.0, 0.0, _LEVELS):
         command = closed + part * (opened - closed)
@@ -89,6 +89,7 @@ def _table(
         rows.append((width / 2, command, np.array(data.qpos[model.jnt_qposadr[rig.joints]])))
         reach.append(max(reach_of(model, data, g, ahead) for g in pads))
         middles.append(middle)
+        turns.append(np.array(data.geom_xmat[pads[0]].reshape(3, 3)))
     kept = _ascending([row[0] for row in rows])
     if rows[kept[-1]][0] - max(rows[kept[0]][0], 0.0) < _LEAST_M / 2:
         raise InputError(
@@ -108,7 +109,7 @@ def _table(
     apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across))
     thick = apart - 2 * rows[-1][0]
     table = [rows[i] for i in kept]
-    force, squeeze = force_of(rig, at, np.column_stack([across, side, ahead]), table)
+    force, squeeze, friction = force_of(rig, at, np.column_stack([across, side, ahead]), table)
     apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across)) - thick
     hand = Hand(
         actuators=tuple(model.actuator(int(a)).name for a in rig.actuators),
@@ -119,13 +120,19 @@ def _table(
         force_n=force,
         squeeze_m=squeeze,
         gives_m=max(0.0, PROBE_WIDE * rows[kept[-1]][0] - apart / 2),
-        friction=max(float(model.geom_friction[g, 0]) for g in pads),
+        turns_deg=_angle(turns[min(kept, key=lambda i: abs(rows[i][0] - rows[kept[-1]][0] / 2))], turns[kept[-1]]),
+        friction=friction,
         pads=(model.geom(left).name, model.geom(right).name),
         thick_m=thick,
         seconds=seconds + _STROKE_S,
         reach=np.array([reach[i] - longest + _BEYOND_M for i in kept]),
     )
     return Measured(hand, model.body(mount).name, T)
+
+
+def _angle(one: Array, other: Array) -> float:
+    """Between two rotations, [deg]."""
+    return float(np.degrees(np.arccos(np.clip((np.sum(one * other) - 1.0) / 2.0, -1.0, 1.0))))
 
 
 def _ascending(openings: Sequence[float]) -> list[int]:

@@ -22,8 +22,9 @@ _PROBE_HIGH_M, _STEPS, _SLOWLY_S, _LOOKS = 0.006, 16, 0.02, 100
 which the force is averaged."""
 
 
-def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, Array]]) -> tuple[float, float]:
-    """How hard each pad pushes on a part between them, [N], and how far inside it they are sent for that, [m].
+def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, Array]]) -> tuple[float, float, float]:
+    """How hard each pad pushes on a part between them, [N], how far inside it they are sent for that, [m], and the
+    friction of what touches it there.
 
     Farther means harder where the drive is soft; it is not more than a part should be pressed by.
     """
@@ -36,30 +37,32 @@ def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, 
     model.geom_aabb[geom, 3:] = half
     mocap = int(model.body_mocapid[body])
     data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
-    force = squeeze = 0.0
+    force = squeeze = friction = 0.0
     for squeeze in _SQUEEZES_M:
         rig.settle(opened)
         data.mocap_pos[mocap] = at
         mujoco.mju_mat2Quat(data.mocap_quat[mocap], np.ascontiguousarray(R).ravel())
         wanted, openings = half[0] - squeeze, [row[0] for row in table]
         closed = np.array([np.interp(wanted, openings, column) for column in np.array([row[1] for row in table]).T])
-        force = _pressed(rig, opened, closed, R[:, 0])
+        force, friction = _pressed(rig, geom, opened, closed, R[:, 0])
         data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
         if force <= _MOST_N:
             break
-    return force, squeeze
+    return force, squeeze, friction
 
 
-def _pressed(rig: Rig, opened: Array, closed: Array, across: Array) -> float:
-    """The mean force of a pad while it presses, [N]."""
+def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> tuple[float, float]:
+    """The mean force of a pad while it presses, [N], and its friction."""
     data = rig.data
     for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         rig.settle(opened + part * (closed - opened), _SLOWLY_S)
     rig.settle(closed)
-    total, wrench = 0.0, np.zeros(6)
+    total, rubs, wrench = 0.0, 0.0, np.zeros(6)
     for _ in range(_LOOKS):
         rig.settle(closed, STEP_S)
         for c in range(data.ncon):
             mujoco.mj_contactForce(rig.model, data, c, wrench)
-            total += abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
-    return total / 2 / _LOOKS
+            push = abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
+            pad = next(int(g) for g in data.contact[c].geom if g != probe)
+            total, rubs = total + push, rubs + push * float(rig.model.geom_friction[pad, 0])
+    return total / 2 / _LOOKS, round(rubs / total, 6) if total else 0.0

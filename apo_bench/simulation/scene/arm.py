@@ -76,7 +76,7 @@ class Arm:
     files: tuple[Path, ...] = ()
     """All files that it was made of; none: `mjcf` alone."""
     control: str = "own position actuators"
-    """What moves the joints."""
+    """What moves the joints, and how much stronger than in the model the drive of the gripper is, if it is."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "home", frozen(self.home, len(self.joints)))
@@ -172,13 +172,20 @@ class Kinematics:
         self._full = self.model.qpos0.copy()
         limited = self.model.jnt_limited.astype(np.bool_)
         self._range: Array = np.where(limited[:, None], self.model.jnt_range, (-np.inf, np.inf)).T
-        self._ids = [int(self.model.joint(j).id) for j in arm.joints]
-        self._posture = _posture_task(self, arm) if posture and len(arm.joints) > 6 else None
+        self.ids = [int(self.model.joint(j).id) for j in arm.joints]
+        self._posture: Any = None
+        if posture:
+            self.keep_near(arm.home)
+
+    def keep_near(self, home: Array) -> None:
+        """Of arms with more than six joints: which joint angles they prefer from now on, [rad]."""
+        if len(self.adr) > 6:
+            self._posture = _posture_task(self, home)
 
     @property
     def range_of_joints(self) -> Array:
         """(2, joints): the lowest and the highest angle of each, [rad]."""
-        return self._range[:, self._ids]
+        return self._range[:, self.ids]
 
     def forward(self, q: Array) -> Array:
         """The pose of the tip, (4, 4), world."""
@@ -245,12 +252,12 @@ def _alone(arm: Arm) -> Any:
     return spec.compile()
 
 
-def _posture_task(kinematics: Kinematics, arm: Arm) -> Any:
+def _posture_task(kinematics: Kinematics, home: Array) -> Any:
     """What keeps the elbow where it is at home, (mink's `PostureTask`)."""
     cost = np.zeros(kinematics.model.nv)
-    cost[[int(kinematics.model.joint(j).dofadr[0]) for j in arm.joints]] = Kinematics.POSTURE
+    cost[kinematics.model.jnt_dofadr[kinematics.ids]] = Kinematics.POSTURE
     task = mink.PostureTask(kinematics.model, cost=cost)
     q = kinematics.model.qpos0.copy()
-    q[kinematics.adr] = arm.home
+    q[kinematics.adr] = home
     task.set_target(q)
     return task
