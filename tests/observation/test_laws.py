@@ -215,7 +215,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     class Carried(Exception):
         pass
 
-    def refuse(plan: Any, *_: object) -> None:
+    def refuse(plan: Any, *_: object, **__: object) -> None:
         carried_out.append(plan)
         raise Carried
 
