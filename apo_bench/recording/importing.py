@@ -92,8 +92,8 @@ def rested(tracks: Mapping[str, Track], file: str) -> Stays:
         if not found:
             track = tracks[part]
             raise InputError(
-                f"{file}: '{part}' never rests, so nothing is known of it: {len(track.t)} frames in "
-                f"{track.t[-1] - track.t[0]:.2f} s were given; give a log in which it lies still for 0.3 s and more."
+                f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
+                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for 0.3 s and more."
             )
     return stays
 

@@ -28,19 +28,20 @@ _FIELDS = {
     "child_frame_id": Column("id", ""),
 }
 _NOTES = ["lengths in m, as in ROS", "quaternions by the names of the fields, as in ROS"]
-_NANO = 1e15
-"""A time that is larger is in nanoseconds: as seconds it would be 30 million years."""
 
 
 def read_ros_csv(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
-    """Columns such as `field.header.stamp`, `pose.position.x`; without child_frame_id one file is one object."""
+    """Columns such as `field.header.stamp`, `pose.position.x`; without child_frame_id one file is one object.
+
+    A stamp in one column is in nanoseconds if it is whole, as ROS writes it, else in seconds.
+    """
     table = read_numbers(path, _field, how.columns)
     cells = dict(table.cells)
     if "seconds" in cells:
         t = cells["seconds"] + 1e-9 * cells.get("nanoseconds", np.zeros(len(cells["seconds"])))
     elif "stamp" in cells or "time" in cells:
         t = cells["stamp"] if "stamp" in cells else cells["time"]
-        t = t * 1e-9 if len(t) and np.abs(t).max() > _NANO else t
+        t = t * 1e-9 if (t == np.round(t)).all() else t
     else:
         raise InputError(f"{path}: the column of the time is missing, such as header.stamp.sec; export the header too.")
     places = [f"{path}, line {line}" for line in table.lines]
@@ -109,7 +110,7 @@ def _stamp(message: dict[str, Any], place: str) -> float:
         whole, part = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs", 0))
         return _finite(whole, f"{place}, header.stamp.sec") + 1e-9 * _finite(part, f"{place}, header.stamp.nanosec")
     x = _finite(stamp, f"{place}, header.stamp")
-    return x * 1e-9 if abs(x) > _NANO else x
+    return x * 1e-9 if x.is_integer() else x
 
 
 def _pose(message: dict[str, Any], place: str) -> list[float]:

@@ -13,7 +13,7 @@ from apo_bench.files.observation import read_observation
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
-from benchmarks.recordings import FORMS, Tracked
+from benchmarks.recording_forms import FORMS, Tracked
 from tests.recorded import CAMERA, seen
 
 NAME = "block_on_block"

@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.recording.camera_file import Conventions, read_camera
 from apo_bench.recording.formats import FORMATS, read_log
 from apo_bench.recording.objects_file import part_tracks, read_objects
-from benchmarks.recordings import FORMS, Tracked
+from benchmarks.recording_forms import FORMS, Tracked
 from tests.recorded import CAMERA, RATE_HZ, motion
 
 

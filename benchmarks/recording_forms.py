@@ -1,0 +1,260 @@
+"""Every way in which the log of a pose tracker may be written, with the camera and objects files that belong to it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+RATE_HZ = 30.0
+
+
+class Tracked(NamedTuple):
+    """What a tracker reports of one model."""
+
+    id: str
+    T_model_part: Array
+    t: Array
+    T: Array
+    """(n, 4, 4), camera from model, [m]."""
+
+
+class Form(NamedTuple):
+    """A way to write a log."""
+
+    format: str
+    file: str
+    log: str
+    """What the camera file has to say about it."""
+    write: Callable[[Mapping[str, Tracked], Path], None]
+
+
+def camera_text(log: str, known: Mapping[str, str], stays: float | None) -> str:
+    """A camera file: how the log is written, and which parts stand on known places."""
+    lines = ['schema = "apo-bench/camera/1"', "", *(["[log]", log, ""] if log else []), "[known]"]
+    lines += [f"{part} = {place}" for part, place in known.items()]
+    lines += [] if stays is None else ["", "[noise]", f"stays_mm = {stays:g}", f"stays_deg = {stays:g}"]
+    return "\n".join(lines) + "\n"
+
+
+def objects_text(found: Mapping[str, Tracked]) -> str:
+    """An objects file."""
+    lines = ['schema = "apo-bench/objects/1"', "", "[objects]"]
+    for part, one in found.items():
+        packed = pose.pack(one.T_model_part)
+        at, q = (", ".join(f"{x:.9g}" for x in numbers) for numbers in (packed[:3] * 1e3, packed[3:]))
+        lines.append(f'{part} = {{ id = "{one.id}", frame = {{ at_mm = [{at}], quaternion_wxyz = [{q}] }} }}')
+    return "\n".join(lines) + "\n"
+
+
+def _rows(found: Mapping[str, Tracked]) -> list[tuple[float, str, Array]]:
+    return sorted(
+        ((t, one.id, T) for one in found.values() for t, T in zip(one.t, one.T, strict=True)), key=lambda r: r[:2]
+    )
+
+
+def _csv(
+    head: str, numbers: Callable[[Array], Array], clock: str = "t_s", per_s: float = 1.0
+) -> Callable[[Mapping[str, Tracked], Path], None]:
+    def write(found: Mapping[str, Tracked], path: Path) -> None:
+        rows = [f"{per_s * t:.6f},{name}," + ",".join(f"{x:.7g}" for x in numbers(T)) for t, name, T in _rows(found)]
+        path.write_text("\n".join([f"{clock},id,{head}", *rows]) + "\n", encoding="utf-8")
+
+    return write
+
+
+def _csv_files(found: Mapping[str, Tracked], path: Path) -> None:
+    path.mkdir()
+    for one in found.values():
+        packed = pose.pack(one.T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]
+        rows = [",".join(f"{x:.9g}" for x in (t, *row)) for t, row in zip(one.t, packed, strict=True)]
+        text = "\n".join(["t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz", *rows]) + "\n"
+        (path / f"{one.id}.csv").write_text(text, encoding="utf-8")
+
+
+def _with(scale: float, rotation: Callable[[Rotation], Array]) -> Callable[[Array], Array]:
+    return lambda T: np.concatenate([T[:3, 3] * scale, np.ravel(rotation(Rotation.from_matrix(T[:3, :3])))])
+
+
+def _bop(found: Mapping[str, Tracked], path: Path) -> None:
+    rows = []
+    for t, name, T in _rows(found):
+        R, at = (" ".join(f"{x:.8g}" for x in np.ravel(numbers)) for numbers in (T[:3, :3], T[:3, 3] * 1e3))
+        rows.append(f"1,{round(t * RATE_HZ)},{name},0.9,{R},{at},0.03")
+    path.write_text("\n".join(["scene_id,im_id,obj_id,score,R,t,time", *rows]) + "\n", encoding="utf-8")
+
+
+def _tum(found: Mapping[str, Tracked], path: Path) -> None:
+    path.mkdir()
+    for one in found.values():
+        packed = pose.pack(one.T)[:, [0, 1, 2, 4, 5, 6, 3]]
+        lines = [" ".join(f"{x:.9g}" for x in (t, *row)) for t, row in zip(one.t, packed, strict=True)]
+        (path / f"{one.id}.txt").write_text(
+            "# timestamp tx ty tz qx qy qz qw\n" + "\n".join(lines) + "\n", encoding="utf-8"
+        )
+
+
+def _ros_csv(found: Mapping[str, Tracked], path: Path) -> None:
+    names = [f"transform.translation.{a}" for a in "xyz"] + [f"transform.rotation.{a}" for a in "xyzw"]
+    rows = [
+        f"{int(t)},{round(t % 1 * 1e9)},camera,{name},"
+        + ",".join(f"{x:.9g}" for x in pose.pack(T)[[0, 1, 2, 4, 5, 6, 3]])
+        for t, name, T in _rows(found)
+    ]
+    head = "header.stamp.sec,header.stamp.nanosec,header.frame_id,child_frame_id," + ",".join(names)
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+
+
+def _ros_csv_files(found: Mapping[str, Tracked], path: Path) -> None:
+    path.mkdir()
+    names = [f"field.pose.position.{a}" for a in "xyz"] + [f"field.pose.orientation.{a}" for a in "xyzw"]
+    for one in found.values():
+        packed = pose.pack(one.T)[:, [0, 1, 2, 4, 5, 6, 3]]
+        rows = [
+            f"{round(t * 1e9)},{round(t * 1e9)},camera," + ",".join(f"{x:.9g}" for x in row)
+            for t, row in zip(one.t, packed, strict=True)
+        ]
+        text = "\n".join([",".join(["%time", "field.header.stamp", "field.header.frame_id", *names]), *rows]) + "\n"
+        (path / f"{one.id}.csv").write_text(text, encoding="utf-8")
+
+
+def _stamp(t: float) -> dict[str, object]:
+    return {"stamp": {"sec": int(t), "nanosec": round(t % 1 * 1e9)}, "frame_id": "camera"}
+
+
+def _ros_json(found: Mapping[str, Tracked], path: Path) -> None:
+    lines = []
+    for t, name, T in _rows(found):
+        packed = pose.pack(T).tolist()
+        at, turn = dict(zip("xyz", packed[:3], strict=True)), dict(zip("wxyz", packed[3:], strict=True))
+        message = {"header": _stamp(t), "pose": {"position": at, "orientation": turn}}
+        lines.append(json.dumps({"topic": f"/tracker/{name}", "msg": message}))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _ros_tf(found: Mapping[str, Tracked], path: Path) -> None:
+    messages = []
+    for t, name, T in _rows(found):
+        packed = pose.pack(T).tolist()
+        at, turn = dict(zip("xyz", packed[:3], strict=True)), dict(zip("wxyz", packed[3:], strict=True))
+        transform = {"translation": at, "rotation": turn}
+        messages.append({"transforms": [{"header": _stamp(t), "child_frame_id": name, "transform": transform}]})
+    path.write_text(json.dumps(messages), encoding="utf-8")
+
+
+_MM, _M, _CM = 1e3, 1.0, 1e2
+_WXYZ = _with(_MM, lambda R: R.as_quat(scalar_first=True))
+FORMS: Mapping[str, Form] = {
+    "csv-wxyz": Form("csv", "log.csv", "", _csv("x_mm,y_mm,z_mm,qw,qx,qy,qz", _WXYZ)),
+    "csv-xyzw": Form(
+        "csv", "log.csv", 'quaternion = "xyzw"', _csv("x_m,y_m,z_m,q0,q1,q2,q3", _with(_M, lambda R: R.as_quat()))
+    ),
+    "csv-files": Form("csv", "log", "", _csv_files),
+    "csv-rotvec": Form(
+        "csv",
+        "log.csv",
+        "",
+        _csv("x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg", _with(_MM, lambda R: np.degrees(R.as_rotvec()))),
+    ),
+    "csv-axis": Form("csv", "log.csv", "", _csv("x_cm,y_cm,z_cm,ax,ay,az,angle_deg", _with(_CM, lambda R: _axis(R)))),
+    "csv-euler": Form(
+        "csv",
+        "log.csv",
+        'euler = "ZYX"\nangle = "rad"\nlength = "m"',
+        _csv("x,y,z,e1,e2,e3", _with(_M, lambda R: R.as_euler("ZYX"))),
+    ),
+    "csv-rpy": Form(
+        "csv",
+        "log.csv",
+        'euler = "xyz"',
+        _csv("x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg", _with(_MM, lambda R: R.as_euler("xyz", degrees=True))),
+    ),
+    "csv-matrix": Form(
+        "csv",
+        "log.csv",
+        "",
+        _csv(
+            "x_mm,y_mm,z_mm," + ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
+            _with(_MM, lambda R: R.as_matrix()),
+        ),
+    ),
+    "csv-ms": Form(
+        "csv",
+        "log.csv",
+        "",
+        _csv(
+            "x_m,y_m,z_m," + ",".join(f"m{i}{j}" for i in (0, 1, 2) for j in (0, 1, 2)),
+            _with(_M, lambda R: R.as_matrix()),
+            "t_ms",
+            1e3,
+        ),
+    ),
+    "bop": Form("bop", "log.csv", f"rate_hz = {RATE_HZ:g}", _bop),
+    "tum": Form("tum", "log", "", _tum),
+    "ros-csv": Form("ros-csv", "log.csv", "", _ros_csv),
+    "ros-csv-files": Form("ros-csv", "log", "", _ros_csv_files),
+    "ros-json": Form("ros-json", "log.jsonl", "", _ros_json),
+    "ros-tf": Form("ros-json", "log.json", "", _ros_tf),
+}
+"""Every way in which a log may be written."""
+SAID: Mapping[str, str] = {
+    "csv-wxyz": "quaternions by the names of their columns, mm",
+    "csv-xyzw": "quaternions `q0` to `q3` in the order x, y, z, w, m",
+    "csv-files": "the same without ids, one file per object",
+    "csv-rotvec": "rotation vectors, deg, mm",
+    "csv-axis": "axis and angle, deg, cm",
+    "csv-euler": "Euler angles about moving axes z, y, x, rad, m",
+    "csv-rpy": "roll, pitch and yaw about fixed axes, deg, mm",
+    "csv-matrix": "matrices `r11` to `r33`, mm",
+    "csv-ms": "matrices `m00` to `m22`, m, times in ms",
+    "bop": "results of BOP, images by their numbers",
+    "tum": "one file per object",
+    "ros-csv": "`TransformStamped`, seconds and nanoseconds",
+    "ros-csv-files": "`PoseStamped`, one file per object, nanoseconds",
+    "ros-json": "`PoseStamped`, one message per line, topics are ids",
+    "ros-tf": "a list of `TFMessage`",
+}
+"""What each is, for a reader."""
+
+
+def _axis(R: Rotation) -> Array:
+    """Unit axis and angle in degrees."""
+    vector = R.as_rotvec()
+    angle = float(np.linalg.norm(vector))
+    return np.array([*(vector / angle if angle else (1.0, 0.0, 0.0)), np.degrees(angle)])
+
+
+def known_text(starts: Mapping[str, Array | None]) -> dict[str, str]:
+    """Known places as a camera file states them; None: where the scenario starts the part."""
+    said = {}
+    for part, T in starts.items():
+        said[part] = '"start"'
+        if T is not None:
+            packed = pose.pack(T)
+            at, q = (", ".join(f"{x:.9g}" for x in numbers) for numbers in (packed[:3] * 1e3, packed[3:]))
+            said[part] = f"{{ at_mm = [{at}], quaternion_wxyz = [{q}] }}"
+    return said
+
+
+def write_recording(
+    form: Form, found: Mapping[str, Tracked], starts: Mapping[str, Array | None], folder: Path, stays: float | None
+) -> Path:
+    """Write a log with its camera.toml and objects.toml; returns the log.
+
+    Args:
+        starts: Part -> where it begins, (4, 4), world, [m]; None: where the scenario starts it.
+        stays: Standard deviation of the error that stays, mm and degrees; None: it is not stated.
+    """
+    topics = form.write is _ros_json
+    ids = {part: one._replace(id=f"tracker/{one.id}") if topics else one for part, one in found.items()}
+    form.write(found, folder / form.file)
+    (folder / "camera.toml").write_text(camera_text(form.log, known_text(starts), stays), encoding="utf-8")
+    (folder / "objects.toml").write_text(objects_text(ids), encoding="utf-8")
+    return folder / form.file
