@@ -24,11 +24,14 @@ from apo_bench.recording.doubts import check_arrangement, check_direction
 from apo_bench.recording.log import Track
 from apo_bench.recording.operations import Seen, seen_operation
 from apo_bench.recording.ordering import NoOrder, Stated
-from apo_bench.recording.rests import rests_of
+from apo_bench.recording.rests import least_rest_s, rests_of
 from apo_bench.recording.stays import Stay, Stays, stays_of
 from apo_bench.recording.unclear import unclear
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
+
+_SLOW_S = 0.5
+"""Rests that have to be longer are said: hands pause for less."""
 
 
 @final
@@ -76,7 +79,9 @@ def import_recording(
         arranged = fitted(stays)
     except NoOrder as error:
         check_direction(fitted, stays, file)
-        raise InputError(f"{file}: {error}") from error
+        least = max(map(least_rest_s, tracks.values()))
+        slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
+        raise InputError(f"{file}: {error}{slow}") from error
     check_arrangement(arranged, fitted, stays, models or {}, file)
     return _made(tracks, stays, arranged, camera, scenario)
 
@@ -93,7 +98,8 @@ def rested(tracks: Mapping[str, Track], file: str) -> Stays:
             track = tracks[part]
             raise InputError(
                 f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
-                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for 0.3 s and more."
+                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
+                f"{least_rest_s(track):.1f} s and more."
             )
     return stays
 

@@ -17,6 +17,8 @@ from apo_bench.recording.log import Log, Track
 from apo_bench.scenario.keys import read_any_pose, refuse
 
 _SCHEMA = "apo-bench/objects/1"
+_MOST_IDS = 12
+"""So many ids are named in a sentence."""
 
 
 class TrackedPart(NamedTuple):
@@ -75,13 +77,15 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
         InputError: An id of the log is no part, or a part is not in the log.
     """
     known = {one.id for one in objects.parts.values()} | objects.ignored
-    for name in log.tracks:
-        if name not in known:
-            raise InputError(
-                f"{log.file}: the id '{one_line(name, 60)}'{_of_file(name, log)} is no part; name its part in "
-                f"{objects.file}, "
-                f"or add it to its key `ignore`. Known: {', '.join(sorted(known))}."
-            )
+    strange = [name for name in log.tracks if name not in known]
+    if strange:
+        are, them = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part", "it"
+        if len(strange) > 1:
+            are, them = f"the ids {_quoted(strange)} are no parts; name their parts", "them"
+        raise InputError(
+            f"{log.file}: {are} in {objects.file}, or add {them} to its key `ignore`. Known: "
+            f"{', '.join(sorted(known))}."
+        )
     found: dict[str, Track] = {}
     for part, one in objects.parts.items():
         if one.id not in log.tracks:
@@ -91,6 +95,11 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
         track = log.tracks[one.id]
         found[part] = Track(track.t, track.T @ one.T_model_part)
     return found
+
+
+def _quoted(names: list[str]) -> str:
+    more = ", ..." if len(names) > _MOST_IDS else ""
+    return ", ".join(f"'{one_line(name, 60)}'" for name in names[:_MOST_IDS]) + more
 
 
 def _of_file(name: str, log: Log) -> str:

@@ -22,6 +22,8 @@ REST_S = 0.3
 """Least duration of a rest."""
 _FEWEST = 4
 """Frames of a rest."""
+_ENOUGH_HZ = 30.0
+"""Rests are looked for in so many frames a second."""
 _LEAST = np.repeat([2e-4, 1.7e-3], 3)
 """Noise per axis below which changes are not looked for: 0.2 mm, 0.1 deg."""
 _LEAST.flags.writeable = False
@@ -60,21 +62,40 @@ class Rest:
 
 
 def rests_of(track: Track, rest_s: float = REST_S) -> tuple[Rest, ...]:
-    """The rests of a track, in order of time."""
-    n = len(track.t)
-    if n < _FEWEST:
+    """The rests of a track, in order of time: looked for in frames that are new, averaged over all."""
+    each = _stride(track)
+    t, T = track.t[::each], track.T[::each]
+    if len(t) < _FEWEST:
         return ()
-    noise = np.maximum(_noise(track.T), _LEAST)
-    m = _half_window(track.t, rest_s)
+    noise = np.maximum(_noise(T), _LEAST)
+    m = _half_window(t, rest_s)
     spans: list[tuple[int, int]] = []
-    for a, b in _still_spans(track, noise, m):
-        a, b = _trimmed(track.T, a, b, noise)
-        if b - a + 1 >= _FEWEST and track.t[b] - track.t[a] >= 0.5 * rest_s:
-            spans += _split(track.T, a, b, noise)
-    spans = _merged(track.T, spans, noise, m)
-    found = [(a, b, average(track.T[a : b + 1])) for a, b in spans if track.t[b] - track.t[a] >= 0.5 * rest_s]
+    for a, b in _still_spans(T, noise, m):
+        a, b = _trimmed(T, a, b, noise)
+        if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * rest_s:
+            spans += _split(T, a, b, noise)
+    spans = [(each * a, each * b) for a, b in _merged(T, spans, noise, m) if t[b] - t[a] >= 0.5 * rest_s]
+    found = [(a, b, average(track.T[a : b + 1])) for a, b in spans]
     common = common_scatter([mean for _, _, mean in found]) if found else np.zeros((6, 6))
     return tuple(Rest(a, b, float(track.t[a]), float(track.t[b]), pooled(mean, common)) for a, b, mean in found)
+
+
+def least_rest_s(track: Track) -> float:
+    """How long a part has to rest to be seen resting, [s]."""
+    each = _stride(track)
+    if len(track.t) <= each:
+        return REST_S
+    return float(max(REST_S, (2 * _FEWEST - 1) * np.median(np.diff(track.t[::each]))))
+
+
+def _stride(track: Track) -> int:
+    """Every how many frames one is new: trackers repeat a pose until there is another, or smooth over many a second."""
+    if len(track.t) < 2:
+        return 1
+    changes = np.flatnonzero((np.diff(track.T, axis=0) != 0.0).any(axis=(1, 2)))
+    repeated = float(np.median(np.diff(changes))) if len(changes) > 1 else 1.0
+    rate = 1.0 / max(float(np.median(np.diff(track.t))), 1e-6)
+    return max(1, round(repeated), round(rate / _ENOUGH_HZ))
 
 
 def _noise(T: Array) -> Array:
@@ -91,14 +112,14 @@ def _half_window(t: Array, rest_s: float) -> int:
     return max(3, round(0.5 * rest_s / max(float(np.median(np.diff(t))), 1e-6)))
 
 
-def _still_spans(track: Track, noise: Array, m: int) -> list[tuple[int, int]]:
+def _still_spans(T: Array, noise: Array, m: int) -> list[tuple[int, int]]:
     """First and last frame of each stretch of still frames, with the half windows at its ends."""
-    n = len(track.t)
+    n = len(T)
     if n <= 2 * m:
         return [(0, n - 1)]
     window = np.arange(n - 2 * m)[:, None] + np.arange(2 * m + 1)
-    middle = pose.inverse(track.T[m : n - m])
-    xi = pose.log(middle[:, None] @ track.T[window])
+    middle = pose.inverse(T[m : n - m])
+    xi = pose.log(middle[:, None] @ T[window])
     change = np.median(xi[:, m + 1 :], axis=1) - np.median(xi[:, :m], axis=1)
     still = np.linalg.norm(change / noise, axis=1) < _STILL * _MEDIAN / np.sqrt(m)
     spans: list[tuple[int, int]] = []

@@ -26,7 +26,7 @@ NEAR_M = 0.005
 _BEYOND_M = 0.002
 """Contact is sought this far beyond where it should be."""
 _ABOVE_M = 0.1
-"""A part is approached from so far above."""
+"""A part is approached from so far above, and left by so far back along the tip."""
 _ALONG = 0.999
 
 
@@ -39,7 +39,7 @@ def robot_form(
         lines: Of the plan, step by step.
         notes: What is to be said with it.
     """
-    poses = dict(plan.start)
+    poses, to_base = dict(plan.start), pose.inverse(frames.T_world_base)
     steps = []
     history: list[Mapping[str, Array]] = []
     for line in lines:
@@ -58,6 +58,11 @@ def robot_form(
             "quaternion": frames.quaternion,
             "tip": "between the fingertips: z ahead, x along the direction in which the fingers close",
             "base_in_world": _pose(frames.T_world_base, frames),
+            "flange_to_tip": None if frames.T_flange_tip is None else _pose(frames.T_flange_tip, frames),
+        },
+        "parts": {
+            part: {"starts": _pose(to_base @ T, frames), "fixed": part in plan.assembly.fixed}
+            for part, T in plan.start.items()
         },
         "steps": steps,
         "notes": list(notes),
@@ -85,12 +90,14 @@ def _step(
     grip = tip_in_part(line.grasp, here)
     low, high = solid.bounds
     width = float(np.abs(line.grasp.across) @ (high - low))
-    tip = here @ grip
+    tip, end = here @ grip, goal @ grip
+    made = () if line.undo else plan.assembly.operations[line.operation].contacts
     return {
         "operation": line.operation + 1,
         "undo": line.undo,
         "part": part,
         "carries": list(line.what.carries),
+        "makes": [str(contact) for contact in made],
         "grasp": {
             "tip_in_part": _pose(grip, frames),
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
@@ -100,6 +107,7 @@ def _step(
             *_departs(line, here, grip, frames),
             *_arrives(line, goal, grip, frames),
         ],
+        "leave": _tip(_shifted(end, end[:3, 2], -_ABOVE_M), frames),
         "part_at_goal": _pose(pose.inverse(frames.T_world_base) @ goal, frames),
         "trouble": line.trouble or None,
     }

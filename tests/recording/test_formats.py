@@ -115,7 +115,7 @@ def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def test_an_id_that_is_no_part_and_a_part_without_its_id_are_named(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
     log = read_log(tmp_path / "log.csv", "csv", Conventions())
-    for id_, sentence in (("b", "the id 'a' is no part"), ("a", "")):
+    for id_, sentence in (("b", "the id 'a' is no part; name its part in"), ("a", "")):
         text = f'schema = "apo-bench/objects/1"\n[objects]\npeg = {{ id = "{id_}" }}\n'
         (tmp_path / "o.toml").write_text(text, encoding="utf-8")
         if sentence:

@@ -64,6 +64,20 @@ def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> N
     assert all(not one.rest.mean.inlier.all() for one in found.operations if one.rest is not None)
 
 
+def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
+    tracks = seen(NAME, 0.5)
+    often = {
+        part: Track((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
+        for part, (t, T) in tracks.items()
+    }
+    found, plain = imported(often), imported(tracks)
+    off = pose.log(pose.inverse(goals(NAME)) @ found.observation.goals)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    means = ([one.rest.mean.covariance for one in each.operations if one.rest] for each in (found, plain))
+    ratio = np.divide(*(np.trace(C, axis1=1, axis2=2) for C in map(np.array, means)))
+    assert ratio.min() > 0.5  # three times as many frames would make it 0.33
+
+
 def test_the_covariance_of_a_frame_is_that_of_its_noise() -> None:
     scatter = [one.rest.mean.scatter for one in imported(seen(NAME, 1.0)).operations if one.rest]
     deviations = np.sqrt([np.diagonal(S) for S in scatter]) / np.repeat([1e-3, np.radians(1.0)], 3)

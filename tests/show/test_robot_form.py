@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,15 @@ def matrix(said: dict[str, list[float]]) -> Array:
     return pose.unpack(np.concatenate([np.array(said["position_mm"]) * 1e-3, q]))
 
 
+def numbers(said: Any) -> list[float | str]:
+    """Every number and text of a document, in order."""
+    if isinstance(said, dict):
+        return [x for key, value in said.items() for x in (key, *numbers(value))]
+    if isinstance(said, list):
+        return [x for value in said for x in numbers(value)]
+    return [float(said) if isinstance(said, int | float) else str(said)]
+
+
 @pytest.mark.parametrize("name", ["stick_in_tower", "carried_bridge", "pocket_table"])
 def test_motions_follow_each_other_and_end_with_the_part_at_its_goal(name: str) -> None:
     goals = layout_at(load_scenario(name), 0.1, 0.0, 0.3).goals
@@ -41,6 +51,32 @@ def test_motions_follow_each_other_and_end_with_the_part_at_its_goal(name: str) 
         for motion in step["motions"]:
             begin, end = (np.array(motion[key]["position_mm"]) for key in ("from", "to"))
             assert np.allclose(begin + motion["length_mm"] * np.array(motion["direction"]), end, atol=1e-5)
+
+
+@pytest.mark.parametrize("frames", [RobotFrames(), RobotFrames(BASE, TOOL, "wxyz")], ids=["tip", "flange"])
+@pytest.mark.parametrize("name", ["stick_in_tower", "carried_bridge"])
+def test_a_reader_rebuilds_the_plan_from_the_file_alone(name: str, frames: RobotFrames) -> None:
+    """Nothing but the file and the scenario that it names; grasps and motions then follow from it again."""
+    said = json.loads(json.dumps(form(name, frames)))
+    base, scenario = matrix(said["poses"]["base_in_world"]), load_scenario(said["scenario"])
+    start = {part: base @ matrix(one["starts"]) for part, one in said["parts"].items()}
+    goals = np.array([base @ matrix(step["part_at_goal"]) for step in said["steps"]])
+    plan = Plan(scenario.assembly, start, goals)
+    assert {part for part, one in said["parts"].items() if one["fixed"]} == set(scenario.assembly.fixed)
+    for step, operation in zip(said["steps"], scenario.assembly.operations, strict=True):
+        assert (step["part"], *step["carries"]) == operation.moves
+    again = robot_form(plan_lines(plan, scenario), plan, scenario, frames)
+    for one, other in zip(numbers(said), numbers(json.loads(json.dumps(again))), strict=True):
+        assert one == other if isinstance(one, str) else abs(one - other) < 1e-6
+
+
+def test_flange_and_tip_are_the_same_pose() -> None:
+    said = form("stick_in_tower", RobotFrames(BASE, TOOL, "wxyz"))
+    tool = matrix(said["poses"]["flange_to_tip"])
+    for step in said["steps"]:
+        tip = matrix(step["motions"][-1]["to"]) @ tool
+        assert np.allclose(tip, matrix(step["part_at_goal"]) @ matrix(step["grasp"]["tip_in_part"]), atol=1e-9)
+        assert np.allclose(matrix(step["leave"]) @ tool, tip @ pose.at((0, 0, -0.1), (0, 0, 0)), atol=1e-9)
 
 
 def test_base_flange_and_order_are_those_that_were_asked_for() -> None:
