@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
@@ -87,6 +88,24 @@ def framed(change: Callable[[Array], Array]) -> Change:
     return other
 
 
+def eulers(written: str, stated: str, unit: str = "deg") -> Change:
+    """A log of Euler angles about other axes than the camera file states, or in another unit than its columns say."""
+
+    def change(files: Files) -> Files:
+        R = Rotation.from_matrix(files.T[:, :3, :3])
+        rows = [
+            f"{t:.6f},{name}," + ",".join(f"{x:.9g}" for x in (*at, *angles))
+            for t, name, at, angles in zip(
+                files.t, files.ids, files.T[:, :3, 3], R.as_euler(written, degrees=unit == "deg"), strict=True
+            )
+        ]
+        text = "\n".join(["t_s,id,x_mm,y_mm,z_mm,e1_deg,e2_deg,e3_deg", *rows]) + "\n"
+        camera = files.camera.replace("[known]", f'[log]\neuler = "{stated}"\n\n[known]')
+        return files._replace(text=text, camera=camera)
+
+    return change
+
+
 def edited(key: str, old: str, new: str) -> Change:
     """A file in which a text is another one."""
 
@@ -128,6 +147,8 @@ CHANGES: Mapping[str, Change] = {
     "milliseconds in the column `t_s`": timed(lambda t: 1e3 * t),
     "quaternions x, y, z, w in columns named w, x, y, z": posed(_reordered),
     "quaternions by number, order not stated": lambda files: files._replace(head="t_s,id,x_mm,y_mm,z_mm,q0,q1,q2,q3"),
+    "Euler angles about axes z, y, x, stated as x, y, z": eulers("ZYX", "XYZ"),
+    "radians in columns named `e1_deg`": eulers("xyz", "xyz", "rad"),
     "x mirrored": posed(_flipped(0)),
     "y mirrored": posed(_flipped(1)),
     "z mirrored": posed(_flipped(2)),

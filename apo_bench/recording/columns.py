@@ -37,6 +37,9 @@ KNOWN = {"id", "t", "frame", *_POSITION, *(name for names in _ROTATIONS.values()
 _LENGTH_ONE = 0.02
 """A quaternion, an axis or a row may differ from length 1 by so much."""
 
+_MOST_RAD = 4.0 * np.pi
+"""Larger angles are none in radians."""
+
 
 class Column(NamedTuple):
     """What a column is, and the unit in its name."""
@@ -167,6 +170,12 @@ def _rotations(
     if len(unit) > 1:
         raise InputError(f"{file}: angles are in {' and '.join(sorted(unit))}; give all in one unit.")
     (called,) = unit
+    largest = float(np.abs(np.column_stack([cells[name] for name in angular])).max(initial=0.0))
+    if called == "rad" and largest > _MOST_RAD:
+        raise InputError(
+            f"{file}: angles of up to {largest:.4g} rad were given, so these seem to be degrees that were read as "
+            "radians; state the unit: columns such as rx_deg, or `angle` in the camera file."
+        )
     if kind == "axis and angle":
         _check_length(np.linalg.norm(numbers[:, :3], axis=1), "an axis", places)
         vectors = numbers[:, :3] * numbers[:, 3:] * ANGLES[called]

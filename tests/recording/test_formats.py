@@ -68,6 +68,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "euler": ("t_s,id,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0.1,a,0,0,900,1,0,0\n", "do not say their order"),
     "no time": ("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,0,0,900,1,0,0,0\n", "the column of the time is missing"),
     "milliseconds": (HEAD + ROW + "33.4,a,0,0,900,1,0,0,0\n", "33.3 s, so its times seem to be in another unit"),
+    "degrees": ("t_s,id,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad\n0.1,a,0,0,900,90,0,0\n", "up to 90 rad were given"),
     "lacking": (HEAD.replace("qz", "q") + ROW, "qz is missing beside qw, qx, qy"),
     "semicolons": (HEAD.replace(",", ";"), "columns are separated by commas; this file uses ';'"),
 }

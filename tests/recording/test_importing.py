@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -167,6 +168,19 @@ def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
     aside = Track(tracks["stick"].t, tracks["stick"].T @ pose.at((-0.155, 0.0, 0.0), (0.0, 0.0, 0.0)))
     assert imported(tracks).unclear == ()
     assert "operation 3 (stick) leaves a contact open by 1" in imported({**tracks, "stick": aside}).unclear[0]
+
+
+def test_euler_angles_about_other_axes_and_in_radians_are_named() -> None:
+    stated = replace(GIVEN, conventions=Conventions(euler="xyz"))
+    for other, sentence in (("ZYX", 'state `euler = "ZYX"`'), ("radians", "radians that were read as degrees")):
+        tracks = {}
+        for part, (t, T) in seen(NAME, 0.1).items():
+            R, wrong = Rotation.from_matrix(T[:, :3, :3]), T.copy()
+            angles = np.radians(R.as_euler("xyz")) if other == "radians" else R.as_euler(other)
+            wrong[:, :3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+            tracks[part] = Track(t, wrong)
+        with pytest.raises(InputError, match=sentence):
+            imported(tracks, stated)
 
 
 def test_time_that_runs_backwards_is_named() -> None:
