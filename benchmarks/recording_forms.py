@@ -207,7 +207,7 @@ FORMS: Mapping[str, Form] = {
 SAID: Mapping[str, str] = {
     "csv-wxyz": "quaternions by the names of their columns, mm",
     "csv-xyzw": "quaternions `q0` to `q3` in the order x, y, z, w, m",
-    "csv-files": "the same without ids, one file per object",
+    "csv-files": "quaternions by the names of their columns, mm, no ids, one file per object",
     "csv-rotvec": "rotation vectors, deg, mm",
     "csv-axis": "axis and angle, deg, cm",
     "csv-euler": "Euler angles about moving axes z, y, x, rad, m",
