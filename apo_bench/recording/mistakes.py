@@ -50,8 +50,8 @@ def mistakes(stays: Stays, models: Mapping[str, Array], euler: str | None) -> It
         yield sentence, log(partial(_scaled, factor=factor))
     sentence = "its angles seem to be radians that were read as degrees: name their columns so, or state `angle`"
     yield sentence, log(partial(_turned_more, euler=euler))
-    for order in _AXES if euler else ():
-        if order != euler:
+    for order in _AXES:
+        if euler and order != euler:
             sentence = f'its Euler angles seem to be about other axes: state `euler = "{order}"` in the camera file'
             yield sentence, log(partial(_other_axes, stated=euler, order=order))
     yield "its time seems to run backwards: give the log as it was recorded", reversed_in_time(stays)
