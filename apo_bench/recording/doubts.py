@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
+from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.mistakes import mistakes, reversed_in_time
 from apo_bench.recording.ordering import NoOrder
 from apo_bench.recording.stays import Stays
@@ -25,13 +26,13 @@ _HELPLESS = (
 
 
 def check_arrangement(
-    found: Arrangement, arrange: Arrange, stays: Stays, models: Mapping[str, Array], euler: str | None, file: str
+    found: Arrangement, arrange: Arrange, stays: Stays, models: Mapping[str, Array], camera: CameraFile, file: str
 ) -> None:
     """Refuse a recording in which no contact fits, with what would mend it.
 
     Args:
         models: Part -> where its frame lies in the tracker's model, (4, 4), [m]; the identity if it is missing.
-        euler: The axes of Euler angles that were stated.
+        camera: As it was stated.
 
     Raises:
         InputError: It does not fit.
@@ -39,7 +40,7 @@ def check_arrangement(
     if found.wrong_mm <= _FITS_MM:
         return
     best, said = found.wrong_mm * _MENDS, ""
-    for sentence, other in mistakes(stays, models, euler):
+    for sentence, other in mistakes(stays, models, camera):
         try:
             wrong = arrange(other).wrong_mm
         except (NoOrder, np.linalg.LinAlgError):

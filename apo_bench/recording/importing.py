@@ -82,7 +82,7 @@ def import_recording(
         least = max(map(least_rest_s, tracks.values()))
         slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
         raise InputError(f"{file}: {error}{slow}") from error
-    check_arrangement(arranged, fitted, stays, models or {}, camera.conventions.euler, file)
+    check_arrangement(arranged, fitted, stays, models or {}, camera, file)
     return _made(tracks, stays, arranged, camera, scenario)
 
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.rests import Rest
 from apo_bench.recording.stays import Stay, Stays
 
@@ -20,7 +21,7 @@ _AXES = tuple("".join(axes) for each in ("xyz", "XYZ") for axes in permutations(
 """About three different axes, fixed or moving."""
 
 
-def mistakes(stays: Stays, models: Mapping[str, Array], euler: str | None) -> Iterator[tuple[str, Stays]]:
+def mistakes(stays: Stays, models: Mapping[str, Array], camera: CameraFile) -> Iterator[tuple[str, Stays]]:
     """What to do about each usual mistake, and the stays that it gives.
 
     Mistakes in a log are made in the poses of the tracker's models, not in those of parts.
@@ -28,6 +29,8 @@ def mistakes(stays: Stays, models: Mapping[str, Array], euler: str | None) -> It
 
     def log(change: Callable[[Array], Array]) -> Stays:
         return _changed(stays, lambda part, T: change(T @ pose.inverse(M(part))) @ M(part))
+
+    euler, X = camera.conventions.euler, camera.T_world_camera
 
     def M(part: str) -> Array:
         return models.get(part, _SAME)
@@ -43,6 +46,9 @@ def mistakes(stays: Stays, models: Mapping[str, Array], euler: str | None) -> It
         yield sentence, log(partial(_mirrored, flip=flip))
     sentence = "its poses seem to be those of the camera in the model: state `inverted = true` in the camera file"
     yield sentence, log(pose.inverse)
+    if X is not None:
+        sentence = "the pose in the camera file seems to be that of the world in the camera: state it inverted"
+        yield sentence, log(lambda T: pose.inverse(X @ X) @ T)
     sentence = "its axes seem to be those of OpenGL: turn the pose of the camera by 180 deg about x"
     yield sentence, log(lambda T: _GL @ T)
     for factor in (10.0, 0.1, 1e3, 1e-3):

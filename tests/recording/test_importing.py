@@ -183,6 +183,11 @@ def test_euler_angles_about_other_axes_and_in_radians_are_named() -> None:
             imported(tracks, stated)
 
 
+def test_a_pose_of_the_world_in_the_camera_is_named() -> None:
+    with pytest.raises(InputError, match="that of the world in the camera: state it inverted"):
+        imported(seen(NAME, 0.3), replace(GIVEN, T_world_camera=pose.inverse(CAMERA)))
+
+
 def test_time_that_runs_backwards_is_named() -> None:
     tracks = {part: Track(t[-1] - t[::-1], T[::-1]) for part, (t, T) in seen(NAME, 0.3).items()}
     with pytest.raises(InputError, match=r"log\.csv: time seems to run backwards"):
