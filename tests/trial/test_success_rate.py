@@ -60,7 +60,7 @@ OTHERWISE = (
 """What older rows say of the verdict that is now called `as_demonstrated`."""
 PHYSICS = ("peak_force_n", "pushed_mm", "pose_error_fixed_mm", "pose_error_free_mm")
 """Two rows in which one of these differs were rounded differently on the way, and everything else may differ too."""
-NEW = ("seen_again", "left_out", "free_moved", "moved_in_hand")
+NEW = ("seen_again", "left_out", "free_moved", "moved_in_hand", "robot_error", "joint_control")
 """What rows of before do not say."""
 CASES = [(name, method) for name, methods in METHODS.items() for method in methods]
 
