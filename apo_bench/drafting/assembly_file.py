@@ -15,6 +15,10 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
+_UPRIGHT = 1.0 - 1e-9
+_NEAR = 0.005
+"""A part of the width of the box."""
+
 
 def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: int = 2) -> tuple[Path, tuple[str, ...]]:
     """Write the parts of an assembly, each shape once, and where every copy of them is.
@@ -40,7 +44,7 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
     places, said = dict[str, list[Place]](), list[str]()
     for raw in raws:
         called = free_name(part_name(raw.name), places)
-        foot = _foot(raw.mesh)
+        foot = _foot(raw)
         done = import_part(_shifted(raw, -foot), called, folder, f"{file.name}, {raw.name}")
         said.append(f"{called}: {len(done.solid.faces)} flat and {len(done.solid.rounds)} round faces")
         said += [f"{called}.{face} can make no contact: {why}" for face, why in done.refused.items()]
@@ -48,10 +52,20 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
     return write_places(named_places(places), folder, file.name), tuple(said)
 
 
-def _foot(mesh: Mesh) -> Array:
-    """The middle of the lower side of the box around a mesh, (3,), to a micrometre, [mm]."""
-    low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
-    return np.round([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]], 3)
+def _foot(raw: RawSolid) -> Array:
+    """The middle of the lower side of the box around a solid, (3,), to a micrometre, [mm].
+
+    An upright axis that goes by near there takes its place: the box around facets is off by a part of their sagitta.
+    """
+    low, high = raw.mesh.corners.min(axis=0), raw.mesh.corners.max(axis=0)
+    middle = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+    for region in raw.regions:
+        if region.point is not None and region.axis is not None and abs(region.axis[2]) > _UPRIGHT:
+            beside = region.point[:2] - middle[:2]
+            if np.linalg.norm(beside) < _NEAR * np.ptp([low, high], axis=0)[:2].max():
+                middle[:2] += beside
+                break
+    return np.round(middle, 3)
 
 
 def _shifted(raw: RawSolid, by: Array) -> RawSolid:

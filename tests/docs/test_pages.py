@@ -45,6 +45,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"eye ": "many depth images; tests/depth_camera runs them",
     r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/show steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
+    r"scenario new .*\.step ": "needs the extra cad; tests/cad runs it",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",
     r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",

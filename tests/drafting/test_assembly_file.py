@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 from apo_bench.drafting.assembly_file import import_assembly
 from apo_bench.drafting.posed import read_posed
@@ -40,6 +41,14 @@ def test_solids_that_touch_are_parts_with_frames_of_their_own(tmp_path: Path) ->
     wall = next(w for each in parts.values() for w in each.solid.rounds.values())
     np.testing.assert_allclose(wall.ends[:, :2], 0.0, atol=1e-5)
     np.testing.assert_allclose(sorted(wall.ends[:, 2]), (0, 0.01), atol=1e-6)
+
+
+def test_the_frame_of_a_turned_part_lies_on_its_axis(tmp_path: Path) -> None:
+    """With 41 facets the middle of the box is off the axis by a part of their sagitta."""
+    pin = Manifold.cylinder(30, 8, 8, 41).translate((20, 5, 10))
+    poses, _ = import_assembly(stl(tmp_path, block(90, 60, 10, (0, 0, 0)), pin), tmp_path / "parts")
+    found = next(each for each in read_posed(poses) if each.solid.rounds)
+    np.testing.assert_allclose(1e3 * found.T[:3, 3], (20, 5, 10), atol=1.1e-3)
 
 
 def test_a_cavity_is_no_solid(tmp_path: Path) -> None:
