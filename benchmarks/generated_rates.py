@@ -11,6 +11,7 @@ import argparse
 import csv
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
-from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.rates import wilson
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import record_demonstration
@@ -74,7 +75,7 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
             scenario_of(int(name), path.parent)
         if (name, CHECK, "") not in there:
             yield checked(name, path)
-    scenes = {name: scene_of(TrialSettings(str(path))) for name, path in paths.items()}
+    scenes: dict[str, Scene] = {}
     for seed in range(seeds):
         for name, path in paths.items():
             methods = METHODS if seed < FEW else ("contact",)
@@ -82,6 +83,7 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
             asked = [TrialSettings(str(path), method=method, seed=seed) for method in missing]
             if not asked:
                 continue
+            scenes[name] = scenes.get(name) or scene_of(asked[0])
             recording, cache = record_demonstration(scenes[name], asked[0].careless, seed), ReplayCache()
             for settings in asked:
                 row = run_trial(settings, scenes[name], recording=recording, cache=cache)
@@ -105,8 +107,10 @@ def lines_of(path: Path) -> list[Line]:
 
 
 def keep(lines: Sequence[Line]) -> None:
-    """Write the rows in order, and the tables into the page."""
-    order = (CHECK, *METHODS)
+    """Write the rows in order, of seeds that every assembly has, and the tables into the page."""
+    order, names = (CHECK, *METHODS), {line["assembly"] for line in lines}
+    seen = Counter((line["method"], line["seed"]) for line in lines)
+    lines = [line for line in lines if seen[line["method"], line["seed"]] == len(names)]
     lines = sorted(lines, key=lambda x: (int(x["assembly"]), order.index(x["method"]), int(x["seed"] or 0)))
     with KEPT.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")

@@ -20,7 +20,14 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.execution.grasping import RestingPart, grasp_at, half_width, obstacles, tip_frame
+from apo_bench.simulation.execution.grasping import (
+    RestingPart,
+    clear_across,
+    grasp_at,
+    half_width,
+    obstacles,
+    tip_frame,
+)
 from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import obstacle
@@ -211,6 +218,17 @@ def test_where_a_wall_stands_a_bracket_is_held_by_its_other_sides(tmp_path: Path
     found = grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, (*around, wall))])
     assert abs(found.across[0]) == 1.0
     assert half_width(scene.pieces["part"], found, T) == pytest.approx(0.005)
+
+
+def test_no_part_is_centred_where_fingers_would_close_flush_with_a_wall(tmp_path: Path) -> None:
+    scene = one_part(tmp_path, bracket(), SIDEWAYS)
+    T = scene.scenario.start["part"]
+    around = obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
+    for half, clear in ((0.005, False), (0.002, True)):
+        size = np.array([half, 0.01, 0.02])
+        walls = [Box(f"wall{side}", np.array([0.005, side * 0.0205, 0.02]), size) for side in (-1, 1)]
+        found = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, obstacle(tuple(walls), T))))
+        assert (found is not None) == clear
 
 
 def test_the_robot_carries_an_l_shaped_bracket_by_its_arm(tmp_path: Path) -> None:

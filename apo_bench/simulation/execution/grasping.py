@@ -73,11 +73,15 @@ def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[Resting
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
-    """The first clear grasp that closes along what is level of a direction of the part, either way, or None."""
+    """The first grasp that closes along what is level of a direction of the part, either way, or None.
+
+    It is clear open and closed: fingers that close flush with a wall beside the part stem against it.
+    """
     up = _upwards(place.T)
     level = across - (across @ up) * up
     level /= np.linalg.norm(level)
     able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ level) > 0.99]
+    able = [grasp for grasp in able if _clear_closed(scene, part, grasp, place, _MARGINS_M[-1])]
     return _first_clear(scene, part, able, [place])
 
 
@@ -216,6 +220,13 @@ def _clear_ones(
             at = points @ place.T[:3, :3].T + place.T[:3, 3]
             struck |= _depth(scene, opening, R, at, place.around, margin) > 0.0
         yield from (grasp for grasp, hit in zip(same, struck, strict=True) if not hit)
+
+
+def _clear_closed(scene: Scene, part: str, grasp: Grasp, place: RestingPart, margin: float) -> bool:
+    """Whether the gripper strikes nothing once it has closed on the part."""
+    width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, place.T)
+    tip = place.T @ tip_frame(grasp, place.T)
+    return bool(_depth(scene, width, tip[:3, :3], tip[None, :3, 3], place.around, margin)[0] <= 0.0)
 
 
 def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
