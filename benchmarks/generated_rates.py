@@ -151,7 +151,7 @@ def tables(lines: Sequence[Line]) -> str:
     ]
     wrong = [line for line in lines if line["method"] in METHODS[:2] and line["success"] != "1"]
     made += [f"- {x['assembly']}, `{x['method']}`, seed {x['seed']}: {x['code']}, {x['sentence']}." for x in wrong]
-    return "\n".join(made if wrong else made[:-2])
+    return "\n".join(made if wrong else made[:-3])
 
 
 def _cells(assembly: int, own: Sequence[Line]) -> Iterator[str]:
