@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from apo_bench.cad.raw import Mesh
-from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-_MOST_PAIRS, _AT_ONCE = 12_000_000, 200_000
+_AT_ONCE = 200_000
+_OF_TWO = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
 _INSIDE = 1e-6
 """Crossings nearer to an edge than this part of a triangle are touches."""
 
@@ -22,10 +23,8 @@ def crossing(mesh: Mesh, off: Array | None = None) -> Array | None:
         off: How far each triangle may be from the surface that it stands for, (t,): triangles that cross by no more
             than that of both say nothing of the surfaces.
     """
-    pairs = _near(mesh)
     tolerance = 1e-6 * mesh.extent
-    for first in range(0, len(pairs), _AT_ONCE):
-        some = pairs[first : first + _AT_ONCE]
+    for some in _near(mesh):
         a, b = mesh.triangles[some.T]
         apart = (a[:, :, None] != b[:, None, :]).all(axis=(1, 2))
         least = np.full(int(apart.sum()), tolerance) + (0.0 if off is None else off[some[apart]].sum(axis=1))
@@ -36,8 +35,8 @@ def crossing(mesh: Mesh, off: Array | None = None) -> Array | None:
     return None
 
 
-def _near(mesh: Mesh) -> Any:
-    """Pairs of triangles whose boxes overlap, (p, 2)."""
+def _near(mesh: Mesh) -> Iterator[Any]:
+    """Pairs of triangles whose boxes overlap, (p, 2), some at a time."""
     points = mesh.corners[mesh.triangles]
     low, high = points.min(axis=1), points.max(axis=1)
     order = _in_space((low + high) / 2.0)
@@ -46,17 +45,20 @@ def _near(mesh: Mesh) -> Any:
     tree = [(np.full((room, 3), np.inf), np.full((room, 3), -np.inf))]
     tree[0][0][: len(order)], tree[0][1][: len(order)] = low[order], high[order]
     for _ in range(levels):
-        below = tree[-1]
-        tree.append((np.minimum(below[0][::2], below[0][1::2]), np.maximum(below[1][::2], below[1][1::2])))
-    pairs = np.zeros((1, 2), dtype=np.int64)
-    for lows, highs in tree[-2::-1]:
-        every = np.concatenate([2 * pairs + off for off in ([0, 0], [0, 1], [1, 0], [1, 1])])
+        lows, highs = tree[-1]
+        tree.append((np.minimum(lows[::2], lows[1::2]), np.maximum(highs[::2], highs[1::2])))
+    open_ = [(levels, np.zeros((1, 2), dtype=np.int64))]
+    while open_:
+        level, pairs = open_.pop()
+        if level == 0:
+            yield order[pairs[pairs[:, 0] < pairs[:, 1]]]
+            continue
+        lows, highs = tree[level - 1]
+        every = np.concatenate([2 * pairs + off for off in _OF_TWO])
         every = every[every[:, 0] <= every[:, 1]]
         i, k = every.T
-        pairs = every[((lows[i] <= highs[k]) & (lows[k] <= highs[i])).all(axis=1)]
-        if len(pairs) > _MOST_PAIRS:
-            raise InputError("the triangles lie on each other in too many places; save the part with fewer of them.")
-    return order[pairs[pairs[:, 0] < pairs[:, 1]]]
+        every = every[((lows[i] <= highs[k]) & (lows[k] <= highs[i])).all(axis=1)]
+        open_ += [(level - 1, every[first : first + _AT_ONCE]) for first in range(0, len(every), _AT_ONCE)]
 
 
 def _in_space(points: Array) -> Any:

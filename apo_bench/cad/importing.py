@@ -29,7 +29,7 @@ from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 from apo_bench.parts import load_part
 from apo_bench.parts.agreement import check_faces, supported
-from apo_bench.parts.allowed import MOST_CORNERS_IN_ALL, MOST_FACES
+from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.parts.making import Body, solid_of, write_part
 
 _RAYS = 720
@@ -86,6 +86,12 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
 
 
 def _imported(raw: RawSolid, name: str, folder: Path, source: str, density: float) -> Imported:
+    weight = 1e-9 * density * raw.mesh.volume
+    if not LIGHTEST_KG <= weight <= HEAVIEST_KG:
+        raise InputError(
+            f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; {1e3 * LIGHTEST_KG:g} g to "
+            f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
+        )
     try:
         found = cut(raw)
     except InputError as error:

@@ -80,6 +80,8 @@ def _unit(path: Path, asked: str | None, stated: str | None, size: float) -> tup
     used = asked or stated or "mm"
     said = "as asked" if asked else "stated in the file" if stated else "taken from the size; the file states none"
     long = size * UNITS_MM[used]
+    if not long:
+        raise InputError(f"{path}: all corners are in one place; save the part again.")
     if asked is None and stated is None and not OPEN_BELOW_MM <= long <= LARGEST_MM:
         raise InputError(
             f"{path}: the file states no unit, and {size:.4g} may be {size:.4g} mm, {size * 25.4:.4g} mm (inch) or "

@@ -11,7 +11,7 @@ from apo_bench.cad.corners import SAME_MM, once
 from apo_bench.cad.raw import Region
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull, sides_of
-from apo_bench.parts.allowed import THINNEST_M
+from apo_bench.parts.allowed import THINNEST_M, WIDEST_M
 
 
 def rounded(corners: Array, shafts: Sequence[Region]) -> Array:
@@ -75,7 +75,7 @@ def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]
     for piece in pieces:
         corners = 1e3 * piece.corners
         for shaft in shafts:
-            if shaft.kind != "cylinder" or 1e-3 * shaft.radii[0] < THINNEST_M:
+            if shaft.kind != "cylinder" or not THINNEST_M <= 1e-3 * shaft.radii[0] <= WIDEST_M:
                 continue
             height, distance, _ = shaft.polar(corners)
             low, high = float(height.min()), float(height.max())

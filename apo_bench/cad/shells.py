@@ -88,8 +88,8 @@ def check_closed(path: Path, mesh: Mesh) -> None:
         )
     if (counts != 2).any():
         raise InputError(
-            f"{path}: {(counts > 2).sum():,} edges have more than two triangles: solids touch there, or a sheet ends; "
-            "save each solid as a file of its own."
+            f"{path}: {(counts != 2).sum():,} of its edges are beside more than two triangles: solids touch there, or "
+            "a sheet ends; save each solid as a file of its own."
         )
 
 
@@ -99,10 +99,7 @@ def check_uncrossed(path: Path, mesh: Mesh, off: Array | None = None) -> None:
     Args:
         off: How far each triangle may be from the surface that it stands for, (t,), [mm].
     """
-    try:
-        where = crossing(mesh, off)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+    where = crossing(mesh, off)
     if where is not None:
         x, y, z = where
         raise InputError(

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.solid import Box, Face, Solid
 from apo_bench.parts.agreement import check_faces, check_receding
-from apo_bench.parts.allowed import MOST_FACES
+from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
 from apo_bench.parts.check import check_matter, check_solid
 from apo_bench.parts.faces import SIDES, Surface, unite
 from apo_bench.parts.mjcf import Mark, PartFile, read_part
@@ -19,7 +19,6 @@ from apo_bench.resources import folder
 
 _ON_FACE_M = 1e-6
 """A site lies on a face if it is this near to its plane and this far from its edges."""
-_LIGHTEST_KG, _HEAVIEST_KG = 1e-4, 1e6
 
 
 def part_names() -> tuple[str, ...]:
@@ -57,9 +56,9 @@ def load_part(given: str | Path) -> Solid:
     file = read_part(part_path(given))
     solid = _stated(file, file.stated) if file.stated else _united(file)
     mass = file.density * solid.volume
-    if not _LIGHTEST_KG <= mass <= _HEAVIEST_KG:
+    if not LIGHTEST_KG <= mass <= HEAVIEST_KG:
         raise InputError(
-            f"{file.path}: the part weighs {mass:.3g} kg; from {_LIGHTEST_KG:g} to {_HEAVIEST_KG:g} kg are allowed, "
+            f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
             "so change its size or its density."
         )
     if file.path.parent != folder("assets") / "parts":
