@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
 
-_MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 160
+_MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 190
 """Of a piece; of one that has more, the farthest corners are kept."""
 _FARTHEST, _IN_PLANE = (60, 40, 24, 12, 0), (16, 8, 4)
 """In how many directions: in space; in each flat face."""

@@ -16,7 +16,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
 _UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
-_LARGEST_BYTES, _DEEPEST, _MOST_PLACES = 120_000_000, 8, 1000
+_LARGEST_BYTES, _DEEPEST, _MOST_PLACES = 60_000_000, 8, 1000
 
 
 def read_3mf(path: Path, raw: bytes) -> tuple[str, list[tuple[str, Mesh]]]:
