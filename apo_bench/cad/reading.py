@@ -51,7 +51,9 @@ def read_meshes(path: Path, unit: str | None = None) -> CadFile:
     """
     ending = path.suffix.lower()
     if ending not in KINDS:
-        raise InputError(f"{path}: a file that ends in {', '.join(KINDS)}, .step or .stp is needed; save the part as one of them.")
+        raise InputError(
+            f"{path}: a file that ends in {', '.join(KINDS)}, .step or .stp is needed; save the part as one of them."
+        )
     if unit is not None and unit not in UNITS_MM:
         raise InputError(f"--unit {unit} was given; {', '.join(UNITS_MM)} are allowed.")
     raw = read_bytes(path, f"{ending[1:].upper()} file", LARGEST_BYTES)
