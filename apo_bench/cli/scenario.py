@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -79,16 +80,21 @@ def new(
         typer.Option(help="A part that is never moved; may be given again. Default: the largest of the lowest."),
     ] = None,
     clearance: Annotated[float, typer.Option(help="Room per side of faces marked as fit, mm.")] = 0.25,
+    overwrite: Annotated[bool, typer.Option(help="Make --out and its parts anew where they are.")] = False,
 ) -> None:
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
     from apo_bench.drafting.assembly_file import import_assembly
     from apo_bench.drafting.draft import draft
-    from apo_bench.drafting.posed import on_the_table, read_posed
+    from apo_bench.drafting.posed import UPS, on_the_table, read_posed
     from apo_bench.drafting.writing import scenario_text
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.draft_text import draft_lines
 
     check_writable(out, "--out", (".toml",))
+    if out.exists() and not overwrite:
+        raise InputError(f"--out {out} is there already, maybe with changes by hand; name another, or add --overwrite.")
+    if up not in UPS:
+        raise InputError(f"--up {up} was given; {', '.join(UPS)} are allowed.")
     if not 0.0 <= clearance <= 5.0:
         raise InputError(f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
     named = [*(parts or []), *(more or [])]
@@ -104,7 +110,7 @@ def new(
     out.write_text(scenario_text(made, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
     typer.echo("\n".join(draft_lines(made)))
     load_scenario(out)
-    typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {out}")
+    typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {shlex.quote(str(out))}")
 
 
 @scenario.command()

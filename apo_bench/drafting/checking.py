@@ -70,7 +70,7 @@ def check_file(
     Raises:
         InputError: There is no such file.
     """
-    text = read_bytes(path, "scenario file, which ends in .toml").decode("utf-8", "replace")
+    text = read_bytes(path, "scenario file (.toml)").decode("utf-8", "replace")
     found = list[Finding]()
     for each in _findings(path, seeds, fidelity):
         line = None if each.ok else line_of(text, each.sentence)

@@ -93,8 +93,6 @@ def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, 
     Args:
         up: The axis of the poses that looks up, of `UPS`.
     """
-    if up not in UPS:
-        raise InputError(f"--up {up} was given; {', '.join(UPS)} are allowed.")
     axis, sign = UPS[up]
     turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])
     low, high = world_bounds([(each.solid, turned @ each.T) for each in parts])

@@ -24,7 +24,7 @@ def read_toml(path: str | Path, kind: str) -> JsonNode:
     Raises:
         InputError: No such file, too large, not UTF-8, not TOML, nested too deep, a huge number, or a date or time.
     """
-    return parse_toml(read_bytes(path, f"{kind}, which ends in .toml"), str(path))
+    return parse_toml(read_bytes(path, f"{kind} (.toml)"), str(path))
 
 
 def parse_toml(raw: bytes, file: str) -> JsonNode:

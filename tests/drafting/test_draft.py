@@ -198,6 +198,10 @@ def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.Capture
     asked = ["scenario", "new", "--parts", "block", "--poses", str(poses), "--fixed", "lower", "--out", str(out)]
     assert main(asked) == 0
     assert "1. upper comes from above, onto lower: 1 contacts" in capsys.readouterr().out
+    assert main(asked) == 2
+    assert "is there already, maybe with changes by hand" in capsys.readouterr().err
+    assert main([*asked, "--overwrite"]) == 0
+    capsys.readouterr()
     text = out.read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [500, 0]")
     out.write_text(text, encoding="utf-8")
     assert main(["scenario", "check", str(out), "--seeds", "0"]) == 1
@@ -209,4 +213,4 @@ def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.Capture
     out.write_text("schema = 1\n", encoding="utf-8")
     assert main(["scenario", "check", str(out)]) == 1
     assert main(["scenario", "check", str(tmp_path / "none.toml")]) == 2
-    assert main(["scenario", "new", "--out", str(out)]) == 2
+    assert main(["scenario", "new", "--out", str(tmp_path / "other.toml")]) == 2

@@ -177,6 +177,7 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
         (GOOD + "[gripper]\nforce_n = 500", "force_n"),
         (GOOD + "[gripper]\nopen = [1]", "'open' and 'closed' are given together"),
         ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"', "No such file"),
+        ('schema = "apo-bench/arm/1"\nmjcf = "/dev/zero"', "a device was given"),
         ('schema = "apo-bench/arm/1"\nmjcf = "broken.xml"', "MuJoCo cannot read this MJCF file of the arm"),
         ('schema = "apo-bench/arm/1"\nmjcf = "meshes.xml"', r"the mesh file .*link.stl of the arm is missing"),
         (GOOD + 'flange = "flnge"\n' + GRIPPER, "unknown flange 'flnge'; did you mean 'flange'"),

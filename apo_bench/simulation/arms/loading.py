@@ -12,7 +12,7 @@ import mujoco
 from apo_bench.errors import InputError, one_line
 from apo_bench.io.reading import opened, read_bytes
 
-_LONGEST = 200
+_LONGEST, _LARGEST_BYTES = 200, 50_000_000
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
 _NAMED_FILE = re.compile(r"""\bfile\s*=\s*["']([^"']+)["']""")
 _NAMED_FOLDER = re.compile(r"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)["']""")
@@ -63,8 +63,8 @@ def compiled(spec: Any, path: Path) -> Any:
 def files_of(path: Path) -> tuple[Path, ...]:
     """A file of an arm, and the files that it names, beside it or in a folder that it names for them."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
+        text = read_bytes(path, "MJCF file", _LARGEST_BYTES).decode("utf-8", errors="replace")
+    except InputError:
         return (path,)
     folders = [path.parent, *(path.parent / name for name in _NAMED_FOLDER.findall(text))]
     named = (folder / name for folder in folders for name in _NAMED_FILE.findall(text))
@@ -83,7 +83,7 @@ def _parsed(path: Path, kind: str) -> Any:
 def _without_repeats(path: Path, kind: str) -> Any:
     """Of assets that have one name the first, as robosuite takes them."""
     try:
-        root = ElementTree.fromstring(read_bytes(path, f"MJCF file of the {kind}", 50_000_000))
+        root = ElementTree.fromstring(read_bytes(path, f"MJCF file of the {kind}", _LARGEST_BYTES))
         seen: set[tuple[str, str | None]] = set()
         for assets in root.iter("asset"):
             for each in list(assets):
