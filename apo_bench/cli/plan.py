@@ -114,4 +114,4 @@ def _planned(
 
 
 def _by(method: str) -> str:
-    return "as seen" if method == "none" else f"corrected by {method}"
+    return {"none": "as seen", "by-heart": "by heart"}.get(method, f"corrected by {method}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.records.short_names import LOOKING, METHODS
+from apo_bench.records.short_names import LOOKING, METHODS, UNCORRECTED
 
 _SEARCH = "search"
 """What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
@@ -16,7 +16,7 @@ class Method(NamedTuple):
     """A method in its two parts."""
 
     plan: str
-    """Where the plan comes from: `oracle`, `none`, or a corrector."""
+    """Where the plan comes from: `oracle`, `none`, `by-heart`, or a corrector."""
     searches: bool
 
 
@@ -31,7 +31,8 @@ def checked_method(method: str) -> str:
     """A method's name as rows spell it: `none+search` is `search`.
 
     Raises:
-        InputError: It is not `oracle`, `none`, `search`, a corrector by name, or `module:name`, nor one with `+search`.
+        InputError: It is not `oracle`, `none`, `by-heart`, `search`,
+            a corrector by name, or `module:name`, nor one with `+search`.
     """
     plan, searches = parsed(method)
     if searches and parsed(plan).searches:
@@ -56,7 +57,7 @@ def as_seen(method: str) -> bool:
 
 def knows_relations(method: str) -> bool:
     """Whether a method is told what touches what: whether it has a corrector."""
-    return not knows_truth(method) and not as_seen(method)
+    return parsed(method).plan not in UNCORRECTED
 
 
 def may_look(method: str) -> bool:

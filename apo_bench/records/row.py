@@ -120,7 +120,7 @@ class Row(TypedDict, total=False):
     relations: Name
     """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
     method: Name
-    """Who planned: `oracle`, `none`, `search` or a corrector."""
+    """Who planned: `oracle`, `none`, `by-heart`, `search` or a corrector."""
     looks: LooksAllowed | None
     """How often a corrector that can ask was allowed to look at operations again."""
     seed: Seed

@@ -172,7 +172,7 @@ class TrialSettings:
     method: Name = field(
         default=CORRECTOR,
         metadata=about(
-            "oracle, none, search, a corrector or package.module:name; any of them with +search",
+            "oracle, none, by-heart, search, a corrector or package.module:name; any of them with +search",
             spelled=checked_method,
             key=True,
             axis="methods",
@@ -180,8 +180,8 @@ class TrialSettings:
             swept=("oracle", "none", "paper", CORRECTOR),
         ),
     )
-    """Who plans: `oracle`, `none`, `search`, a corrector by name, or `module:name`; with `+search` the robot feels for
-    holes besides."""
+    """Who plans: `oracle`, `none`, `by-heart`, `search`, a corrector by name, or `module:name`; with `+search` the robot
+    feels for holes besides."""
     looks: LooksAllowed = field(
         default=0,
         metadata=about(

@@ -34,8 +34,10 @@ LOOKING = ("contact-robust",)
 """Correctors that can ask to see operations again."""
 SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.settling:settle"})
 """Correctors that need a simulator; `correct` does not know them, a trial does."""
-METHODS = ("oracle", "none", *CORRECTORS, *SIMULATED)
-"""What a robot can be told to do: `oracle` is the truth, `none` what was seen, anything else a corrector."""
+UNCORRECTED = ("oracle", "none", "by-heart")
+"""Plans without a corrector: the truth, what was seen, the scenario's own goals where they fit best what was seen."""
+METHODS = (*UNCORRECTED, *CORRECTORS, *SIMULATED)
+"""What a robot can be told to do: a plan without a corrector, or by one."""
 RELATIONS = MappingProxyType(
     {
         "missed": "apo_bench.observation.relations:missed",

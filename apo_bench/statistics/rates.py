@@ -141,7 +141,7 @@ def rank(method: str) -> int:
 
     A method with `+search` ranks like the method.
     """
-    first = ("oracle", "none", "search", "contact", "paper", "paper-track")
+    first = ("oracle", "none", "search", "by-heart", "contact", "paper", "paper-track")
     plain = method if method in first else parsed(method).plan
     return first.index(plain) if plain in first else len(first)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
-from apo_bench.records.method import as_seen, knows_relations, knows_truth, may_look
+from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.records.robot_error import NONE
 from apo_bench.records.settings import RANGE, USUAL
 from apo_bench.statistics.rate_text import level_label
@@ -30,8 +30,8 @@ class Setting(NamedTuple):
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
 
-        The oracle meets neither noise nor carelessness, it and `none` are not told any relations, and few methods can
-        ask to look again.
+        The oracle meets neither noise nor carelessness, plans without a corrector are not told any relations, and few
+        methods can ask to look again.
         """
         ceiling = knows_truth(cell.method)
         return (
@@ -74,7 +74,7 @@ def settings(cells: Iterable[Any]) -> list[Setting]:
     """The settings of cells, sorted by scenario first; a cell makes its own only if no other setting holds it."""
     places = [cell_place(cell) for cell in cells]
     found = set[Setting]()
-    for meets_all in (may_look, knows_relations, as_seen, knows_truth):
+    for meets_all in (may_look, knows_relations, _sees, knows_truth):
         own = {setting_of(p): p for p in places if meets_all(p.method)}
         found |= {s for s, p in own.items() if not any(other.holds(p) for other in found)}
     return sorted(found, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
@@ -118,6 +118,11 @@ def setting_of(p: Place) -> Setting:
 
 def _site(x: Place | Setting) -> tuple[Any, ...]:
     return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error
+
+
+def _sees(method: str) -> bool:
+    """Whether a method looks at what was seen."""
+    return not knows_truth(method)
 
 
 def _one_ceiling(inside: list[_Item]) -> list[_Item]:

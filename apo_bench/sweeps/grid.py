@@ -150,8 +150,8 @@ def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: 
     equally full.
 
     The oracle meets neither noise nor carelessness: it runs once per seed, grasp and robot error, recorded at level 0,
-    carelessness 0 and the first noise model or eye. Neither it nor `none` asks what touches what: both are recorded
-    with relations as given. Methods that cannot ask to see operations again are recorded with no looks.
+    carelessness 0 and the first noise model or eye. Plans without a corrector ask for no contacts: they are
+    recorded with relations as given. Methods that cannot ask to see operations again are recorded with no looks.
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]

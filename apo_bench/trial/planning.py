@@ -15,6 +15,7 @@ from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.scene import Scene
+from apo_bench.trial.by_heart import goals_by_heart
 from apo_bench.trial.fitting import FittingPlan, fitting_plan
 from apo_bench.trial.methods import with_simulated
 from apo_bench.trial.stages import observation_failure
@@ -47,8 +48,8 @@ def apply_method(
     """What a method would have the robot do.
 
     Args:
-        method: `oracle` takes the truth, `none` what was seen, anything else is a corrector or names one; what is
-            named as `module:name` runs in a process of its own.
+        method: `oracle` takes the truth, `none` what was seen, `by-heart` the goals of the scenario of `where`;
+            anything else is a corrector or names one; what is named as `module:name` runs in a process of its own.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
         corrector_input: What a corrector gets in place of `observation`, where its relations are wrong. The plan has
             the right ones all the same: what is executed are goals.
@@ -60,6 +61,8 @@ def apply_method(
         return _uncorrected(observation, truth, None)
     if isinstance(method, str) and method == "none":
         return _uncorrected(observation, observation.goals, observation_failure(observation))
+    if isinstance(method, str) and method == "by-heart" and where is not None:
+        return _by_heart(observation, where)
     given = observation if corrector_input is None else corrector_input
     correction = correct_named(given, with_simulated(method), look)
     if not correction.ok:
@@ -69,6 +72,13 @@ def apply_method(
     found = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where, given)
     after_m = largest_gap(plan.assembly, plan.start, found.plan.goals) if found.moves else correction.gap_after_m
     return MethodResult(found.plan, None, correction.gap_before_m, after_m, correction, found)
+
+
+def _by_heart(observation: Observation, where: Scene | Scenario) -> MethodResult:
+    scenario = where.scenario if isinstance(where, Scene) else where
+    if not observation.seen.any():
+        return _uncorrected(observation, observation.goals, observation_failure(observation))
+    return _uncorrected(observation, goals_by_heart(scenario.goals, observation), None)
 
 
 def _uncorrected(observation: Observation, goals: Array, failure: Outcome | None) -> MethodResult:

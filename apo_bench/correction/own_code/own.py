@@ -19,6 +19,7 @@ from apo_bench.correction.own_code.process import Server
 from apo_bench.errors import InputError
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
 from apo_bench.records.method import is_own
+from apo_bench.records.short_names import UNCORRECTED
 
 LEAST_STARTING_S = 30.0
 """What importing a module may take at least: a new interpreter, and libraries that are large."""
@@ -100,14 +101,14 @@ def correct_named(observation: Observation, corrector: Any, look: Look | None = 
 
 
 def check_correctors(methods: Iterable[str], limit_s: float = CORRECTOR_LIMIT_S) -> set[str]:
-    """Raise an `InputError` unless all of these can be had: `oracle`, `none`, correctors by name or `module:name`.
+    """Raise an `InputError` unless all of these can be had: plans without one, correctors by name or `module:name`.
 
     Returns:
         The files of the modules that those of one's own bring in.
     """
     with OwnCorrectors(limit_s) as own:
         for method in methods:
-            if own.find(method) == method and method not in ("oracle", "none"):
+            if own.find(method) == method and method not in UNCORRECTED:
                 checked_corrector(method)
         return own.files
 

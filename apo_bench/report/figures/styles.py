@@ -24,6 +24,7 @@ class Style(NamedTuple):
 STYLES = {
     "none": Style("#d55e00", "o", _SOLID),
     "search": Style("#e7298a", "8", _DASHED),
+    "by-heart": Style("#999933", "$H$", _DASHED),
     "contact": Style("#332288", "p", _SOLID),
     "contact-robust": Style("#aa3377", "$R$", _DASHED),
     "paper": Style("#0072b2", "s", _SOLID),

@@ -1,0 +1,88 @@
+"""The baseline that knows the scenario's file by heart: one and the same assembly, put where it fits best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.records.settings import TrialSettings
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import layout_at
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.by_heart import goals_by_heart
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.trial import run_trial
+
+SCENARIO = load_scenario("stick_in_tower")
+
+
+def seen(goals: Array, sigma: float = 1e-3) -> Observation:
+    n = len(SCENARIO.assembly)
+    return Observation(
+        SCENARIO.assembly, SCENARIO.start, goals, np.tile(sigma**2 * np.eye(6), (n, 1, 1)), np.ones(n, dtype=bool)
+    )
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, -2.0, 3.1])
+def test_a_nominal_layout_is_found_wherever_it_stands(yaw: float) -> None:
+    """The solver stops at a relative step of 1e-8: 1e-8 m was found."""
+    layout = layout_at(SCENARIO, 0.13, -0.05, yaw)
+    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, seen(layout.goals)), layout.goals, rtol=0, atol=1e-6)
+
+
+def test_the_assembly_is_always_the_same() -> None:
+    """Whatever was seen, goals lie to each other as in the file, and the assembly stands level on the table."""
+    rng = np.random.default_rng(3)
+    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).goals @ np.array(
+        [pose.exp(np.repeat([4e-3, 0.07], 3) * rng.standard_normal(6)) for _ in SCENARIO.goals]
+    )
+    planned = goals_by_heart(SCENARIO.goals, seen(goals))
+    for k in range(1, len(planned)):
+        apart, nominal = (pose.inverse(each[0]) @ each[k] for each in (planned, SCENARIO.goals))
+        np.testing.assert_allclose(apart, nominal, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(planned[:, 2, 3], SCENARIO.goals[:, 2, 3], rtol=0, atol=1e-12)
+
+
+def test_no_other_place_fits_better() -> None:
+    """The sum of squares of the twists, a quadratic form of body twists, is least where the goals were put."""
+    goals = layout_at(SCENARIO, 0.1, 0.0, 0.2, (0.004, -0.005)).goals
+    found = goals_by_heart(SCENARIO.goals, seen(goals))
+
+    def misfit(planned: Array) -> float:
+        return sum(float(np.sum(pose.log(pose.inverse(a) @ b) ** 2)) for a, b in zip(planned, goals, strict=True))
+
+    for moved in ((1e-4, 0, 0), (0, 1e-4, 0), (0, 0, 0.01)):
+        for sign in (-1, 1):
+            x, y, deg = sign * np.array(moved)
+            assert misfit(pose.at((x, y, 0.0), (0.0, 0.0, deg)) @ found) > misfit(found)
+
+
+def test_operations_that_were_not_seen_are_left_out() -> None:
+    layout = layout_at(SCENARIO, 0.13, -0.05, 0.3)
+    goals = np.array(layout.goals)
+    goals[1, :3, 3] += 1.0
+    partly = replace(seen(goals), seen=np.array([True, False, True]))
+    np.testing.assert_allclose(goals_by_heart(SCENARIO.goals, partly), layout.goals, rtol=0, atol=1e-6)
+    nothing = apply_method("by-heart", replace(partly, seen=np.zeros(3, dtype=bool)), None, where=SCENARIO)
+    assert nothing.plan is None
+    assert nothing.failure is not None
+    assert nothing.failure.code == "not_seen"
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(SCENARIO)
+
+
+def test_a_tower_that_may_stand_anywhere_is_built_by_heart(scene: Scene) -> None:
+    """At 4 mm and degrees: no part is where it was shown, and the assembly is right in itself."""
+    asked = TrialSettings("stick_in_tower", 4.0, 4.0, careless=0.0, method="by-heart", seed=1, fidelity="contact")
+    row = run_trial(asked, scene)
+    assert (row["success"], row["as_demonstrated"]) == (True, True)
+    assert row["planned_error_fixed_mm"] > 0.0
+    assert (row["gap_after_mm"] < 1e-6, row["freed"], row["tried"]) == (True, [], [])
