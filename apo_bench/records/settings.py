@@ -180,8 +180,8 @@ class TrialSettings:
             swept=("oracle", "none", "paper", CORRECTOR),
         ),
     )
-    """Who plans: `oracle`, `none`, `by-heart`, `search`, a corrector by name, or `module:name`; with `+search` the robot
-    feels for holes besides."""
+    """Who plans: `oracle`, `none`, `by-heart`, `search`, a corrector by name, or `module:name`; with `+search` the
+    robot feels for holes besides."""
     looks: LooksAllowed = field(
         default=0,
         metadata=about(
