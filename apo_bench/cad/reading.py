@@ -60,7 +60,7 @@ def read_meshes(path: Path, unit: str | None = None) -> CadFile:
     if not raw:
         raise InputError(f"{path}: the file is empty; save the part again.")
     if ending == ".3mf":
-        stated, found = read_3mf(path, raw)
+        stated, found = read_3mf(path, raw, MOST_TRIANGLES)
     else:
         stated, found = None, [(path.stem, _by_trimesh(path, raw, ending[1:]))]
     count = sum(len(mesh.triangles) for _, mesh in found)

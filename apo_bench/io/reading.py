@@ -42,26 +42,34 @@ def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
 
 
-def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES) -> bytes:
+def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own: bool = False) -> bytes:
     """What stands in a file.
 
+    Args:
+        own: Whether it must belong to this user, where the system tells users apart.
+
     Raises:
-        InputError: It is no ordinary file, cannot be opened, or is larger than the limit.
+        InputError: It is no ordinary file, cannot be opened, is larger than the limit, or belongs to another user.
     """
     with opened(path, kind) as file:
+        if own and hasattr(os, "geteuid") and os.fstat(file.fileno()).st_uid != os.geteuid():
+            raise InputError(f"{path}: the {kind} belongs to another user.")
         found = file.read(limit + 1)
     if len(found) > limit:
         raise InputError(f"{path}: the file is larger than {limit / 1e6:g} MB; give a {kind}.")
     return found
 
 
-def read_text(path: str | Path, kind: str, limit: int = _LARGEST_BYTES) -> str:
+def read_text(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own: bool = False) -> str:
     """The text of a file, without a byte order mark.
 
+    Args:
+        own: As in `read_bytes`.
+
     Raises:
-        InputError: It cannot be read, is larger than the limit, or is not UTF-8.
+        InputError: It cannot be read, is larger than the limit, belongs to another user, or is not UTF-8.
     """
-    return decoded(read_bytes(path, kind, limit), str(path), kind)
+    return decoded(read_bytes(path, kind, limit, own=own), str(path), kind)
 
 
 def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:

@@ -1,7 +1,8 @@
 """Demonstrations kept in a folder: what was simulated once is read again, bit for bit.
 
 A file is JSON, and its name the hash of all that decides the demonstration. Whoever can read it knows the truth of its
-trial, salted or not.
+trial, salted or not. The digest in it notices damage, not intent: whoever can write into the folder as this user
+decides the truth of its trials.
 """
 
 from __future__ import annotations
@@ -134,16 +135,16 @@ def _read(path: Path, key: str, scene: Scene) -> Recording:
     """What stands in a file.
 
     Raises:
-        InputError: Anything in it is not as it was written, or it is of something else.
+        InputError: It is another user's, damaged, or of something else.
     """
-    root = parse_json(read_text(path, _KIND, _LARGEST_BYTES), str(path)).fields(
+    root = parse_json(read_text(path, _KIND, _LARGEST_BYTES, own=True), str(path)).fields(
         ("schema", "key", "digest", "demonstration")
     )
     digest = _hash(json.dumps(root["demonstration"].value))
     for name, wanted, why in (
         ("schema", SCHEMA, f"this is no {_KIND} of this version"),
         ("key", key, "this is another demonstration, renamed"),
-        ("digest", digest, "the file was changed after it was written"),
+        ("digest", digest, "the file is damaged"),
     ):
         if root[name].text() != wanted:
             raise InputError(f"{path}: {why}.")

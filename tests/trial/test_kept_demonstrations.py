@@ -112,7 +112,7 @@ def pipe(path: Path) -> None:
         (lambda path: path.write_text("[]"), "an object with named keys is needed"),
         (edited(lambda said: said.update(schema="apo-bench/kept-demonstration/0")), "no kept demonstration of this"),
         (edited(lambda said: said.update(key="0" * 64)), "another demonstration, renamed"),
-        (edited(lambda said: said["demonstration"]["goals"][0][0].reverse()), "changed after it was written"),
+        (edited(lambda said: said["demonstration"]["goals"][0][0].reverse()), "the file is damaged"),
         (signed(lambda said: said["goals"].pop()), " x 4 x 4 finite numbers are needed"),
         (signed(lambda said: said["goals"][0][0].reverse()), "poses are needed"),
         (signed(lambda said: said["final"].popitem()), "is missing"),
@@ -134,6 +134,37 @@ def test_a_damaged_file_is_one_sentence_and_is_made_again(
     assert content(kept.recording(SPEC, scene())) == good
     assert once == [7, 7], "the file is whole again"
     assert list(tmp_path.iterdir()) == [path], "nothing else is left"
+
+
+def test_a_file_of_another_user_is_not_read(
+    tmp_path: Path, once: list[int], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = KeptDemonstrations(tmp_path)
+    good = content(kept.recording(SPEC, scene()))
+    [path] = tmp_path.iterdir()
+    signed(moved)(path)
+    monkeypatch.setattr(os, "geteuid", lambda: path.stat().st_uid + 1)
+    assert content(kept.recording(SPEC, scene())) == good
+    assert "belongs to another user; the demonstration is made again." in capsys.readouterr().err
+    assert once == [7, 7]
+
+
+def moved(said: dict[str, Any]) -> None:
+    """The truth, by 20 mm."""
+    said["truth"][0][0][3] += 0.02
+
+
+def test_own_files_are_trusted_as_the_guide_says(tmp_path: Path) -> None:
+    """A digest that was computed again fits: whoever writes as this user decides the truth."""
+    kept = KeptDemonstrations(tmp_path)
+    good = kept.recording(SPEC, scene())
+    [path] = tmp_path.iterdir()
+    signed(moved)(path)
+    off = kept.recording(SPEC, scene()).layout.goals - good.layout.goals
+    assert off[0, 0, 3] == pytest.approx(0.02)
+    guide = (PACKAGE.parent / "docs" / "guide" / "sweeps.md").read_text()
+    assert "the folder is trusted: its digests find damage, not intent." in guide
+    assert "put there by somebody else" not in guide
 
 
 def test_what_cannot_be_kept_is_used_all_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,168 @@
+"""3MF files made to stall or to fill the memory are refused in one sentence, before anything is built."""
+
+from __future__ import annotations
+
+import struct
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from apo_bench.cad.three_mf import read_3mf
+from apo_bench.cli.app import main
+from apo_bench.errors import InputError
+
+TETRAHEDRON = (
+    "<mesh><vertices>"
+    + "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in ((0, 0, 0), (10, 0, 0), (0, 10, 0), (0, 0, 10)))
+    + "</vertices><triangles>"
+    + "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)))
+    + "</triangles></mesh>"
+)
+MESH = f'<object id="1">{TETRAHEDRON}</object>'
+MOST = 400_000
+
+
+def model(objects: str, items: str = '<item objectid="1"/>', head: str = "") -> str:
+    return f'{head}<model unit="millimeter"><resources>{objects}</resources><build>{items}</build></model>'
+
+
+def packed(text: str | bytes, method: int = zipfile.ZIP_DEFLATED) -> bytes:
+    out = BytesIO()
+    with zipfile.ZipFile(out, "w", method) as archive:
+        archive.writestr("3D/3dmodel.model", text)
+    return out.getvalue()
+
+
+def refers(number: int, *inner: int) -> str:
+    components = "".join(f'<component objectid="{each}"/>' for each in inner)
+    return f'<object id="{number}"><components>{components}</components></object>'
+
+
+def chain(depth: int, times: int, innermost: str = MESH) -> str:
+    """Objects 2, 3, ..., each so many times the one before; the last one is placed."""
+    objects = innermost + "".join(refers(n, *[n - 1] * times) for n in range(2, depth + 1))
+    return model(objects, f'<item objectid="{depth}"/>')
+
+
+def corrupt() -> bytes:
+    """Bytes of the packed model that no deflate makes."""
+    raw = bytearray(packed(model(MESH)))
+    at = raw.index(b".model") + len(b".model")
+    raw[at : at + 8] = b"\xff" * 8
+    return bytes(raw)
+
+
+def negative_offset() -> bytes:
+    """The list of files begins behind where it says: zipfile then takes all offsets for that much less."""
+    raw = bytearray(packed(model(MESH)))
+    end = raw.rindex(b"PK\5\6")
+    raw[end + 16 : end + 20] = struct.pack("<I", struct.unpack("<I", raw[end + 16 : end + 20])[0] + 500)
+    return bytes(raw)
+
+
+def says_less() -> bytes:
+    """A model of 70 MB that calls itself 1,000 bytes long."""
+    raw = packed(model(MESH) + " " * 70_000_000)
+    return raw.replace(struct.pack("<I", len(model(MESH)) + 70_000_000), struct.pack("<I", 1000))
+
+
+REFUSED: dict[str, tuple[Callable[[], bytes], str]] = {
+    "corrupt deflate": (corrupt, "no 3MF file that can be read"),
+    "negative offset": (negative_offset, "no 3MF file that can be read"),
+    "packed otherwise": (lambda: packed(model(MESH), zipfile.ZIP_LZMA), "packed in a way that 3MF does not allow"),
+    "larger than it says": (says_less, "no XML|no 3MF file that can be read"),
+    "too large": (lambda: packed(model(MESH) + " " * 60_000_001), "larger than 60 MB when it is unpacked"),
+    "many files": (lambda: packed(model(MESH)) + b"PK\1\2" * 10_001, "more than 10,000 files"),
+    "60^7 places": (lambda: packed(chain(8, 60)), "places very many objects, 2,000 are the most"),
+    "60^7 places of nothing": (lambda: packed(chain(8, 60, '<object id="1"/>')), "places very many objects"),
+    "2001 places": (lambda: packed(model(MESH, '<item objectid="1"/>' * 2001)), "places 2,001 objects"),
+    "itself": (lambda: packed(model(refers(1, 1))), "object '1' is in itself"),
+    "a cycle": (lambda: packed(model(refers(1, 2) + refers(2, 3) + refers(3, 1))), "object '1' is in itself"),
+    "nested": (lambda: packed(chain(9, 1)), "nested deeper than 8"),
+    "nested, inner ones first": (
+        lambda: packed(chain(20, 1).replace("<item ", '<item objectid="8"/><item ', 1)),
+        "nested deeper than 8",
+    ),
+    "a long chain": (lambda: packed(chain(5000, 1)), "nested deeper than 8"),
+    "many objects": (lambda: packed(model('<object id="1"/>' * 10_001)), "more than 10,000 objects and places"),
+    "not there": (lambda: packed(model(MESH, '<item objectid="7"/>')), "object '7' is not there"),
+    "deep elements": (lambda: packed("<a>" * 1000), "nested deeper than 100"),
+    "many attributes": (
+        lambda: packed(model(MESH, "<x " + " ".join(f'a{k}=""' for k in range(10**6)) + "/>")),
+        "too large",
+    ),
+    "many names": (lambda: packed(model(MESH, "".join(f"<a{k}/>" for k in range(200_000)))), "too many kinds"),
+    "entities": (lambda: packed(model(MESH, head='<!DOCTYPE m [<!ENTITY a "b">]>')), "declares entities"),
+    "entities in UTF-16": (
+        lambda: packed(model(MESH, head='<!DOCTYPE m [<!ENTITY a "b">]>').encode("utf-16")),
+        "declares entities",
+    ),
+    "no XML": (lambda: packed("<model><"), "is no XML"),
+    "a word": (lambda: packed(model(MESH.replace('"10"', '"ten"'))), "a number in the 3MF file"),
+    "no number": (lambda: packed(model(MESH.replace('x="10"', ""))), "a number in the 3MF file"),
+    "a huge number": (lambda: packed(model(MESH.replace('v1="1"', f'v1="{10**30}"'))), "a number in the 3MF file"),
+    "no such corner": (lambda: packed(model(MESH.replace('v1="1"', 'v1="4"'))), "a number in the 3MF file"),
+    "a short place": (lambda: packed(model(MESH, '<item objectid="1" transform="1 0"/>')), "a number in the 3MF file"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_it_is_refused_in_one_sentence_and_little_memory(case: str) -> None:
+    make, sentence = REFUSED[case]
+    raw = make()
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=sentence) as raised:
+            read_3mf(Path("a.3mf"), raw, MOST)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(raised.value)
+    assert peak < 50e6, "what is built of a file that is refused stays small"
+
+
+def test_what_is_placed_is_counted_before_it_is_built() -> None:
+    placed = packed(model(MESH, '<item objectid="1"/>' * 1000))
+    assert len(read_3mf(Path("a.3mf"), placed, 4000)[1]) == 1000
+    with pytest.raises(InputError, match="places 4,000 triangles, 3,999 are the most"):
+        read_3mf(Path("a.3mf"), placed, 3999)
+    lonely = '<vertex x="0" y="0" z="0"/>' * 13
+    with pytest.raises(InputError, match="places 17 corners, 15 are the most"):
+        read_3mf(Path("a.3mf"), packed(model(MESH.replace("</vertices>", f"{lonely}</vertices>"))), 5)
+
+
+def test_corners_that_are_packed_small_take_little_memory() -> None:
+    """24 bytes of each, in arrays that grow, where a tree of elements takes 450."""
+    corners = '<vertex x="0" y="0" z="0"/>' * 100_000
+    raw = packed(model(f'<object id="1"><mesh><vertices>{corners}</vertices></mesh></object>'))
+    assert len(raw) < 10_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="places 100,000 corners, 90,000 are the most"):
+            read_3mf(Path("a.3mf"), raw, 30_000)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 10e6
+
+
+def test_nested_objects_are_placed_by_the_product_of_their_places() -> None:
+    move, turn = "1 0 0 0 1 0 0 0 1 5 0 0", "0 1 0 -1 0 0 0 0 1 0 0 0"
+    inner = f'<object id="2"><components><component objectid="1" transform="{move}"/></components></object>'
+    _, [(name, mesh)] = read_3mf(
+        Path("a.3mf"), packed(model(MESH + inner, f'<item objectid="2" transform="{turn}"/>')), MOST
+    )
+    assert name == "object1"
+    assert mesh.corners[:2].tolist() == [[0.0, 5.0, 0.0], [0.0, 15.0, 0.0]]
+
+
+@pytest.mark.parametrize("make", [corrupt, negative_offset])
+def test_the_command_says_so(make: Callable[[], bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.3mf"
+    path.write_bytes(make())
+    assert main(["part", "import", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == f"apo-bench: {path}: this is no 3MF file that can be read; save the part again.\n"
