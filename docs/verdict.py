@@ -35,7 +35,6 @@ DOUBTFUL = {
     "pockets, cube 1 on top of cube 3": "pocket_table",
     "fixture, the cube put down on the finished assembly": "vanished_fixture",
     "fixture, the cube was not put away: it stands against castle 2": "vanished_fixture",
-    "tower, all of it turned by 0.6 degrees at the end": "stick_in_tower",
 }
 """States that are drawn, each with the scenario whose parts it is of."""
 GROUPS = {
@@ -54,13 +53,30 @@ GROUPS = {
 FLIPS = """
 ## States whose verdict changed
 
-Of the {n} states that the judge was audited with before, these {flipped} were no success and are one now. All others
-keep their verdict. One state more was a success and is none: a tower that is turned by 5 degrees after it was built,
-about its centres.
+Of the {n} states that the judge was audited with at first, these {flipped} were no success when every contact was asked
+for as it was made, or when a part was not to move in the room, and are one now. All others keep their verdict.
 
 | state | why it is right |
 |---|---|
 """
+
+REVISED = """
+### Moved after they were put
+
+Until a part could move in the room as long as it keeps its place in the whole, the person had said *wrong* of these
+{n} states of the audit below, for where a part had been before, which nobody sees who sees the finished assembly. The
+person now says *right*, and so does `success`. Of {more} others the person had said *right* from the beginning, and
+`success` only says so now: {named}.
+
+| state | why it is right |
+|---|---|
+"""
+FOLLOWED = (
+    "tower, all of it turned by 0.6 degrees at the end",
+    "tower, the stick turned by 0.6 degrees at the end",
+    "stop for two: B pushed by 3 mm when D goes",
+)
+"""States that were a difference between person and rule, and are none."""
 
 AUDIT = """
 ## The audit
@@ -80,6 +96,10 @@ def main() -> None:
     apart = {**audited.DIFFERS, **rounds.DIFFERS}
     lines = [BEGIN, FLIPS.format(n=len(cases), flipped=len(first.FLIPPED)).rstrip("\n")]
     lines += [f"| {what} | {reason} |" for what, reason in first.FLIPPED.items()]
+    revised = {**audited.REVISED, **rounds.REVISED}
+    named = "; ".join(f"*{what}*" for what in FOLLOWED)
+    lines.append(REVISED.format(n=len(revised), more=len(FOLLOWED), named=named).rstrip("\n"))
+    lines += [f"| {what} | {reason} |" for what, reason in revised.items()]
     lines += [AUDIT.format(n=len(states), same=len(states) - len(apart), apart=len(apart)).rstrip("\n")]
     lines += [
         f"| {what} | {yes(states[what].right)} | {success(states[what])} | {why} |" for what, why in apart.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.geometry import pose
-from tests.audited_states import HALF_Y, HALF_Z, Seen
+from tests.audited_states import ALONE, HALF_Y, HALF_Z, WHOLE, Seen
 from tests.end_states import END, moved, put, shift, state
 from tests.rounds import (
     countersink,
@@ -46,7 +46,7 @@ PEGS = [
     Seen("peg, the plate upside down", peg_in_plate, [put("plate", 1, mm(0, 0, 20, (180, 0, 0)))], True),
     Seen("peg, all of it 150 mm further and turned", peg_in_plate, [moved(1, mm(150, -80, 0, (0, 0, 30)))], True),
     Seen("peg, plate and peg pushed by 0.9 mm at the insertion", peg_in_plate, [moved(2, mm(0.9, 0, 0))], True),
-    Seen("peg, plate and peg pushed by 1.1 mm at the insertion", peg_in_plate, [moved(2, mm(1.1, 0, 0))], False),
+    Seen("peg, plate and peg pushed by 1.1 mm at the insertion", peg_in_plate, [moved(2, mm(1.1, 0, 0))], True),
     Seen("peg, still turning", peg_in_plate, [state(END, spin_rad_s=np.radians(3.0))], False),
     Seen("peg, still held", peg_in_plate, [state(END, released=False)], False),
     Seen("peg, 0.06 mm deep in the wall", peg_in_plate, [state(END, penetration_m=6e-5)], False),
@@ -108,7 +108,7 @@ SHAFTS = [
     Seen("lying shaft, 0.09 mm above the table", on_table, [shift("peg", 1, -0.09, 0, 0)], True),
     Seen("lying shaft, 0.11 mm above the table", on_table, [shift("peg", 1, -0.11, 0, 0)], False),
     Seen("lying shaft, one end 0.13 mm up", on_table, [shift("peg", 1, 0, 0, 0, (0, -0.15, 0))], False),
-    Seen("lying shaft, rolls by 5 mm at the end", on_table, [moved(END, mm(0, 5, 0))], False),
+    Seen("lying shaft, rolls by 5 mm at the end", on_table, [moved(END, mm(0, 5, 0))], True),
     Seen("lying shaft, stands on its end", on_table, [put("peg", 1, mm(0, 0, 0))], False),
     Seen("lying shaft, 26 of 50 mm on the table", on_table, [put("peg", 1, mm(674, 0, 5, (0, 90, 0)))], True),
     Seen("lying shaft, 24 of 50 mm on the table", on_table, [put("peg", 1, mm(676, 0, 5, (0, 90, 0)))], False),
@@ -190,3 +190,9 @@ DIFFERS = {
     "dovetail, 31 mm along, 49 of 60 mm on the rail": PLACE,
 }
 """States of which the rule says otherwise than the person, and what in the rule does."""
+
+REVISED = {
+    "peg, plate and peg pushed by 1.1 mm at the insertion": WHOLE,
+    "lying shaft, rolls by 5 mm at the end": ALONE,
+}
+"""States that the person called wrong at first, for where a part had been in the room before, and why they are right."""

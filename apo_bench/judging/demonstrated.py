@@ -13,6 +13,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import NOTHING, Overlap
 from apo_bench.judging.contacts import ContactJudge, ContactVerdict, Moment, face_overlap
+from apo_bench.judging.displaced import displacements
+from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
 
@@ -25,8 +27,8 @@ def judge_demonstrated(
     At the corners of the overlap of the nominal faces |e| is at most the clearance plus a margin for fit contacts and
     `support_mm` for the others; the overlap is at least a part of the true one, at its place on the environment face,
     so an assembly that is right in itself but stands elsewhere on the table is not what was shown; no two geoms are
-    too deep in each other; nothing holds a part; nothing moves; no part that was in place is pushed before it is moved
-    again.
+    too deep in each other; nothing holds a part; nothing moves; no centre of a part that was in place is pushed before
+    it is moved again, and at the end no corner, but of fixtures.
 
     Args:
         reached: Sound snapshots.
@@ -38,7 +40,7 @@ def judge_demonstrated(
     return judgement(
         _contacts(asked, after, final, reference),
         states,
-        [(part, push * 1e3) for part, push in _pushes(assembly, after, final)],
+        [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *_corners_at_end(assembly, reached))],
         thresholds,
         all_made=len(states) == len(after) + 1,
     )
@@ -86,6 +88,12 @@ def _pushes(
             at = {part: _centroid(assembly, part, snapshot) for part in (*put, *moved)}
             yield from ((part, float(np.linalg.norm(at[part] - where))) for part, where in put.items())
             put.update({part: at[part] for part in moved})
+
+
+def _corners_at_end(assembly: Assembly, reached: Reached) -> Iterator[tuple[str, float]]:
+    """How far a corner of each part that is no fixture lies at most from where its last operation had put it, [m]."""
+    if reached.final is not None:
+        yield from displacements(assembly, reached.after, reached.final, fixtures(assembly))
 
 
 def _centroid(assembly: Assembly, part: str, snapshot: Snapshot) -> Array:

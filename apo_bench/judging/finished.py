@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
+from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.placement import placements
-from apo_bench.assembly.reached import Reached, Snapshot
+from apo_bench.assembly.reached import Reached
 from apo_bench.assembly.topology import Assembly, Contact, Relation
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.overlap import Overlap
-from apo_bench.geometry.revolution import turned_alike
-from apo_bench.geometry.solid import Solid
 from apo_bench.geometry.symmetry import nearest_alike
 from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
+from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
 
@@ -24,14 +20,14 @@ from apo_bench.records.thresholds import Thresholds
 def judge_finished(
     assembly: Assembly, reached: Reached, reference: Array, thresholds: Thresholds, clearance_mm: float
 ) -> Judgement:
-    """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and that all parts stayed where put.
+    """Judge the end: gaps, overlaps, penetration, nothing held, nothing moving, and parts as they were put together.
 
     Asked for are the contacts that stand at the end. A part may have been put in by any of its symmetries: the one
     nearest in rotation to its true final pose counts, for all its contacts. On a fixed part the area of the overlap
     counts, wherever it is, so that an assembly that is right in itself may stand elsewhere on the table; between
-    movable parts the overlap has its place on the environment face. Where fixtures end is free. No corner of a part
-    lies at the end further than `pushed_mm` from where it was after the last operation that moved the part. Every
-    operation must have ended.
+    movable parts the overlap has its place on the environment face. Where fixtures end is free. Parts that touch at the
+    end have moved against each other by `pushed_mm` at most since they were put, at any corner and along what their
+    contacts leave free; so has a part in a mate of a fixed part. Every operation must have ended.
 
     Args:
         reached: Sound snapshots.
@@ -41,12 +37,15 @@ def judge_finished(
     if final is None:
         return judgement((), (), (), thresholds, all_made=False)
     away = fixtures(assembly)
+    true = placements(assembly, final.poses, reference)[-1]
+    seen = {part: _nearest_alike(assembly, part, T, true[part]) for part, T in final.poses.items()}
     return judgement(
-        tuple(_contacts(ContactJudge(assembly, thresholds, clearance_mm), final, reference, away)),
+        tuple(_contacts(ContactJudge(assembly, thresholds, clearance_mm), seen, true, away)),
         [final],
-        [(part, push * 1e3) for part, push in _displacements(assembly, reached.after, final, away)],
+        [(what, 1e3 * m) for what, m in faults_of_place(assembly, reached.after, final, away, seen)],
         thresholds,
         all_made=made,
+        disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
     )
 
 
@@ -57,7 +56,7 @@ def fixtures(assembly: Assembly) -> frozenset[str]:
     only. One that ends against a movable part is none, even if that part leaves it later.
     """
     relations = assembly.relations()
-    return frozenset(part for part, k in _last_moves(assembly).items() if _put_away(assembly, relations, part, k))
+    return frozenset(part for part, k in last_moves(assembly).items() if _put_away(assembly, relations, part, k))
 
 
 def _put_away(assembly: Assembly, relations: tuple[Relation, ...], part: str, k: int) -> bool:
@@ -72,15 +71,13 @@ def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
     return any(end.part in assembly.fixed for end in contact)
 
 
-def _contacts(asked: ContactJudge, final: Snapshot, reference: Array, away: frozenset[str]) -> Iterator[ContactVerdict]:
+def _contacts(asked: ContactJudge, seen: Poses, true: Poses, away: frozenset[str]) -> Iterator[ContactVerdict]:
     """The contacts that stand at the end, of parts that are no fixtures."""
     assembly = asked.assembly
-    true = placements(assembly, final.poses, reference)[-1]
-    poses = {part: _nearest_alike(assembly, part, T, true[part]) for part, T in final.poses.items()}
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
             share = _share_of_area if _on_fixed(assembly, contact) else Overlap.share
-            yield asked.verdict(contact, made, "end", poses, face_overlap(assembly, contact, true), share)
+            yield asked.verdict(contact, made, "end", seen, face_overlap(assembly, contact, true), share)
 
 
 def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Array:
@@ -92,29 +89,3 @@ def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Arra
 
 def _share_of_area(found: Overlap, true: Overlap) -> float:
     return min(1.0, found.area / true.area) if true else 1.0
-
-
-def _last_moves(assembly: Assembly) -> dict[str, int]:
-    """Part -> the last operation that moves it, counted from 0."""
-    return {part: k for k, operation in enumerate(assembly.operations) for part in operation.moves}
-
-
-def _displacements(
-    assembly: Assembly, after: tuple[Snapshot | None, ...], final: Snapshot, away: frozenset[str]
-) -> Iterator[tuple[str, float]]:
-    """How far a corner of each part lies at most from where it was after the part's last operation, [m].
-
-    A part of revolution may have turned about its axis.
-    """
-    for part, k in _last_moves(assembly).items():
-        put = after[k]
-        if put is not None and part not in away:
-            corners = _corners(assembly.solids[part])
-            T = turned_alike(assembly.solids[part], final.poses[part], put.poses[part])
-            moved = pose.apply(T, corners) - pose.apply(put.poses[part], corners)
-            yield part, float(np.linalg.norm(moved, axis=1).max())
-
-
-def _corners(solid: Solid) -> Array:
-    """The corners of all pieces, (k, 3), in the frame of the solid, [m]."""
-    return np.concatenate([piece_corners(piece) for piece in solid.pieces])

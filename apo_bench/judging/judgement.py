@@ -35,7 +35,7 @@ class Judgement:
     overlap: float | None
     penetration_mm: float | None
     pushed_mm: float | None
-    """How far a part that was in place was pushed at most."""
+    """How far a part that was in place was pushed at most, whether or not this rule minds."""
 
     @property
     def holds(self) -> bool:
@@ -55,14 +55,16 @@ def judgement(
     thresholds: Thresholds,
     *,
     all_made: bool,
+    disturbed: Sequence[float] | None = None,
 ) -> Judgement:
     """Compare what was measured with the thresholds.
 
     Args:
         contacts: The contacts that are asked for.
         states: The snapshots in which nothing may be inside anything, held or moving.
-        pushes: Part, and how far it was pushed [mm].
+        pushes: Part, and how far it was pushed [mm], by what the rule minds.
         all_made: Whether every operation ended and there is a snapshot of the end.
+        disturbed: How far parts were pushed [mm], if that is not the same.
     """
     conditions = {
         "not_made": not all_made,
@@ -83,7 +85,7 @@ def judgement(
         angle_deg=max((c.angle_deg for c in contacts), default=None),
         overlap=min((c.overlap for c in contacts), default=None),
         penetration_mm=max((s.penetration_m * 1e3 for s in states), default=None),
-        pushed_mm=max((push for _, push in pushes), default=None),
+        pushed_mm=max((push for _, push in pushes) if disturbed is None else disturbed, default=None),
     )
 
 

@@ -163,7 +163,7 @@ class Row(TypedDict, total=False):
     penetration_mm: _Number | None
     """Largest depth of one part in another [mm]."""
     pushed_mm: _Number | None
-    """Largest distance by which a part that was in place was moved [mm]."""
+    """Largest distance by which a part that was in place was moved in the room, whether or not it counts [mm]."""
     freed: list[_Operation] | None
     """Operations whose motion parameters were corrected."""
     tried: list[FreedSet] | None

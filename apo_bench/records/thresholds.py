@@ -24,7 +24,8 @@ class Thresholds:
     penetration_mm: float = 0.05
     """Strict: no two physical geoms of different parts are deeper in each other."""
     pushed_mm: float = 1.0
-    """Strict: no part that was in place moved a corner by more; as demonstrated: its centre, at any later moment."""
+    """Strict: no two parts that touch slid against each other by more; as demonstrated: no part that was in place moved
+    its centre by more at any later moment, or a corner at the end."""
     rest_mm_s: float = 1.0
     """Strict: every part is slower."""
     rest_deg_s: float = 2.0

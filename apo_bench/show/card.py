@@ -137,8 +137,8 @@ def _success(scenario: Scenario) -> Iterator[str]:
         f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
         f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
         f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
-        f"another, no corner of a part more than {t.pushed_mm:g} mm from where it was put; all let go of and slower "
-        f"than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
+        f"another, no parts that touch slid against each other by more than {t.pushed_mm:g} mm since they were put; all let "
+        f"go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
     )
     if any(map(scenario.assembly.is_round, (relation.contact for relation in scenario.assembly.relations()))):
         yield (
@@ -151,7 +151,8 @@ def _success(scenario: Scenario) -> Iterator[str]:
         yield f"Where {listed_words(away)} ends is free: it is a fixture, used and put away."
     yield (
         "As demonstrated: the same, and every contact also when it was made, where it was shown; no part in place "
-        "pushed on the way." + (" Here only that is a success." if scenario.success_means != "assembled" else "")
+        f"pushed on the way, nor a corner of one more than {t.pushed_mm:g} mm from where it was put."
+        + (" Here only that is a success." if scenario.success_means != "assembled" else "")
     )
     yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
     yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."

@@ -14,12 +14,14 @@ from apo_bench.judging.finished import fixtures
 from tests import audited_rounds, rounds, scenes
 from tests.audited_states import DIFFERS as FLAT_DIFFERS
 from tests.audited_states import LOOSE, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
+from tests.audited_states import REVISED as FLAT_REVISED
 from tests.audited_states import STATES as FLAT_STATES
 from tests.end_states import END, Edit, moved, shift, verdict
 from tests.judging.test_verdict import FLIPPED
 
 STATES = [*FLAT_STATES, *audited_rounds.STATES]
 DIFFERS = {**FLAT_DIFFERS, **audited_rounds.DIFFERS}
+REVISED = {**FLAT_REVISED, **audited_rounds.REVISED}
 
 
 @pytest.mark.parametrize("seen", STATES, ids=lambda seen: seen.what)
@@ -32,6 +34,7 @@ def test_every_difference_is_of_a_state() -> None:
     assert min(len(FLAT_STATES), len(audited_rounds.STATES)) >= 60
     assert len(set(names)) == len(names)
     assert set(DIFFERS) <= set(names)
+    assert set(REVISED) <= {seen.what for seen in STATES if seen.right}
 
 
 @pytest.mark.parametrize("seen", LOOSE, ids=lambda seen: seen.what)
@@ -45,7 +48,7 @@ def test_the_page_says_what_was_audited_and_why_the_rule_says_otherwise() -> Non
     page = (Path(__file__).parents[2] / "docs" / "how" / "judge.md").read_text(encoding="utf-8")
     for seen in STATES:
         assert f"| {seen.what} | {'right' if seen.right else 'wrong'} |" in page
-    for what, reason in (DIFFERS | FLIPPED).items():
+    for what, reason in (DIFFERS | FLIPPED | REVISED).items():
         assert any(line.startswith(f"| {what} |") and line.endswith(f"| {reason} |") for line in page.splitlines())
 
 

@@ -233,6 +233,8 @@ FLIPPED = {
     "carried stick, the cube slips 1.2 mm before it is moved": "it is moved again",
     "tower, castle 2 was still held when it was over": "it was on the way",
     "everything is assembled well, but at the other end of the table": "it is right in itself",
+    "tower, pushed by 1.1 mm at the insertion": "all of it moved as one, and may stand anywhere on the table",
+    "fixture, castle 2 far from the fixture when it was put": "the stick was put when it stood where it should",
     "castles of one kind stand in each other's place": "the stick lies in both slots, as it should",
     "castles, the stick turned end for end: other faces touch": "it is the same stick, turned by half a turn",
 }
@@ -404,14 +406,27 @@ def test_the_reference_only_says_how_large_an_overlap_should_be() -> None:
     assert verdict(replace(scene, goals=goals), [shift("castle2", 2, 10, 0, 0)]).success
 
 
-def test_a_tower_that_is_turned_after_it_was_built_is_seen_at_its_corners() -> None:
-    """Its centres stay where they are."""
+def test_a_tower_that_is_turned_after_it_was_built_is_right_but_not_as_demonstrated() -> None:
+    """Its parts touch as they did; its centres stay where they are, its corners do not."""
     about = scenes.mm(0, 0, 0, (0, 0, 5))
     turn = [lambda states: states[END].update({p: LAYOUT @ about @ pose.inverse(LAYOUT) @ states[END][p] for p in ALL})]
     found = verdict(TOWER(), turn)
-    assert found.demonstrated.pushed_mm == pytest.approx(0.0, abs=1e-6)
-    assert (found.success, found.finished.code) == (False, "pushed")
-    assert "stick by 9." in found.finished.why
+    assert (found.success, found.as_demonstrated, found.demonstrated.code) == (True, False, "pushed")
+    assert found.finished.pushed_mm == pytest.approx(9.64, abs=0.01)
+    assert "stick by 9.64 mm" in found.demonstrated.why
+
+
+def test_parts_that_touch_are_told_apart_by_what_their_contacts_leave_free() -> None:
+    """A castle pushed along its slot slides on the other one; pushed aside by as much it would open a contact."""
+    along = verdict(TOWER(), [shift("castle2", END, 1.2, 0, 0)])
+    assert (along.finished.code, along.finished.why) == (
+        "pushed",
+        "castle2 against castle1 by 1.20 mm, where 1 mm are allowed",
+    )
+    both = verdict(TOWER(), [shift("castle1", END, -0.6, 0, 0), shift("castle2", END, 0.6, 0, 0)])
+    assert both.success
+    long = verdict(TOWER(), [shift("castle1", END, 1.2, 0, 0), shift("castle2", END, 1.2, 0, 0)])
+    assert (long.finished.code, long.finished.why[:21]) == ("pushed", "stick against castle1")
 
 
 def test_where_a_fixture_ends_is_free_and_what_it_does_there_is_not() -> None:
