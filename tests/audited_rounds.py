@@ -195,4 +195,4 @@ REVISED = {
     "peg, plate and peg pushed by 1.1 mm at the insertion": WHOLE,
     "lying shaft, rolls by 5 mm at the end": ALONE,
 }
-"""States that the person called wrong at first, for where a part had been in the room before, and why they are right."""
+"""States that the person called wrong at first, for where a part had been before, and why they are right."""

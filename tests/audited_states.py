@@ -427,7 +427,7 @@ REVISED = {
     "block used later: B pushed by 3 mm under D": WHOLE,
     "block aligned twice: A pushed by 5 mm when D goes": ALONE,
 }
-"""States that the person called wrong at first, for where a part had been in the room before, and why they are right."""
+"""States that the person called wrong at first, for where a part had been before, and why they are right."""
 
 
 class Loose(NamedTuple):

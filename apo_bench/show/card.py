@@ -137,8 +137,8 @@ def _success(scenario: Scenario) -> Iterator[str]:
         f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
         f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
         f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
-        f"another, no parts that touch slid against each other by more than {t.pushed_mm:g} mm since they were put; all let "
-        f"go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
+        f"another, no parts that touch slid against each other by more than {t.pushed_mm:g} mm since they were put; "
+        f"all let go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
     )
     if any(map(scenario.assembly.is_round, (relation.contact for relation in scenario.assembly.relations()))):
         yield (
