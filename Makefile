@@ -1,15 +1,15 @@
 # Two commands do everything, on a machine with Python 3.11 or 3.12 and make:
 #   make sweep   set up, run a small benchmark, print the table, write the report
 #   make test    set up, check style and types, build the documentation, run every test
-# and one the table of the project (100 trials per cell take some 100 minutes on two cores):
-#   make headline [TRIALS=100] [FIDELITY=contact]
+# and one the headline of the project (40 trials per cell take some 40 minutes on two cores):
+#   make headline [TRIALS=40] [FIDELITY=contact]
 
 PYTHON ?= python3
 WORKERS ?= 2
 FIDELITY ?= contact
 sweep: TRIALS ?= 4
 sweep: OUT ?= runs/sweep
-headline: TRIALS ?= 100
+headline: TRIALS ?= 40
 headline: OUT ?= runs/headline_$(FIDELITY)
 
 VENV := .venv

@@ -3,48 +3,150 @@
 from __future__ import annotations
 
 import json
-import lzma
+import re
+from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records.settings import ROW
-from apo_bench.statistics.rates import tally
-from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep_file import read_sweep
+import pytest
 
-KEPT = Path(__file__).parents[2] / "benchmarks" / "results" / "headline"
-GRID = Path(__file__).parents[2] / "benchmarks" / "headline.toml"
+from apo_bench.records.settings import ROW
+from apo_bench.statistics.rates import Cell, tally
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.sweeps.sweep_file import read_sweep
+from benchmarks import headline
+from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
+from benchmarks.headline_figure import NAME_HEIGHT, apart
+from benchmarks.headline_look import block, look_at, robot_rate, sentence
+from benchmarks.headline_page import GRID, METHODS, OLDER, up_to_date
+from benchmarks.headline_tables import rates
+
+SEEDS, MOST_TRIALS = 40, 16_000
+"""A run of the headline shall take less than an hour on two cores."""
 
 
 @cache
 def kept_rows() -> list[dict[str, Any]]:
-    found = [json.loads(line) for line in lzma.decompress((KEPT / "rows.jsonl.xz").read_bytes()).splitlines()]
-    return [row if row["schema"] == ROW else {"as_demonstrated": row["success"], "salt": None} | row for row in found]
+    rows = headline.kept_rows()
+    return [row if row["schema"] == ROW else {"as_demonstrated": row["success"], "salt": None} | row for row in rows]
+
+
+@cache
+def run_file() -> dict[str, Any]:
+    ran: dict[str, Any] = json.loads((KEPT / "run.json").read_text())
+    return ran
 
 
 def fidelity() -> str:
-    return str(json.loads((KEPT / "run.json").read_text())["grids"][0]["fidelity"])
+    return str(run_file()["grids"][0]["fidelity"])
 
 
 def key(row: dict[str, Any]) -> tuple[Any, ...]:
-    return row["scenario"], row["seed"], row["method"], row["level"], row["careless"]
+    where = (row["noise"], row.get("robot_error") or "none")
+    return row["scenario"], row["seed"], row["method"], row["level"], row["careless"], *where
 
 
-def test_the_headline_holds_every_trial_of_its_grid_once() -> None:
-    ran = json.loads((KEPT / "run.json").read_text())
-    grids = read_sweep(GRID, {"trials": ran["grids"][0]["trials"], "fidelity": fidelity()})
+def grid_of(described: dict[str, Any]) -> SweepSettings:
+    """A grid of `run.json`; clearances are those of the scenarios."""
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in described.items()}
+    return SweepSettings(**{**values, "clearances_mm": ()})
+
+
+def test_the_headline_holds_every_trial_of_its_grids_once() -> None:
+    grids = [grid_of(described) for described in run_file()["grids"]]
     asked = [trial for unit in units(grids, load_all(grids)) for trial in unit.trials]
-    expected = [(t.scenario, t.seed, t.method, t.level_mm, t.careless) for t in asked]
+    expected = [(t.scenario, t.seed, t.method, t.level_mm, t.careless, t.noise, t.robot_error) for t in asked]
     assert sorted(map(key, kept_rows())) == sorted(expected)
-    assert ran["rows"] == len(expected)
+    assert run_file()["rows"] == len(expected)
+
+
+def test_the_page_says_so_where_the_sweep_file_asks_for_other_trials() -> None:
+    assert (OLDER.strip() in PAGE.read_text(encoding="utf-8")) != up_to_date(run_file())
+
+
+def test_the_sweep_of_the_headline_is_small_and_meets_what_breaks_it() -> None:
+    grids = read_sweep(GRID, {"trials": 1})
+    trials = [trial for unit in units(grids, load_all(grids)) for trial in unit.trials]
+    assert SEEDS * len(trials) <= MOST_TRIALS
+    by_method = {method: {t.level_mm for t in trials if t.method == method and t.careless == 0} for method in METHODS}
+    assert all(by_method[method] >= {0.1, 0.25, 0.5, 1.0, 2.0, 4.0} for method in METHODS)
+    assert {"isotropic", "outliers", "megapose-tless"} <= {t.noise for t in trials}
+    assert {"oracle", "contact-robust", "contact-robust+search"} == {
+        t.method for t in trials if t.robot_error != "none"
+    }
 
 
 def test_the_table_is_that_of_the_rows() -> None:
     lines = (KEPT / "table.csv").read_text().splitlines()
     names = lines[0].split(",")
     told = [dict(zip(names, line.split(","), strict=False)) for line in lines[1:]]
-    counted = {(t["scenario"], t["method"], float(t["level_mm"]), float(t["careless"])): t for t in told}
+    counted = {
+        (t["scenario"], t["noise"], t["method"], float(t["level_mm"]), float(t["careless"]), error_of(t)): t
+        for t in told
+    }
+    assert len(counted) == len(lines) - 1
     for cell in tally(kept_rows()):
-        line = counted[cell.scenario, cell.method, cell.level, cell.careless]
+        line = counted[cell.scenario, cell.noise, cell.method, cell.level, cell.careless, cell.robot_error]
         assert (int(line["trials"]), int(line["successes"])) == (cell.trials, cell.successes)
+
+
+def error_of(line: dict[str, str]) -> str:
+    return line.get("robot_error") or "none"
+
+
+@pytest.mark.parametrize("page", [*BLOCKS, PAGE], ids=lambda path: path.name)
+def test_the_first_look_is_the_same_on_every_page_and_that_of_the_rows(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    look = look_at(tally(kept_rows()))
+    if page in BLOCKS:
+        written = text.split(BEGIN)[1].split(END)[0].strip()
+        assert written == "\n".join(block(look, *BLOCKS[page]))
+    assert text.count(sentence(look)) == 1
+    picture = re.search(r"!\[[^\]]*\]\(([^)]*headline\.png)\)", text)
+    assert picture is not None
+    assert (page.parent / picture.group(1)).exists()
+
+
+def cell(method: str, successes: int, **more: Any) -> Cell:
+    """Ten trials at level 1, a careful human."""
+    first = next(c for c in tally(kept_rows()) if c.scenario == "stick_in_tower")
+    plain = replace(first, careless=0.0, level=1.0, level_deg=1.0, trials=10, excluded=0)
+    return replace(plain, **{"method": method, "successes": successes, "demonstrated": successes, **more})
+
+
+CELLS = [
+    cell("none", 1),
+    cell("search", 2),
+    cell("contact", 9),
+    cell("contact-robust", 10),
+    cell("contact-robust", 0, careless=1.0),
+    cell("contact-robust", 6, noise="megapose-tless"),
+    cell("contact-robust", 3, robot_error="hand_eye:0.5/0.1"),
+    cell("contact-robust+search", 7, robot_error="hand_eye:0.5/0.1"),
+    cell("oracle", 4, level=0.0, robot_error="hand_eye:0.5/0.1"),
+]
+
+
+def test_the_sentence_says_what_was_counted_and_nothing_that_was_not_run() -> None:
+    assert re.findall(r"\*\*(\d+ %)\*\*", sentence(look_at(CELLS))) == ["10 %", "20 %", "100 %", "60 %", "30 %", "70 %"]
+    assert re.findall(r"\*\*(\d+ %)\*\*", sentence(look_at(CELLS[:3]))) == ["10 %", "20 %", "90 %"]
+    assert "breaks" not in sentence(look_at(CELLS[:4]))
+
+
+def test_the_oracle_under_an_error_of_the_robot_is_found_at_level_zero() -> None:
+    rate = robot_rate(look_at(CELLS), "oracle", "hand_eye:0.5/0.1")
+    assert rate == (4, 10)
+
+
+def test_every_rate_stands_in_its_line_and_column() -> None:
+    shown = [cell("none", 1), cell("none", 3, level=2.0), cell("search", 5, level=2.0, demonstrated=4)]
+    lines = rates(shown, ("method",), lambda c: (c.method,), lambda c: c.level)
+    assert lines == ["| method | 1 | 2 |", "|---|--:|--:|", "| none | 10 | 30 |", "| search |  | 50 (40) |"]
+
+
+def test_names_beside_lines_do_not_touch_and_keep_their_order() -> None:
+    heights = apart([0.0, 97.0, 98.0, 100.0])
+    assert (heights[0], heights[-1]) == (0.0, 100.0)
+    assert all(high - low >= NAME_HEIGHT for low, high in pairwise(heights))
