@@ -56,8 +56,8 @@ def rate(
     reached = wilson_half_width(rate, n)
     _say(
         {"question": "rate", "rate": rate, "half_width": half_width, "trials": n, "reached": reached},
-        f"{n} trials: at a rate of {rate:g} Wilson's 95 % interval then reaches {100 * reached:.3g} points to either "
-        "side of its middle.",
+        f"{_many(n, 'trial')}: at a rate of {rate:g} Wilson's 95 % interval then reaches {100 * reached:.3g} points to "
+        "either side of its middle.",
         as_json,
     )
 
@@ -74,6 +74,7 @@ def pairs(
 ) -> None:
     """Seeds, met by both methods, until McNemar's exact test shows which one is better."""
     from apo_bench.statistics.power import ERROR, paired_power, paired_trials
+    from apo_bench.statistics.rate_text import percent
 
     win, lose = _shares(win, lose, rates, agree)
     n = paired_trials(win, lose, power, comparisons)
@@ -81,8 +82,8 @@ def pairs(
     _say(
         {"question": "pairs", "win": win, "lose": lose, "power": power, "comparisons": comparisons}
         | {"trials": n, "reached": reached},
-        f"{n} seeds, each met by both methods: {_expected(win, lose)} McNemar's exact "
-        f"test{_held(comparisons)} then shows which is better in {100 * reached:.1f} of 100 sweeps.",
+        f"{_many(n, 'seed')}, each met by both methods: {_expected(win, lose)} McNemar's exact "
+        f"test{_held(comparisons)} then shows which is better in {percent(reached)} of all sweeps.",
         as_json,
     )
 
@@ -99,6 +100,7 @@ def margin(
 ) -> None:
     """Seeds, met by both methods, until Tango's 95 % interval shows that one is not worse by a margin."""
     from apo_bench.statistics.power import margin_power, margin_trials
+    from apo_bench.statistics.rate_text import percent
 
     win, lose = (0.0, 0.0) if all(x is None for x in (win, lose, rates, agree)) else _shares(win, lose, rates, agree)
     n = margin_trials(margin, win, lose, power)
@@ -107,8 +109,8 @@ def margin(
     _say(
         {"question": "margin", "margin": margin, "win": win, "lose": lose, "power": power}
         | {"trials": n, "reached": reached},
-        f"{n} seeds, each met by both methods: {expected}, Tango's 95 % interval then lies above "
-        f"-{100 * margin:.3g} points in {100 * reached:.1f} of 100 sweeps.",
+        f"{_many(n, 'seed')}, each met by both methods: {expected}, Tango's 95 % interval then lies above "
+        f"-{100 * margin:.3g} points in {percent(reached)} of all sweeps.",
         as_json,
     )
 
@@ -121,23 +123,26 @@ def shows(
     as_json: _AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
-    from apo_bench.statistics.power import evidence
+    from apo_bench.statistics.power import ERROR, evidence, least_discordant
 
     s = evidence(trials, power, comparisons)
     if s.discordant is None or s.least_win is None:
-        test = f"McNemar's exact test{_held(comparisons)} can reject nothing with so few."
+        fewest = least_discordant(ERROR / comparisons)
+        test = (
+            f"McNemar's exact test{_held(comparisons)} can show no difference with so few: it takes {fewest} or more."
+        )
     else:
         test = (
             f"McNemar's exact test{_held(comparisons)} rejects from {s.discordant} discordant pairs on, if all fall "
             f"one way; wins at {100 * s.least_win:.3g} % of the seeds, without a loss, are shown in {100 * power:g} "
-            "of 100 sweeps."
+            "% of all sweeps."
         )
     _say(
         {"question": "shows", "power": power, "comparisons": comparisons, "trials": trials}
         | {"half_width_at_0.5": s.half_width_50, "half_width_at_0.9": s.half_width_90}
         | {"low_95_if_all_right": s.all_right.low, "discordant": s.discordant, "least_win": s.least_win}
         | {"margin": s.margin},
-        f"{trials} trials per cell:\n"
+        f"{_many(trials, 'trial')} per cell, with 95 % intervals:\n"
         f"  a rate of 0.5 is known to {100 * s.half_width_50:.3g} points to either side, one of 0.9 to "
         f"{100 * s.half_width_90:.3g};\n"
         f"  all right means a rate above {100 * s.all_right.low:.3g} %, none right one below "
@@ -161,6 +166,10 @@ def _shares(win: float | None, lose: float | None, rates: str | None, agree: flo
     if len(found) != 2:
         raise InputError(f"--rates {rates} was given; two numbers are allowed, as 0.95,0.85.")
     return shares(found[0], found[1], agree)
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n:,} {what}{'' if n == 1 else 's'}"
 
 
 def _expected(win: float, lose: float) -> str:

@@ -64,7 +64,8 @@ def print_cells(cells: Sequence[Cell]) -> None:
     print_table(cell_table(cells))
     excluded = sum(c.excluded for c in cells)
     if excluded:
-        _console().print(f"{excluded} rows are left out, since the demonstration itself was not right.")
+        left = "1 row is" if excluded == 1 else f"{excluded:,} rows are"
+        _console().print(f"{left} left out, since the demonstration itself was not right.")
 
 
 def print_report(made: Report) -> None:
@@ -141,10 +142,10 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         lines.append(("free directions", f"{moved}, so that the plan fits"))
     if row["predicted"] is not None:
         lines.append(("predicted", _predicted(row["predicted"])))
-    if row["worst_gap_mm"] is not None and not row["loose_success"]:
-        lines.append(("reached", f"not every contact was made: least overlap {row['least_overlap']:.2f}"))
-    elif row["worst_gap_mm"] is not None:
-        lines.append(("reached", f"worst contact gap {row['worst_gap_mm']:.3f} mm, overlap {row['least_overlap']:.2f}"))
+    if row["worst_gap_mm"] is not None:
+        reached = f"least overlap {row['least_overlap']:.2f}, worst gap {row['worst_gap_mm']:.3f} mm"
+        missed = "" if row["loose_success"] else "not every contact was made, even loosely: "
+        lines.append(("reached", f"{missed}{reached}"))
     if row["pose_error_fixed_mm"] is not None:
         errors = f"{row['pose_error_fixed_mm']:.3f} mm fixed by contacts, {row['pose_error_free_mm']:.3f} mm free"
         lines.append(("pose error", errors))
@@ -187,8 +188,10 @@ def _predicted(said: Predicted) -> str:
 
 
 def _test(row: Row) -> str:
-    """`chi-square 31.2 of 13, p 0.003; one of R2, R4 may be wrong; R2 was left out`."""
-    said = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_freedom']}, p {row['p_value']:.2g}"]
+    """`chi-square 31.2 of 13, p 0.003: not explained by the stated noise; one of R2, R4 may be wrong; left out: R2`."""
+    explained = f"{'' if row['test_passes'] else 'not '}explained by the stated noise"
+    p = f"p {row['p_value']:.2g}" if row["p_value"] else "p < 1e-300"
+    said = [f"chi-square {row['chi_square'] or 0.0:.1f} of {row['chi_square_freedom']}, {p}: {explained}"]
     if row["suspects"]:
         said.append(f"{'one of ' * (len(row['suspects']) > 1)}{', '.join(row['suspects'])} may be wrong")
     if row["dropped"]:

@@ -1,44 +1,64 @@
-"""What a sweep answers, in one sentence: who succeeds, up to which noise, who is better by how much, and how sure."""
+"""What a sweep answers, in some sentences: what was counted first, then what the counts tell.
+
+No sentence says more than its counts: an interval only where there are seeds enough for one, "more often" only where
+the difference is beyond chance, "as often" only where the interval lies close around 0.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from apo_bench.records.method import knows_relations, knows_truth
 from apo_bench.records.row import Row, look_up
-from apo_bench.statistics.levels.bounded import mean_interval
 from apo_bench.statistics.levels.half_level import HalfLevel
-from apo_bench.statistics.paired import tango
+from apo_bench.statistics.over_seeds import FEWEST_SEEDS, Contrast, Results, contrast, pooled
 from apo_bench.statistics.rate_text import percent
-from apo_bench.statistics.rates import Interval, Place, rank, wilson
+from apo_bench.statistics.rates import Interval, Place, rank
 from apo_bench.statistics.summary import Summary
 
+ALIKE = 0.05
+"""Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
 _AGAINST = ("none", "paper", "contact")
 """The best method is compared with these; if none of them was tried, with the next best."""
+_NAMED = 3
+"""Of methods that are as good as the best so many are named."""
+_GIVEN = "given"
 _Who = tuple[str, int]
 """A method, and how often it might look again."""
-_Results = Mapping[tuple[Any, ...], bool]
-"""All that a trial is of but the method, its seed last -> success."""
 
 
 def answer(rows: Iterable[Row], found: Summary) -> str:
-    """The sentence, with methods in backquotes. Trials that were told wrong relations are left out where others are."""
-    results = _results(rows)
+    """The sentences, with methods in backquotes; of trials with wrong relations only where there are no others."""
+    rows = list(rows)
+    results, told = _results(rows)
     if not results:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
     best, *others = _ranked(results)
-    count, (low, high) = len(results[best]), _rate_interval(results[best])
-    said = f"{_named(best)} succeeds in {percent(sum(results[best].values()) / count)} of its {count:,} trials "
-    said += f"(95 %: {100 * low:.1f} to {100 * high:.1f} %)"
-    curves = [h for h in found.half_levels if h.setting.relations == "given"]
+    own = pooled(results[best])
+    few = own.seeds < FEWEST_SEEDS
+    if not any(any(each.values()) for each in results.values()):
+        return f"No method succeeds in any trial: {_nothing([best, *others], results)}.{_wrong(told)}"
+    first = f"{_named(best)} succeeds in {_counted(own.right, own.trials, None if few else own.interval)}"
+    sentences = [f"{first}{_tied(best, others, results)}."]
+    curves = [h for h in found.half_levels if h.setting.relations in told]
     half = [h for h in curves if (h.setting.method, h.setting.looks) == best]
-    said += f" and in half of them or more {_reach(half)}" if half else ""
+    if half and not few:
+        sentences.append(_reach(half))
     known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
-    compared = [words for words in (_compared(best, m, results) for m in known) if words]
-    return f"{said}; at the same seeds it succeeds {' and '.join(compared)}." if compared else f"{said}."
+    sentences += [_compared(best, m, results) for m in known]
+    if few:
+        sentences.append(
+            f"{own.seeds} {'seed is' if own.seeds == 1 else 'seeds are'} too few for an interval: from {FEWEST_SEEDS} "
+            "on, a difference at every seed is beyond chance."
+        )
+    return " ".join(sentence for sentence in sentences if sentence) + _wrong(told)
+
+
+def _wrong(told: set[str]) -> str:
+    """A sentence where nobody was told the right relations."""
+    kinds = ", ".join(f"`{one}`" for one in sorted(told))
+    return "" if told == {_GIVEN} else f" Correctors were told relations {kinds} here, not `{_GIVEN}`."
 
 
 def _named(who: _Who) -> str:
@@ -47,20 +67,40 @@ def _named(who: _Who) -> str:
     return f"`{method}`" + (f" with {looks} more look{'s' * (looks > 1)}" if looks else "")
 
 
-def _results(rows: Iterable[Row]) -> dict[_Who, dict[tuple[Any, ...], bool]]:
+def _counted(right: int, trials: int, interval: Interval | None) -> str:
+    """`95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %)`."""
+    rate = percent(right / trials)
+    between = "" if interval is None else f"; 95 % interval {100 * interval.low:.1f} to {100 * interval.high:.1f} %"
+    return f"{right:,} of {trials:,} trial{'s' * (trials != 1)} ({rate}{between})"
+
+
+def _nothing(methods: Sequence[_Who], results: Mapping[_Who, Results]) -> str:
+    """`none` in 0 of 24, `contact` in 0 of 24."""
+    return ", ".join(f"{_named(who)} in 0 of {len(results[who]):,}" for who in methods)
+
+
+def _results(rows: Iterable[Row]) -> tuple[dict[_Who, dict[tuple[Any, ...], bool]], set[str]]:
+    """Successes of each method, and what correctors were told: the right relations, or else what there is."""
+    counted = [
+        row
+        for row in rows
+        if row["success"] is not None and row["level"] is not None and not knows_truth(row["method"])
+    ]
+    told = {str(row["relations"]) for row in counted if knows_relations(row["method"])} or {_GIVEN}
+    told = {_GIVEN} if _GIVEN in told else told
+    # the one trial of a method that is told nothing would count once for each kind of relations that others are told
+    counted = [row for row in counted if len(told) == 1 or knows_relations(row["method"])]
     names = [name for name in Place._fields if name not in ("method", "relations", "fidelity", "looks")]
-    right: dict[_Who, dict[tuple[Any, ...], bool]] = {}
-    wrong: dict[_Who, dict[tuple[Any, ...], bool]] = {}
-    for row in rows:
-        if row["success"] is not None and row["level"] is not None and not knows_truth(row["method"]):
-            told = row["relations"] if knows_relations(row["method"]) else "given"
-            kept = right if told == "given" else wrong
-            key = (*(look_up(row, name) for name in names), row.get("fidelity"), told, row["seed"])
-            kept.setdefault((row["method"], row.get("looks") or 0), {})[key] = row["success"]
-    return right or wrong
+    results: dict[_Who, dict[tuple[Any, ...], bool]] = {}
+    for row in counted:
+        relations = str(row["relations"]) if knows_relations(row["method"]) else min(told)
+        if relations in told:
+            key = (*(look_up(row, name) for name in names), row.get("fidelity"), relations, row["seed"])
+            results.setdefault((row["method"], row.get("looks") or 0), {})[key] = row["success"]
+    return results, told
 
 
-def _ranked(results: Mapping[_Who, _Results]) -> list[_Who]:
+def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
     """The best first, by trials that all have that were tried in half of all places or more."""
     most = max(map(len, results.values()))
     widely = [who for who in results if 2 * len(results[who]) >= most]
@@ -73,66 +113,80 @@ def _ranked(results: Mapping[_Who, _Results]) -> list[_Who]:
     return sorted(widely, key=lambda who: (-rate(who), rank(who[0]), who))
 
 
-def _compared(ours: _Who, other: _Who, results: Mapping[_Who, _Results]) -> str:
-    """`more often than `none` by 41.2 points (95 %: 38.9 to 43.4)`; nothing where they have no trial in common."""
-    a, b = results[ours], results[other]
-    both = {key: float(a[key]) - float(b[key]) for key in a if key in b}
-    if not both:
+def _tied(best: _Who, others: Sequence[_Who], results: Mapping[_Who, Results]) -> str:
+    """`, as do `snap` and 2 more`: those that are right in as many of the same trials and are not compared below."""
+    ours = results[best]
+    same = [
+        who
+        for who in others
+        if who not in [(m, 0) for m in _AGAINST]
+        and results[who].keys() == ours.keys()
+        and sum(results[who].values()) == sum(ours.values())
+    ]
+    if not same:
         return ""
-    apart = _by_seed(both)
-    low, high = (100 * x for x in _difference_interval(both))
-    mean = 100 * float(np.mean(apart))
-    if low > 0 or high < 0:
-        more = "more" if mean > 0 else "less"
-        low, high = sorted((abs(low), abs(high)))
-        return f"{more} often than {_named(other)} by {abs(mean):.1f} points (95 %: {low:.1f} to {high:.1f})"
-    between = f"{mean:+.1f} points, 95 %: {low:+.1f} to {high:+.1f}"
-    return f"as often as {_named(other)}, as far as {len(apart)} seeds tell ({between})"
+    names = [_named(who) for who in same[:_NAMED]] + ([f"{len(same) - _NAMED} more"] if len(same) > _NAMED else [])
+    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f", as many as {listed}"
 
 
-def _by_seed(results: Mapping[tuple[Any, ...], float]) -> list[float]:
-    """Means over all trials of a seed: they share their random numbers, so that seeds are independent."""
-    seeds: dict[int, list[float]] = {}
-    for key, value in results.items():
-        seeds.setdefault(key[-1], []).append(float(value))
-    return [float(np.round(np.mean(sorted(seeds[seed])), 12)) for seed in sorted(seeds)]
+def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
+    """A sentence that counts both, and what that tells; nothing where they have no trial in common."""
+    c = contrast(results[ours], results[other])
+    if c is None:
+        return ""
+    if c.trials == len(results[ours]):
+        return f"{_named(other)} succeeds in {c.theirs:,} of the same {c.trials:,}{_told(ours, c)}."
+    both = f"Of the {c.trials:,} trials that both have, {_named(other)} succeeds in {c.theirs:,} and {_named(ours)} in"
+    return f"{both} {c.ours:,}{_told(ours, c)}."
 
 
-def _rate_interval(results: _Results) -> Interval:
-    """Wilson's where every seed has one trial, as in the tables; else of the means over seeds."""
-    by_seed = _by_seed(results)
-    if len(by_seed) == len(results):
-        return wilson(sum(results.values()), len(results))
-    return mean_interval(np.array(by_seed))
-
-
-def _difference_interval(both: Mapping[tuple[Any, ...], float]) -> Interval:
-    """Tango's where every seed has one pair; else of the means over seeds.
-
-    A seed that was not seen may differ as much as any that was, and at least as much as one of its trials makes.
-    """
-    by_seed = _by_seed(both)
-    if len(by_seed) == len(both):
-        values = list(both.values())
-        return tango(values.count(1.0), values.count(-1.0), len(values))
-    most = max([len(by_seed) / len(both), *map(abs, by_seed)])
-    return mean_interval(np.array(by_seed), -most, most)
+def _told(ours: _Who, c: Contrast) -> str:
+    """What the counts of a pair tell."""
+    if c.seeds < FEWEST_SEEDS:
+        return ""
+    points = 100 * abs(c.difference)
+    low, high = (100 * x for x in c.interval)
+    between = f"95 % interval {low:+.1f} to {high:+.1f}"
+    if c.sure:
+        more = "more" if low > 0 else "less"
+        least, most = sorted((abs(low), abs(high)))
+        ends = f"95 % interval {least:.1f} to {most:.1f}"
+        return f": {_named(ours)} succeeds {more} often, by {points:.1f} points ({ends})"
+    if c.interval.low >= -ALIKE and c.interval.high <= ALIKE:
+        return f": as often, to within {max(-low, high):.1f} points (95 % interval of the difference)"
+    if c.difference == 0.0:
+        return f": as many, but {c.seeds:,} seeds leave room for a difference (in points: {between})"
+    ahead = f": {_named(ours)} is {points:.1f} points {'ahead' if c.difference > 0 else 'behind'}"
+    if not low <= 0.0 <= high:
+        return f"{ahead}, but too few seeds differ to tell it from chance (better at {c.better}, worse at {c.worse})"
+    enough = c.enough
+    more = f"; if as many differ on, {enough:,} seeds would" if enough is not None and enough > c.seeds else ""
+    return f"{ahead}, which {c.seeds:,} seeds do not tell from chance ({between}{more})"
 
 
 def _reach(half: Sequence[HalfLevel]) -> str:
-    """`up to level 1.31 (95 %: 1.1 to 1.6)`, or from the worst of several settings to the best."""
+    """Where its curve over the level falls to one half; of several settings the worst and the best."""
     ends = sorted(half, key=lambda h: (h.beyond == "above", h.level or 0.0, h.largest))
     worst, best = (_half(ends[i]) for i in (0, -1))
     if len(ends) == 1:
-        return worst if ends[0].level is None else f"{worst} (95 %: {ends[0].interval_text})"
+        between = "" if ends[0].level is None else f" (95 % interval: {_between(ends[0])})"
+        return f"Its curve over the level {worst}{between}."
     if worst == best:
-        return f"{worst}, in each of {len(ends)} settings"
-    return f"{worst} in the worst of {len(ends)} settings and {best} in the best"
+        return f"Its curve over the level {worst}; so in each of {len(ends)} settings."
+    return f"In the worst of {len(ends)} settings its curve over the level {worst}; in the best it {best}."
 
 
 def _half(h: HalfLevel) -> str:
     if h.level is not None:
-        return f"up to level {h.text}"
+        return f"falls to one half at level {h.text}"
     if h.beyond == "above":
-        return f"even at level {h.largest:g}, the largest tried"
-    return f"only below level {h.smallest:g}, the smallest tried" if h.beyond == "below" else "at no level"
+        return f"stays above one half up to level {h.largest:g}, the largest tried"
+    lowest = f"from level {h.smallest:g}, the smallest tried above 0, on"
+    return f"is below one half {lowest}" if h.beyond == "below" else "is below one half even at level 0"
+
+
+def _between(h: HalfLevel) -> str:
+    """`1.1 to 1.6`, `below 0.2`, `above 3.2`; `any level` where it is open at both ends."""
+    said = h.interval_text
+    return "any level" if said == "any" else said.replace("<", "below").replace(">", "above")

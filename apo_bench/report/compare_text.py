@@ -15,6 +15,7 @@ from apo_bench.report.page.trials import verdict, why
 from apo_bench.report.run_facts import limits_of, scenario_files, value_words
 from apo_bench.report.tables.saying import level_text, percents, points
 from apo_bench.report.tables.table import Column, Table
+from apo_bench.statistics.over_seeds import FEWEST_SEEDS
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Cell, Place, Rate, place_of
 from apo_bench.statistics.settings import cell_place, setting_of
@@ -94,17 +95,33 @@ def changed_table(found: Comparison) -> Table:
 
 
 def in_words(found: Comparison) -> str:
-    """The whole in some sentences."""
+    """The whole in some sentences, counts first."""
     older = verdicts.verdict_warning(found.first.verdict)
-    total = found.agreements[-1]
-    low, high = total.same.interval
+    first, second = found.alone
+    shared = f"{_trials(found.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
+    identical = f"{_trials(found.identical)} the same to the last digit."
+    return " ".join(words for words in (shared, _agreed(found.agreements[-1]), identical, older) if words)
+
+
+def _agreed(total: Agreement) -> str:
+    """How many verdicts agree, and at how many seeds all of them do; seeds are independent, trials are not."""
+    same, seeds = total.same, total.same_everywhere
+    if not same.trials:
+        return "None of them counts: no demonstration was right itself."
+    right = f"{total.only_first:,} right in the first alone, {total.only_second:,} in the second alone"
+    counted = f", {total.excluded_in_one:,} counted in one of the two alone" * bool(total.excluded_in_one)
+    if seeds.trials < FEWEST_SEEDS:
+        sure = f"too few for an interval: from {FEWEST_SEEDS} on there is one"
+    else:
+        sure = f"95 % interval {percents(seeds.interval)} of seeds"
     return (
-        f"{found.shared:,} trials are in both ({found.alone[0]:,} in the first alone, {found.alone[1]:,} in the second "
-        f"alone). Verdicts agree in {total.same.successes:,} of {total.same.trials:,}: {percent_text(total.same.rate)} "
-        f"(95 %: {100 * low:.2f} to {100 * high:.2f} %, as if every trial were one of its own; in "
-        f"{total.same_everywhere.successes:,} of {total.same_everywhere.trials:,} seeds all of them agree). "
-        f"{found.identical:,} trials are the same to the last digit.{f' {older}' * bool(older)}"
+        f"Verdicts agree in {same.successes:,} of {same.trials:,} ({percent(same.rate, 2)}): {right}{counted}. All of "
+        f"them agree at {seeds.successes:,} of {seeds.trials:,} seed{'s' * (seeds.trials != 1)} ({sure})."
     )
+
+
+def _trials(n: int) -> str:
+    return "1 trial is" if n == 1 else f"{n:,} trials are"
 
 
 def comparison_form(found: Comparison) -> dict[str, Any]:
@@ -123,11 +140,6 @@ def comparison_form(found: Comparison) -> dict[str, Any]:
         "differences": [d._asdict() for d in found.differences],
         "changed": [_changed_form(pair, found) for pair in found.changed],
     }
-
-
-def percent_text(rate: float | None) -> str:
-    """`99.25 %`."""
-    return "–" if rate is None else f"{100 * rate:.2f} %"
 
 
 def _both(head: str, value: Callable[[Any], object] | None = None, name: str = "") -> Column:
@@ -152,7 +164,7 @@ def _place_of_pair(pair: Pair) -> Place:
 
 
 def _counted(r: Rate) -> str:
-    return f"{r.successes} ({percent_text(r.rate)})"
+    return f"{r.successes} ({percent(r.rate, 2)})"
 
 
 def _rate(cell: Cell | None) -> str | None:

@@ -7,6 +7,7 @@ is right and `lose` that at which the reference alone is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
@@ -150,7 +151,7 @@ def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerE
         raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error, z2 = _error(comparisons), _z() ** 2
-    discordant = int(np.ceil(1 - np.log2(error) - 1e-9))
+    discordant = least_discordant(error)
     return PowerEvidence(
         trials=trials,
         half_width_50=wilson_half_width(0.5, trials),
@@ -160,6 +161,11 @@ def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerE
         least_win=_least_win(trials, power, error) if discordant <= trials else None,
         margin=float(z2 / (trials + z2)),
     )
+
+
+def least_discordant(error: float) -> int:
+    """The fewest discordant pairs, all in favour of one, at which a sign test rejects: 2 / 2^n <= error."""
+    return math.ceil(1 - math.log2(error) - 1e-9)
 
 
 def _least_win(trials: int, power: float, error: float) -> float:

@@ -12,7 +12,8 @@ import pytest
 from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.report.compare import compare
-from apo_bench.report.compare_text import comparison_form
+from apo_bench.report.compare_text import comparison_form, in_words
+from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import wilson
 from tests import pages
 from tests.browser import browser, opened, overflow
@@ -99,6 +100,37 @@ def test_trials_of_one_seed_count_once_where_independence_is_asked_for(tmp_path:
     assert (a.same, a.same_everywhere) == ((18, 20), (9, 10))
 
 
+@pytest.mark.parametrize(
+    ("ours", "theirs", "words"),
+    [
+        ([True], [True], "1 trial is in both, 0 in the first alone, 0 in the second alone. Verdicts agree in 1 of 1"),
+        ([True] * 5, [False] * 5, "agree in 0 of 5 (0.00 %): 5 right in the first alone, 0 in the second alone. All"),
+        (
+            [True] * 5,
+            [True] * 5,
+            "All of them agree at 5 of 5 seeds (too few for an interval: from 6 on there is one).",
+        ),
+        ([True] * 6, [True] * 6, "All of them agree at 6 of 6 seeds (95 % interval 61.0 to 100.0 % of seeds)."),
+        ([None] * 3, [None] * 3, "None of them counts: no demonstration was right itself."),
+        (
+            [True, None],
+            [True, True],
+            "agree in 1 of 2 (50.00 %): 0 right in the first alone, 0 in the second alone, 1 ",
+        ),
+    ],
+)
+def test_the_sentences_count_first(
+    ours: list[bool | None], theirs: list[bool | None], words: str, tmp_path: Path
+) -> None:
+    one, two = ([row("contact", i, x) for i, x in enumerate(side)] for side in (ours, theirs))
+    assert words in in_words(compare(write(tmp_path / "a", one), write(tmp_path / "b", two)))
+
+
+def test_one_trial_of_many_that_differs_is_not_rounded_away() -> None:
+    assert percent(29_999 / 30_000, 2) == "> 99.99 %"
+    assert (percent(1 / 30_000, 2), percent(1.0), percent(0.0)) == ("< 0.01 %", "100.0 %", "0.0 %")
+
+
 def test_one_run_file_that_is_not_there_is_one_difference(folders: tuple[Path, Path]) -> None:
     (folders[1] / "run.json").unlink()
     found = compare(*folders)
@@ -125,7 +157,7 @@ def test_the_command_writes_a_page_and_exits_with_0(
     out = tmp_path / "made"
     assert cli.main(["compare", *map(str, folders), "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "Verdicts agree in 46 of 48: 95.83 %" in said
+    assert "Verdicts agree in 46 of 48 (95.83 %): 1 right in the first alone, 1 in the second alone." in said
     assert "versions: mujoco, rows: fidelity" in said
     (line, _) = csv.DictReader((out / "changed.csv").open(encoding="utf-8"))
     assert line["command of the first"] == "apo-bench replay stick_in_tower --clearance 0.25 --method contact --seed 0"

@@ -203,11 +203,11 @@ def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
     page = pages.words(report(write(tmp_path / "one", [row("contact", i) for i in range(3)])).page)
     for sentence in (
         "No level varied: every trial was at level 1",
-        "No two methods share a cell",
-        "contact succeeds in 100.0 % of its 3 trials",
+        "No method shares a cell with none or paper",
+        "contact succeeds in 3 of 3 trials (100.0 %). 3 seeds are too few",
         "No picture: None was asked for",
         "No method that corrects had a plan",
-        "all were given",
+        "No method was told contacts that were recognised.",
         "There is no timing.jsonl",
         "There is no run.json",
     ):

@@ -234,4 +234,6 @@ def test_the_report_holds_the_pairs(tmp_path: Path) -> None:
     assert "| contact | paper | 1 | 10 | 6, 2, 1, 1 | +10.0 (" in pages.lines(made.page)
     empty = pair_table(()).write(tmp_path / "empty.csv")
     assert empty.read_text().strip().split(",") == list(table[0])
-    assert pair_table(()).markdown() == ["No two methods share a cell."]
+    assert pair_table(()).markdown() == [
+        "No method shares a cell with `none` or `paper`, with which methods are paired."
+    ]

@@ -140,9 +140,15 @@ def _scope(rows: Sequence[Row]) -> str:
     fidelity = ", ".join(sorted({str(row["fidelity"]) for row in rows}))
     return (
         f"{len(rows):,} trials of {many('scenario', 'scenario')}, {many('method', 'method')} and "
-        f"{many('seed', 'seed')}, fidelity {fidelity}. {excluded:,} of {tried:,} demonstrations were not right "
-        "themselves and are left out."
+        f"{many('seed', 'seed')}, fidelity {fidelity}. {_left_out(excluded, tried)}"
     )
+
+
+def _left_out(excluded: int, tried: int) -> str:
+    if not excluded:
+        return f"{'The 1 demonstration was' if tried == 1 else f'All {tried:,} demonstrations were'} right."
+    were = "was not right itself and is" if excluded == 1 else "were not right themselves and are"
+    return f"{excluded:,} of {_many(tried, 'demonstration')} {were} left out."
 
 
 def _level_meaning(rows: Sequence[Row]) -> str:

@@ -20,7 +20,7 @@ CALIBRATION_NOTE = (
 
 def calibration_table(found: Sequence[Calibration]) -> Table:
     """One line per scenario, noise, relations and method; for people."""
-    return Table(found, _COLUMNS, "No method was tried.")
+    return Table(found, _COLUMNS, "No trial of a method but the oracle counts.")
 
 
 def _ratio(c: Calibration) -> str | None:

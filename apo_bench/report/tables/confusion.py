@@ -21,12 +21,12 @@ def confusion_table(found: Sequence[Confusion]) -> Table:
 
 
 def prediction_summary(c: Confusion) -> str:
-    """`Predicted: 96.3 % of 134 executed trials ended as predicted (counted by as_demonstrated); failures ...`"""
+    """`Predicted: 129 of 134 executed trials ended as predicted (96.3 %, counted by as_demonstrated); failures ...`"""
     if c.agreement is None:
         return "Predicted: nothing, since no trial was executed."
-    trials = "1 executed trial" if c.executed == 1 else f"{c.executed} executed trials"
+    trials = "1 executed trial" if c.executed == 1 else f"{c.executed:,} executed trials"
     return (
-        f"Predicted: {100 * c.agreement:.1f} % of {trials} ended as predicted (counted by as_demonstrated); "
+        f"Predicted: {c.right:,} of {trials} ended as predicted ({percent(c.agreement)}, counted by as_demonstrated); "
         f"failures that were not predicted: {c.fit_failed}, warnings that were wrong: {c.fail_fitted}."
     )
 

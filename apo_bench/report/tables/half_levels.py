@@ -12,6 +12,7 @@ from apo_bench.statistics.levels.half_level import HalfLevel
 HALF_LEVEL_NOTE = (
     "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* is from "
     "the last level with success surely over one half to the first surely under it, whatever the curve between them. "
+    "*Any* is an interval that is open at both ends, *none* is under one half even at level 0. "
     "The area is mean success over the logarithm of the level, from 0 to 1, of seeds that have a result at every level."
 )
 _NONE = "No level varied, so nothing is known of how success falls with it."

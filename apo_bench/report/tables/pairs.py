@@ -31,7 +31,7 @@ PAIR_NOTE = (
 
 def pair_table(found: Sequence[Paired]) -> Table:
     """One line per cell, method and reference."""
-    return Table(found, _COLUMNS, "No two methods share a cell.")
+    return Table(found, _COLUMNS, "No method shares a cell with `none` or `paper`, with which methods are paired.")
 
 
 def _counts(p: Paired) -> str:
