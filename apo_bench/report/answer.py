@@ -96,7 +96,7 @@ def _results(rows: Iterable[Row]) -> tuple[dict[_Who, dict[tuple[Any, ...], bool
         relations = str(row["relations"]) if knows_relations(row["method"]) else min(told)
         if relations in told:
             key = (*(look_up(row, name) for name in names), row.get("fidelity"), relations, row["seed"])
-            results.setdefault((row["method"], row.get("looks") or 0), {})[key] = row["success"]
+            results.setdefault((row["method"], row.get("looks") or 0), {})[key] = bool(row["success"])
     return results, told
 
 
