@@ -166,6 +166,7 @@ class Kinematics:
         self.configuration = mink.Configuration(self.model)
         self.adr = np.array([int(self.model.jnt_qposadr[self.model.joint(j).id]) for j in arm.joints])
         self.tip = arm.tip
+        self._mount = arm.mount
         self.site = self.model.site(arm.tip).id
         self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=0.3)
         self._limits = [mink.ConfigurationLimit(self.model)]
@@ -181,6 +182,12 @@ class Kinematics:
         """Of arms with more than six joints: which joint angles they prefer from now on, [rad]."""
         if len(self.adr) > 6:
             self._posture = _posture_task(self, home)
+
+    @property
+    def first_link(self) -> str:
+        """The first body of the arm that moves: everything that moves hangs on it."""
+        tree = self.model.body_treeid[self.model.body(self._mount).id]
+        return str(self.model.body(int(self.model.tree_bodyadr[tree])).name)
 
     @property
     def range_of_joints(self) -> Array:

@@ -98,7 +98,8 @@ def build_scene(
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     check_clearance(scenario, clearance)
     found, settings = find_arm(arm), physics(timestep_s)
-    with_hands, with_arm = _compose(scenario, clearance, settings, found, grasp)
+    kinematics = Kinematics(found)
+    with_hands, with_arm = _compose(scenario, clearance, settings, found, grasp, kinematics.first_link)
     shown = _compiled(scenario, with_hands)
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
     described = found.model is not None
@@ -114,7 +115,7 @@ def build_scene(
         pieces={name: physical_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=shown,
         work=work,
-        kinematics=Kinematics(found),
+        kinematics=kinematics,
     )
 
 
@@ -159,7 +160,9 @@ def _fixed(scenario: Scenario) -> tuple[str, ...]:
     return tuple(part for part in scenario.assembly.solids if part in scenario.assembly.fixed)
 
 
-def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm, grasp: str) -> tuple[str, str]:
+def _compose(
+    scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm, grasp: str, first_link: str
+) -> tuple[str, str]:
     """Parts and hands, then parts and arm; the parts are put together once for both."""
     mjcf = import_mjcf()
     room = mjcf.from_path(str(folder("assets") / "room.xml"))
@@ -183,7 +186,7 @@ def _compose(scenario: Scenario, clearance_mm: float, settings: Physics, arm: Ar
         element.remove()
     if arm.model is None:
         _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
-    text = _with_force_sensors(room.to_xml_string(), scenario)
+    text = _with_force_sensors(room.to_xml_string(), scenario, f"arm/{first_link}")
     return shown, text if arm.model is None or grasp != "weld" else _with_welds(text, arm, movable)
 
 
@@ -268,8 +271,12 @@ def _with_welds(xml: str, arm: Arm, welded: Mapping[str, Any]) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _with_force_sensors(xml: str, scenario: Scenario) -> str:
+def _with_force_sensors(xml: str, scenario: Scenario, arm: str) -> str:
     """What every movable part exerts on all it touches; then, of every part, what it exerts on the arm.
+
+    MuJoCo computes a sensor while one of the two bodies that it names is awake, and a body that cannot move never is.
+    So the arm is named by its first link that moves: by its base, a fixed part and the arm would feel nothing of each
+    other while sleep is on.
 
     PyMJCF's schema does not know contact sensors, so they are written into the finished text.
     """
@@ -279,7 +286,7 @@ def _with_force_sensors(xml: str, scenario: Scenario) -> str:
     for part in _movable(scenario):
         ElementTree.SubElement(sensors, "contact", {"name": f"all_{part}", "subtree1": f"{part}/", **net})
     for part in (*_movable(scenario), *_fixed(scenario)):
-        names = {"name": f"arm_{part}", "subtree1": f"{part}/", "subtree2": "arm/"}
+        names = {"name": f"arm_{part}", "subtree1": f"{part}/", "subtree2": arm}
         ElementTree.SubElement(sensors, "contact", {**names, **net})
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"

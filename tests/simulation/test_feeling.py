@@ -1,0 +1,78 @@
+"""What the arm feels of parts that cannot move, while what rests sleeps."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from apo_bench.geometry import pose
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.robot.paths import shifted, smooth, steady
+from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.world import place, sleeping
+
+DOWN, NORTH = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
+HARDEST_N = 40.0
+"""An arm pushes with 100 to 200 N per mm, and at 4 mm/s goes 0.08 mm between two looks: up to 16 N on top of 20 N."""
+
+
+def hand_at(scene: Scene, x: float, y: float, z: float) -> Robot:
+    """A robot whose empty hand stands closed somewhere, [m]."""
+    robot = Robot(scene, scene.scenario.start)
+    robot.fingers(0.002)
+    T = pose.at((0.0, 0.0, 0.0)) @ robot.T
+    T[:3, 3] = x, y, 0.2
+    robot.go(T, 0.8)
+    robot.follow(smooth(robot.T, shifted(robot.T, DOWN, 0.2 - z), 0.3))
+    robot.stand()
+    return robot
+
+
+def push_on_table(scene: Scene, robot: Robot) -> float:
+    """What the table and the arm really exert on each other, [N], from the forces of all their contacts."""
+    total, force = np.zeros(3), np.zeros(6)
+    names = [scene.work.model.geom(g).name for g in range(scene.work.model.ngeom)]
+    for i, contact in enumerate(robot.data.contact):
+        if {names[contact.geom1].split("/")[0], names[contact.geom2].split("/")[0]} == {"arm", "table"}:
+            mujoco.mj_contactForce(scene.work.model, robot.data, i, force)
+            total += contact.frame.reshape(3, 3).T @ force[:3]
+    return float(np.linalg.norm(total))
+
+
+@pytest.mark.parametrize("arm", ["six_axis", "ur5e_primitive"])
+@pytest.mark.parametrize("asleep", [True, False])
+def test_an_empty_hand_that_presses_on_the_table_is_stopped(arm: str, asleep: bool) -> None:
+    """By its base, which cannot move either, the arm felt nothing of the table, and pressed with 320 N."""
+    scene = build_scene(load_scenario("stick_in_tower"), arm=arm)
+    with sleeping(scene.work, asleep):
+        robot = hand_at(scene, 0.1, 0.16, 0.02)
+        with pytest.raises(Halt) as halt:
+            robot.follow(steady(robot.T, shifted(robot.T, DOWN, 0.025), 0.004))
+        assert (halt.value.code, halt.value.part) == ("collision", "table")
+        assert 20.0 < push_on_table(scene, robot) < HARDEST_N
+
+
+def test_an_empty_hand_that_presses_on_the_wall_of_a_pocket_is_stopped() -> None:
+    scene = build_scene(load_scenario("pocket_table"))
+    with sleeping(scene.work, True):
+        robot = hand_at(scene, -0.06, 0.15, 0.02)
+        robot.follow(smooth(robot.T, shifted(robot.T, DOWN, 0.014), 0.05))
+        assert push_on_table(scene, robot) == 0.0
+        with pytest.raises(Halt) as halt:
+            robot.follow(steady(robot.T, shifted(robot.T, NORTH, 0.02), 0.004))
+        assert (halt.value.code, halt.value.part) == ("collision", "table")
+        assert 20.0 < push_on_table(scene, robot) < HARDEST_N
+
+
+def test_a_part_that_fell_asleep_is_felt_no_longer(tower: Scene) -> None:
+    """The hand lifts off between two looks, the part comes to rest, and its sensor must not keep what it felt last."""
+    robot = Robot(tower, tower.scenario.start)
+    with sleeping(tower.work, True):
+        robot.wait(0.1)
+        sensors = robot.data.sensordata.reshape(-1, 3)[len(tower.work.free) :]
+        sensors[:] = 1.0
+        place(tower.work, robot.data, "castle1", tower.scenario.start["castle1"])
+        robot.wait(0.1)
+        assert robot.load() == 0.0
