@@ -14,6 +14,7 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.mate import Mate, mate
 from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.solid import Face
+from apo_bench.judging.play import joint_play_mm
 from apo_bench.records.thresholds import Thresholds
 
 Moment = Literal["made", "end"]
@@ -28,6 +29,13 @@ _Share = Callable[[Overlap, Overlap], float]
 """How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
 
 
+class Gaps(NamedTuple):
+    """How far two faces are apart and how deep in each other where they are most, [mm]; not negative."""
+
+    apart_mm: float
+    deep_mm: float
+
+
 class ContactVerdict(NamedTuple):
     """One contact at one moment."""
 
@@ -38,7 +46,8 @@ class ContactVerdict(NamedTuple):
     """`made`: when its operation was over; `end`: at the end, if nothing moved the parts away from each other."""
     gap_mm: float | None
     """Largest |e|: distance of a corner of the overlap to the plane of the other face; of round faces that of the
-    axes, at the ends of their common length (`Mate.gap_m`); None without any overlap."""
+    axes, at the ends of their common length (`Mate.gap_m`); None without any overlap. Where faces may be farther apart
+    than deep, |e| where it exceeds what is allowed the most."""
     angle_deg: float
     """Between the normals of the faces, or between the axes; 0 if they look straight at each other."""
     overlap: float
@@ -65,17 +74,19 @@ class ContactJudge(NamedTuple):
     clearance_mm: float
 
     def verdict(
-        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Overlap, share: _Share
+        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Poses, share: _Share
     ) -> ContactVerdict:
         """Measure one contact.
 
         Args:
+            operation: That makes it, counted from 0.
             poses: Where the parts are, world frame, [m].
-            true: The overlap of the two faces at the true goals.
+            true: Where they are when it is made, if all goals are the true ones.
         """
-        asked, allowed = self.thresholds, self._allowed_mm(contact)
-        gap, angle, found = _measured(self.assembly, contact, poses)
-        covered = share(found, true)
+        asked = self.thresholds
+        gaps, angle, found = _measured(self.assembly, contact, poses)
+        allowed, gap = self._nearest_limit(contact, operation, true, gaps)
+        covered = share(found, face_overlap(self.assembly, contact, true))
         covering = gap is not None and covered >= asked.overlap_fraction
         near = angle <= asked.loose_angle_deg and (gap is None or gap <= asked.loose_gap_mm)
         touching = near and (gap is None or gap <= allowed)
@@ -93,6 +104,17 @@ class ContactJudge(NamedTuple):
             allowed_mm=allowed,
             kind=self._kind(contact),
         )
+
+    def _nearest_limit(
+        self, contact: Contact, operation: int, true: Poses, gaps: Gaps | None
+    ) -> tuple[float, float | None]:
+        """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
+        deep = self._allowed_mm(contact)
+        if gaps is None:
+            return deep, None
+        play = joint_play_mm(self.assembly, contact, operation, true, self.clearance_mm)
+        apart = deep if play is None else max(deep, play + self.thresholds.fit_margin_mm)
+        return max((deep, gaps.deep_mm), (apart, gaps.apart_mm), key=lambda side: side[1] - side[0])
 
     def _allowed_mm(self, contact: Contact) -> float:
         """The play of a fit and a margin, or the margin of faces that should touch."""
@@ -114,7 +136,7 @@ def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) 
         if worst.gap_mm is None or worst.angle_deg > thresholds.loose_angle_deg:
             how = f"turned by {worst.angle_deg:.1f} deg, where {thresholds.loose_angle_deg:g} deg are allowed"
         else:
-            how = f"{_OFF[worst.kind].format(worst.gap_mm)}, where {worst.allowed_mm:g} mm are allowed"
+            how = f"{_OFF[worst.kind].format(worst.gap_mm)}, where {round(worst.allowed_mm, 2):g} mm are allowed"
         yield "gap", f"{worst.contact} is {how}{_when(worst)}"
     bare = [c for c in contacts if not c.covering]
     if bare:
@@ -149,12 +171,15 @@ def _when(found: ContactVerdict) -> str:
     return f" after operation {found.operation + 1}" if found.moment == "made" else ""
 
 
-def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float | None, float, Overlap]:
-    """Largest |e| [mm], angle between the normals or axes [degrees], and the overlap."""
+def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps | None, float, Overlap]:
+    """What is between the faces, angle between the normals or axes [degrees], and the overlap.
+
+    Round faces are off, not apart or deep, but for shafts on planes.
+    """
     if assembly.is_round(contact):
         between = _mate(assembly, contact, poses)
-        gap = 1e3 * between.gap_m if between.common else None
-        return gap, float(np.degrees(between.angle_rad)), between.common
+        off = 1e3 * between.gap_m
+        return Gaps(off, off) if between.common else None, float(np.degrees(between.angle_rad)), between.common
     plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
     found = face_overlap(assembly, contact, poses)
     T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]
@@ -162,4 +187,6 @@ def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[float
     angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
     if not found:
         return None, angle, found
-    return float(np.abs((found.corners - T_m[:3, 3]) @ n + plane[3]).max()) * 1e3, angle, found
+    # Seen from the manipulated face, a corner on the plane of the other one is in front of it where the two are apart.
+    e = 1e3 * ((found.corners - T_m[:3, 3]) @ n + plane[3])
+    return Gaps(max(0.0, float(e.max())), max(0.0, float(-e.min()))), angle, found

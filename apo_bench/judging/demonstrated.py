@@ -6,13 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NOTHING, Overlap
-from apo_bench.judging.contacts import ContactJudge, ContactVerdict, Moment, face_overlap
+from apo_bench.geometry.overlap import Overlap
+from apo_bench.judging.contacts import ContactJudge, ContactVerdict, Moment
 from apo_bench.judging.displaced import displacements
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
@@ -53,26 +54,23 @@ def _contacts(
 
     Moments of which there is no snapshot are left out.
     """
-    true = _true_overlaps(asked.assembly, after, reference)
+    true = _true_poses(asked.assembly, (*after, final), reference)
     out = []
-    for k, (contact, made, lost) in enumerate(asked.assembly.relations()):
+    for contact, made, lost in asked.assembly.relations():
         moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
-                out.append(asked.verdict(contact, made, moment, snapshot.poses, true[k], Overlap.share))
+                out.append(asked.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))
     return tuple(out)
 
 
-def _true_overlaps(assembly: Assembly, after: Sequence[Snapshot | None], reference: Array) -> list[Overlap]:
-    """The overlap of every contact when it is made at the true goals.
+def _true_poses(assembly: Assembly, moments: Sequence[Snapshot | None], reference: Array) -> Sequence[Poses]:
+    """Where every part stands after each operation at the true goals; nothing without any snapshot.
 
     A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
     """
-    first = next((snapshot for snapshot in after if snapshot is not None), None)
-    if first is None:
-        return [NOTHING] * len(assembly.relations())
-    history = placements(assembly, first.poses, reference)
-    return [face_overlap(assembly, contact, history[made]) for contact, made, _ in assembly.relations()]
+    first = next((snapshot for snapshot in moments if snapshot is not None), None)
+    return () if first is None else placements(assembly, first.poses, reference)
 
 
 def _pushes(

@@ -11,7 +11,7 @@ from apo_bench.assembly.topology import Assembly, Contact, Relation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import Overlap
 from apo_bench.geometry.symmetry import nearest_alike
-from apo_bench.judging.contacts import ContactJudge, ContactVerdict, face_overlap
+from apo_bench.judging.contacts import ContactJudge, ContactVerdict
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records.thresholds import Thresholds
@@ -77,7 +77,7 @@ def _contacts(asked: ContactJudge, seen: Poses, true: Poses, away: frozenset[str
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
             share = _share_of_area if _on_fixed(assembly, contact) else Overlap.share
-            yield asked.verdict(contact, made, "end", seen, face_overlap(assembly, contact, true), share)
+            yield asked.verdict(contact, made, "end", seen, true, share)
 
 
 def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Array:

@@ -14,6 +14,7 @@ from apo_bench.assembly.touching import touched_contacts
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.states import classify
 from apo_bench.judging.finished import fixtures
+from apo_bench.judging.play import joint_play_mm
 from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario
 from apo_bench.show.axes import holds_axis
@@ -140,6 +141,13 @@ def _success(scenario: Scenario) -> Iterator[str]:
         f"another, no parts that touch slid against each other by more than {t.pushed_mm:g} mm since they were put; "
         f"all let go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
     )
+    wider = sorted(_wider(scenario))
+    if wider:
+        yield (
+            "The play of all faces of two parts together leaves some of them more, so they may be farther apart: "
+            + "; ".join(f"{contact} by {play + t.fit_margin_mm:.2f} mm" for contact, play in wider)
+            + "."
+        )
     if any(map(scenario.assembly.is_round, (relation.contact for relation in scenario.assembly.relations()))):
         yield (
             "Of round faces the axes count, at both ends of the length that they have in common, which is their "
@@ -156,6 +164,16 @@ def _success(scenario: Scenario) -> Iterator[str]:
     )
     yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
     yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."
+
+
+def _wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    """Contacts whose faces can come farther apart than their own clearance, and how far, [mm]; at the nominal goals."""
+    assembly, clearance = scenario.assembly, scenario.clearance_mm
+    history = placements(assembly, scenario.start, scenario.goals)
+    for contact, made, _ in assembly.relations():
+        play = joint_play_mm(assembly, contact, made, history[made], clearance)
+        if play is not None and play > clearance:
+            yield str(contact), play
 
 
 def _span(low_m: float, high_m: float) -> str:

@@ -1,0 +1,127 @@
+"""How far faces of two parts that fit can come apart, if no other face that the two have in contact is in its way.
+
+A face that recedes lets a part sink or shift, which may open others by more than they recede themselves: a slide in a
+dovetail that lies on a receded floor has more room between its leaning walls. What a small motion opens is linear in
+it, so the largest gap is that of a linear program.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import cos, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.kinds import contact_kind, play_mm
+from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.mate import mate
+from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.revolution import across_axis
+from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry.solid import Face
+
+_WALLS = 16
+"""Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""
+_LEVER_MM = 30.0
+"""Turns count as the way at this distance, so that all unknowns of the linear program are of one size."""
+_DIGITS = 6
+"""Of a play in mm; what a program leaves behind them is rounding."""
+_ROUND_M = 9
+"""Digits of a pose [m] that tell two layouts apart."""
+
+AnyFace = Face | RoundFace
+
+
+class _Touch(NamedTuple):
+    """Where a contact touches, in the frame of the part that rests."""
+
+    points: Array
+    """(k, 3), [m]."""
+    normals: Array
+    """Out of the resting face, unit length, (k, 3)."""
+    limit_mm: float
+    """How deep the other face may come at each."""
+
+
+def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, clearance_mm: float) -> float | None:
+    """How far apart a corner of a flat fit contact, or the end of a shaft on a plane, can be at most, [mm].
+
+    All contacts count that the same operation makes between the same two parts: none of them gets deeper than its own
+    play. None where they leave the gap without bound, where there is no other contact, where the faces do not fit, of
+    shafts in holes, which are bounded by their own play, and where the two parts touch at cones.
+
+    Args:
+        made: The operation that makes the contact, counted from 0.
+        true: The poses when it is made, world frame, [m].
+    """
+    moved, rests = (end.part for end in contact)
+    together = [
+        relation.contact
+        for relation in assembly.relations()
+        if relation.made == made and {end.part for end in relation.contact} == {moved, rests}
+    ]
+    if len(together) < 2 or not assembly.is_fit(contact):
+        return None
+    pairs = [each if each.manipulated.part == moved else Contact(*each[::-1]) for each in together]
+    T = np.round(pose.inverse(true[rests]) @ true[moved], _ROUND_M) + 0.0
+    faces = tuple((assembly.face_of(m), assembly.face_of(e)) for m, e in pairs)
+    return _opening(faces, together.index(contact), T.tobytes(), clearance_mm)
+
+
+@lru_cache(maxsize=1024)
+def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], asked: int, at: bytes, clearance_mm: float) -> float | None:
+    """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones.
+
+    With normals n into the free side and points p a motion (v, w) opens n v + (p x n) w.
+    """
+    if not {contact_kind(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
+        return None
+    if contact_kind(*faces[asked]) == "shaft in hole":
+        return None
+    T = np.frombuffer(at).reshape(4, 4)
+    touches = [_touch(*pair, T, clearance_mm) for pair in faces]
+    rows = np.concatenate([_rows(touch) for touch in touches])
+    limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
+    widest = [_widest(row, rows, limits) for row in _rows(touches[asked])]
+    return round(max(widest), _DIGITS) if widest and np.isfinite(widest).all() else None
+
+
+def _rows(touch: _Touch) -> Array:
+    """By how much motions (v [mm], w [mm at the lever]) open a contact at each point, (k, 6)."""
+    return np.concatenate([touch.normals, np.cross(1e3 * touch.points, touch.normals) / _LEVER_MM], axis=1)
+
+
+def _widest(row: Array, rows: Array, limits: Array) -> float:
+    """The most that a motion opens by one row, if no row closes by more than its limit; infinite without bound."""
+    from scipy.optimize import linprog
+
+    found = linprog(-row, -rows, limits, bounds=[(None, None)] * 6)
+    return -float(found.fun) if found.success else np.inf
+
+
+def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _Touch:
+    """Where two faces touch.
+
+    Args:
+        T: The pose of the part that moves in the frame of the one that rests.
+    """
+    fit_mm = clearance_mm * (moved.fit or rests.fit)
+    if isinstance(moved, Face) and isinstance(rests, Face):
+        points = overlap(moved, T, rests, np.eye(4)).corners
+        return _Touch(points, np.tile(rests.normal, (len(points), 1)), fit_mm)
+    between = mate(moved, T, rests, np.eye(4))
+    if isinstance(rests, Face):
+        return _Touch(between.points, np.tile(rests.normal, (2, 1)), fit_mm)
+    if isinstance(moved, Face):
+        return _Touch(between.points, np.tile(-T[:3, :3] @ moved.normal, (2, 1)), fit_mm)
+    x = across_axis(between.axis)
+    turns = 2.0 * np.pi * (np.arange(_WALLS) + 0.5) / _WALLS
+    ring = np.outer(np.cos(turns), x) + np.outer(np.sin(turns), np.cross(between.axis, x))
+    play = play_mm(moved, rests, clearance_mm)
+    assert play is not None
+    ends = between.points
+    return _Touch(np.repeat(ends, _WALLS, axis=0), np.tile(ring, (len(ends), 1)), max(0.0, play) * cos(pi / _WALLS))

@@ -1,0 +1,163 @@
+"""How far faces of parts that fit may be apart: the play of all faces together, in every scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import radians, sin
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly.placement import placements
+from apo_bench.assembly.topology import Contact
+from apo_bench.geometry import pose
+from apo_bench.geometry.intrusion import intrusion_depths
+from apo_bench.geometry.overlap import Overlap
+from apo_bench.judging.contacts import ContactJudge
+from apo_bench.judging.play import joint_play_mm
+from apo_bench.prediction.interference import physical_solids
+from apo_bench.records.thresholds import Thresholds
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.scenario import Scenario
+from tests.end_states import CASTLES, CLEARANCE_MM
+from tests.shipped import BOXES, ROUND, TILTED
+
+pytestmark = pytest.mark.numeric
+
+Pair = tuple[list[Contact], int, Poses]
+"""The contacts of two parts, the operation that makes them, and where all parts are then."""
+WALKS, STEPS, HALVINGS = 4, 5, 24
+FARTHEST_MM, FARTHEST_DEG = 1.5, 1.0
+"""Motions at both ends of what is tried: farther than the play of anything here, less than what leaves a slot."""
+WALLS_MM = 0.02
+"""Holes are polygons around their circle, and depths are measured to 2 um."""
+
+
+def pairs(scenario: Scenario) -> Iterator[Pair]:
+    assembly = scenario.assembly
+    history, relations = placements(assembly, scenario.start, scenario.goals), assembly.relations()
+    for arc in assembly.arcs():
+        made = relations[arc[0]].made
+        yield [relations[i].contact for i in arc], made, history[made]
+
+
+def plays(name: str) -> dict[str, float]:
+    scenario = load_scenario(name)
+    found = {}
+    for contacts, made, true in pairs(scenario):
+        for contact in contacts:
+            play = joint_play_mm(scenario.assembly, contact, made, true, scenario.clearance_mm)
+            if play is not None:
+                found[str(contact)] = play
+    return found
+
+
+def test_the_play_between_the_walls_of_a_slot_is_the_clearance() -> None:
+    """The stick between two parallel walls; its floor, with nothing above it, bounds nothing."""
+    scene = CASTLES()
+    true = placements(scene.assembly, scene.start, scene.goals)[-1]
+    found = [
+        joint_play_mm(scene.assembly, contact, 2, true, CLEARANCE_MM)
+        for contact in scene.assembly.operations[2].contacts
+    ]
+    assert found == [None, CLEARANCE_MM, CLEARANCE_MM] * 2
+
+
+def test_a_slide_sinks_in_its_dovetail_and_gets_room_between_the_walls() -> None:
+    """By hand, walls leaning by 60 degrees: sunk by c the slide is c sin 30 off both walls, and may go on until the
+    other one, receded by c, stops it: c + 2 c sin 30. Its floor opens until both walls stop it, c / sin 30; rolled as
+    well, until an edge of the bottom is on the receded floor, by the factor that the geometry of the trapezium gives.
+    """
+    c, sine = 0.25, sin(radians(30.0))
+    a, b = 31.547005, 4.226497  # width of the bottom, and what a roll opens at the walls per radian, over sine [mm]
+    lifted = (c / sine + b / a * c) / (1.0 - b / a)
+    assert plays("dovetail") == {
+        "slide.bottom on base.floor": pytest.approx(lifted, abs=1e-4),
+        "slide.lean_n on base.slot_n": pytest.approx(c + 2 * c * sine, abs=1e-5),
+        "slide.lean_p on base.slot_p": pytest.approx(c + 2 * c * sine, abs=1e-5),
+    }
+
+
+@pytest.mark.parametrize("name", [*BOXES, "wedge_under_roof", *ROUND])
+def test_in_all_other_scenarios_it_is_the_clearance(name: str) -> None:
+    """Opposite walls, or nothing that bounds the gap; shafts in holes have a play of their own."""
+    assert set(plays(name).values()) <= {CLEARANCE_MM}
+
+
+def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, limit_m: float) -> Poses | None:
+    """The poses where a motion, taken so far, gets the parts as they are made that deep into each other.
+
+    None if it never does.
+    """
+    contacts = pair[0]
+    moved, rests = (end.part for end in contacts[0])
+    solids = physical_solids(scenario.assembly, scenario.clearance_mm)
+
+    def after(share: float) -> Poses:
+        return {**start, moved: start[moved] @ pose.exp(share * motion)}
+
+    def depth(share: float) -> float:
+        T = after(share)[moved]
+        a, b = solids[moved].pieces, solids[rests].pieces
+        return float(intrusion_depths(a, T[:3, :3], T[None, :3, 3], b, start[rests])[0])
+
+    if depth(1.0) <= limit_m:
+        return None
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if depth(middle) <= limit_m else (low, middle)
+    return after(low)
+
+
+def touching(scenario: Scenario, pair: Pair, poses: Poses) -> dict[Contact, bool]:
+    contacts, made, true = pair
+    judge = ContactJudge(scenario.assembly, Thresholds(), scenario.clearance_mm)
+    return {c: judge.verdict(c, made, "made", poses, true, Overlap.share).touching for c in contacts}
+
+
+def bounded(scenario: Scenario, pair: Pair) -> list[Contact]:
+    """Contacts that the play of a pair keeps from opening ever wider."""
+    contacts, made, true = pair
+    assembly = scenario.assembly
+    return [
+        c
+        for c in contacts
+        if contact_kind(*map(assembly.face_of, c)) == "shaft in hole"
+        or joint_play_mm(assembly, c, made, true, scenario.clearance_mm) is not None
+    ]
+
+
+def near(pair: Pair, poses: Poses) -> bool:
+    """Whether the parts are still about where they belong: what nothing bounds may go anywhere."""
+    moved, rests = (end.part for end in pair[0][0])
+    then, now = (pose.inverse(at[rests]) @ at[moved] for at in (pair[2], poses))
+    return bool(np.abs(pose.log(pose.inverse(then) @ now)[:3]).max() < 1e-3 * FARTHEST_MM)
+
+
+@pytest.mark.parametrize("name", [*BOXES, *TILTED, *ROUND])
+def test_all_play_is_right_and_what_is_deeper_is_not(name: str) -> None:
+    """Parts as they are made, moved anyhow until they touch, and on from there: their contacts hold. Moved until they
+    are deeper in each other than the margin: one does not."""
+    rng, scenario = np.random.default_rng(5), load_scenario(name)
+    margin_m = 1e-3 * Thresholds().fit_margin_mm
+    tried = 0
+    for pair in pairs(scenario):
+        held = bounded(scenario, pair)
+        if not held:
+            continue
+        for _ in range(WALKS if name not in ROUND else 1):
+            here = pair[2]
+            for _ in range(STEPS):
+                way = rng.normal(size=6) * np.repeat([1e-3 * FARTHEST_MM, radians(FARTHEST_DEG)], 3)
+                beyond = at_edge(scenario, pair, here, way, margin_m + 1e-3 * WALLS_MM)
+                assert beyond is None or not all(touching(scenario, pair, beyond).values()), (pair[0], way)
+                edge = at_edge(scenario, pair, here, way, 1e-6)
+                if edge is not None and near(pair, edge):
+                    here = edge
+                    holds = touching(scenario, pair, here)
+                    assert all(holds[c] for c in held), (pair[0], way)
+                    tried += 1
+    assert tried > 0 or not any(bounded(scenario, pair) for pair in pairs(scenario))
