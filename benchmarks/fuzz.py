@@ -1,13 +1,14 @@
 """What strangers' files do to the command line: valid files of every kind, made wrong, thousands of times.
 
-    python -m benchmarks.fuzz [--cases 10000] [--seed 0] [--workers 1] [--write [FILE]] [--case N]
+    python -m benchmarks.fuzz [--cases 10000] [--seed 0] [--workers 1] [--kind KIND ..] [--write [FILE]] [--case N]
 
 Every case draws a kind of file, changes one file of it in one to four places (bytes, tokens or structure, see
 `fuzz_mutate.py`) or puts something in its place that is no file, and runs one command that reads it:
 `apo_bench.cli.app.main`, in a fork of this process, in a folder of its own. It must end with exit code 0, 1 or 2,
-without a traceback, in 10 s of processor time and 1 GB of memory, and say one sentence at most that a terminal only
-shows. `--case N` runs one case again and shows it; `--write` writes the counts, to `results/fuzz.json`. Case i is
-drawn from `default_rng([seed, i])`.
+without a traceback, in 10 s of processor time and 1 GB of memory (CAD, logs and arms: 20 s, 2 GB), and say one sentence
+at most that a terminal only shows. It may run no code and start no program, and write no file but those it was asked
+for (see `fuzz_watch.py`). `--case N` runs one case again and shows it; `--write` puts the counts of the kinds that were
+drawn into `results/fuzz.json`, in place of those of the same kinds. Case i is drawn from `default_rng([seed, i])`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import os
 import platform
 import re
 import resource
+import shlex
 import shutil
 import signal
 import subprocess
@@ -28,6 +30,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,12 +39,17 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
-from benchmarks.fuzz_files import Kind, kinds
+from benchmarks.fuzz_files import kinds
+from benchmarks.fuzz_kind import Kind
 from benchmarks.fuzz_mutate import RAN, mutated
+from benchmarks.fuzz_watch import BESIDE, WROTE, changed_files, lay_out, watch
 
 RESULT = Path(__file__).parent / "results" / "fuzz.json"
-LONGEST_S, LARGEST_MB, PATIENCE_S = 10, 1000, 60
+PATIENCE_S = 120
+"""Of the clock: other processes may have the processor."""
 LONGEST_SENTENCE = 2000
+ELSEWHERE = "elsewhere"
+"""An empty file that no command may write."""
 SPECIAL = 0.03
 """How often something that is no file stands in the place of one."""
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
@@ -66,27 +74,30 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--kind", action="append", help="only this one, or these; default: all")
     parser.add_argument("--case", type=int)
     parser.add_argument("--write", type=Path, nargs="?", const=RESULT)
     asked = parser.parse_args()
     if asked.case is not None:
         with tempfile.TemporaryDirectory() as work:
-            print(run_case(prepared(Path(work)), asked.seed, asked.case, Path(work), show=True))
+            print(run_case(prepared(Path(work), asked.kind), asked.seed, asked.case, Path(work), show=True))
         return 0
-    began = time.perf_counter()
-    found = fuzz(asked.cases, asked.seed, asked.workers)
+    found = fuzz(asked.cases, asked.seed, asked.workers, asked.kind)
     for line in lines(found):
         print(line)
     if asked.write:
-        asked.write.write_text(json.dumps(summary(found, asked.seed, time.perf_counter() - began), indent=1) + "\n")
+        words = ["python", "-m", "benchmarks.fuzz", "--cases", str(asked.cases), "--seed", str(asked.seed)]
+        words += [word for kind in asked.kind or () for word in ("--kind", kind)]
+        kept = json.loads(asked.write.read_text()) if asked.write.exists() else {}
+        asked.write.write_text(json.dumps(summary(found, shlex.join([*words, "--write"]), kept), indent=1) + "\n")
     return int(any(case.ending not in FINE for case in found))
 
 
-def fuzz(cases: int, seed: int, workers: int = 1) -> list[Ended]:
+def fuzz(cases: int, seed: int, workers: int = 1, only: Sequence[str] | None = None) -> list[Ended]:
     """Run cases 0, 1, ..., every worker its share."""
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        made = prepared(work)
+        made = prepared(work, only)
         sheets = [work / f"sheet{w}" for w in range(workers)]
         children = []
         for w, sheet in enumerate(sheets):
@@ -95,7 +106,10 @@ def fuzz(cases: int, seed: int, workers: int = 1) -> list[Ended]:
                 continue
             with sheet.open("w", buffering=1) as out:
                 for case in range(w, cases, workers):
-                    out.write(json.dumps(run_case(made, seed, case, work)) + "\n")
+                    ended = run_case(made, seed, case, work)
+                    out.write(json.dumps(ended) + "\n")
+                    if ended.ending not in FINE:
+                        print(f"case {case}, {ended.kind}: {ended.ending}", file=sys.stderr, flush=True)
             os._exit(0)
         for child in children:
             os.waitpid(child, 0)
@@ -105,17 +119,27 @@ def fuzz(cases: int, seed: int, workers: int = 1) -> list[Ended]:
     return sorted(found)
 
 
-def prepared(work: Path) -> Mapping[str, Kind]:
-    """Valid files, each read once here, so that a fork has what it needs imported."""
+def prepared(work: Path, only: Sequence[str] | None = None) -> Mapping[str, Kind]:
+    """Valid files, each read once here, so that a fork has what it needs imported.
+
+    Args:
+        only: Kinds that are wanted; None: all.
+    """
     with open(os.devnull, "w") as nowhere:
         stdout, sys.stdout = sys.stdout, nowhere
         try:
+            (work / ELSEWHERE).touch()
             made = kinds(work)
-            for kind in made.values():
-                place = _laid_out(kind, work / "valid")
-                for arguments in {tuple(command): None for command in kind.commands}:
-                    if (code := _within(place, arguments)) != _expected(arguments):
-                        raise RuntimeError(f"{arguments} ended with exit code {code}")
+            if unknown := set(only or ()) - set(made):
+                raise InputError(f"unknown kinds {sorted(unknown)}; {', '.join(made)} are there.")
+            made = {name: kind for name, kind in made.items() if only is None or name in only}
+            for name, kind in made.items():
+                for k, arguments in enumerate({tuple(command): None for command in kind.commands}):
+                    place = work / "valid" / f"{name} {k}"
+                    lay_out(kind.files, place, traps=False)
+                    code = _within(place, arguments)
+                    if code != _expected(arguments) and not (kind.may_be_refused and code == cli.WRONG_REQUEST):
+                        raise RuntimeError(f"{name}: {arguments} ended with exit code {code}")
         finally:
             sys.stdout = stdout
     gc.freeze()
@@ -133,29 +157,40 @@ def run_case(made: Mapping[str, Kind], seed: int, case: int, work: Path, *, show
     weights = np.array([kind.weight for kind in made.values()], dtype=float)
     name = list(made)[int(rng.choice(len(made), p=weights / weights.sum()))]
     kind = made[name]
-    place = _laid_out(kind, work / f"case{case}")
-    path = place / kind.changed[int(rng.integers(len(kind.changed)))]
+    place = work / f"case{case}"
+    lay_out(kind.files, place)
+    changed = kind.changed[int(rng.integers(len(kind.changed)))]
+    path = place / changed
+    arguments = kind.commands[int(rng.integers(len(kind.commands)))]
+    before = dict(kind.files)
     if rng.random() < SPECIAL:
         level = _special(path, rng)
+        del before[changed]
     else:
-        level, raw = mutated(path.read_bytes(), path.suffix, rng)
-        path.write_bytes(raw)
-    arguments = kind.commands[int(rng.integers(len(kind.commands)))]
+        level, before[changed] = mutated(path.read_bytes(), path.suffix, rng, kind.structure)
+        path.write_bytes(before[changed])
+    if "--out" in arguments and rng.random() < SPECIAL:
+        level = _linked(place / arguments[arguments.index("--out") + 1], work)
     if show:
         print(f"{name}, {level}, {path.name}: apo-bench {' '.join(arguments)}")
         print(path.read_bytes()[:4000].decode(errors="replace") if path.is_file() else level)
-    ending, cpu_s, mb, said = _forked(place, arguments)
+    ending, cpu_s, mb, said = _forked(place, arguments, kind.longest_s, kind.largest_mb)
+    changes = changed_files(place, before, kind.writes, special=() if changed in before else (changed,))
+    if ending in FINE and (changes or (work / ELSEWHERE).read_bytes()):
+        ending, said = WROTE, f"{changes}\n{said}"
+        (work / ELSEWHERE).write_bytes(b"")
     if show:
         print(said)
     shutil.rmtree(place)
     return Ended(case, name, level, arguments, ending, cpu_s, mb, said if ending not in FINE else "")
 
 
-def _laid_out(kind: Kind, place: Path) -> Path:
-    for name, raw in kind.files.items():
-        (place / name).parent.mkdir(parents=True, exist_ok=True)
-        (place / name).write_bytes(raw)
-    return place
+def _linked(out: Path, work: Path) -> str:
+    """A link to a file elsewhere in the place of what is to be written."""
+    if out.exists():
+        return "nothing linked"
+    out.symlink_to(work / ELSEWHERE)
+    return "link at --out"
 
 
 def _special(path: Path, rng: np.random.Generator) -> str:
@@ -180,12 +215,14 @@ def _special(path: Path, rng: np.random.Generator) -> str:
     return what
 
 
-def _forked(place: Path, arguments: Sequence[str]) -> tuple[str, float, float, str]:
-    """Ending, processor time [s], memory [MB] and what was said, of one command."""
+def _forked(
+    place: Path, arguments: Sequence[str], longest_s: float = 10, largest_mb: float = 1000
+) -> tuple[str, float, float, str]:
+    """Ending, processor time [s], memory [MB] and what was said, of one command; what it has started ends with it."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         child = os.fork()
         if not child:
-            _become(place, arguments, out.fileno(), err.fileno())
+            _become(place, arguments, out.fileno(), err.fileno(), longest_s)
         until, status = time.perf_counter() + PATIENCE_S, None
         while status is None:
             found, state, used = os.wait4(child, os.WNOHANG)
@@ -196,24 +233,29 @@ def _forked(place: Path, arguments: Sequence[str]) -> tuple[str, float, float, s
                 until = np.inf
             else:
                 time.sleep(0.002)
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(child, signal.SIGKILL)
         said, printed = ((file.seek(0), file.read(1_000_000).decode(errors="replace"))[1] for file in (err, out))
-    if arguments[0] not in ("report", "compare"):
+    if arguments[0] == "sweep":  # whose file may name code
         said = said.replace(f"{RAN}\n", "")
     cpu_s, mb = used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
-    return _ending(status, cpu_s, mb, until == np.inf, printed, said), round(cpu_s, 2), round(mb), said[-3000:]
+    if until == np.inf or cpu_s > longest_s:
+        ending = f"longer than {longest_s:g} s"
+    elif mb > largest_mb:
+        ending = f"more than {largest_mb:g} MB"
+    else:
+        ending = _ending(status, printed, said)
+    return ending, round(cpu_s, 2), round(mb), said[-3000:]
 
 
-def _ending(status: int, cpu_s: float, mb: float, waited: bool, printed: str, said: str) -> str:
-    if waited or cpu_s > LONGEST_S:
-        return f"longer than {LONGEST_S} s"
+def _ending(status: int, printed: str, said: str) -> str:
     if os.WIFSIGNALED(status):
         return f"signal {os.WTERMSIG(status)}"
+    for beside in (RAN, *BESIDE):
+        if beside in said:
+            return beside
     if "Traceback (most recent call last)" in said or "recursion depth" in said:
         return "traceback"
-    if RAN in said:
-        return RAN
-    if mb > LARGEST_MB:
-        return f"more than {LARGEST_MB} MB"
     if (code := os.WEXITSTATUS(status)) not in (0, 1, 2):
         return f"exit code {code}"
     if CONTROL.search(printed) or CONTROL.search(said):
@@ -223,17 +265,19 @@ def _ending(status: int, cpu_s: float, mb: float, waited: bool, printed: str, sa
     return f"exit code {code}"
 
 
-def _become(place: Path, arguments: Sequence[str], out: int, err: int) -> None:
+def _become(place: Path, arguments: Sequence[str], out: int, err: int, longest_s: float) -> None:
     """Run the command here, as its own process would, and end."""
     code = 1
     try:
-        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_S + 5, LONGEST_S + 10))
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_CPU, (int(longest_s) + 5, int(longest_s) + 10))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_AS, (8 * 10**9, 8 * 10**9))
         for number, file in ((0, os.open(os.devnull, os.O_RDONLY)), (1, out), (2, err)):
             os.dup2(file, number)
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
         sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", closefd=False)  # noqa: SIM115
+        watch(place)
         code = _within(place, arguments)
         sys.stdout.flush()
     except BaseException:
@@ -284,28 +328,32 @@ def lines(found: Sequence[Ended]) -> list[str]:
     ]
 
 
-def summary(found: Sequence[Ended], seed: int, seconds: float) -> dict[str, Any]:
-    """What is written."""
-    counts = Counter((case.kind, case.ending) for case in found)
-    return {
-        "command": f"python -m benchmarks.fuzz --cases {len(found)} --seed {seed} --write",
-        "seed": seed,
-        "cases": len(found),
-        "version": __version__,
-        "commit": subprocess.run(
-            ["git", "rev-parse", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
-        ).stdout.strip(),
-        "python": platform.python_version(),
-        "counts": {
-            kind: {ending: n for (k, ending), n in sorted(counts.items()) if k == kind}
-            for kind in sorted({case.kind for case in found})
-        },
-        "levels": dict(sorted(Counter(case.level for case in found).items())),
-        "wrong": sum(case.ending not in FINE for case in found),
-        "slowest_s": max(case.cpu_s for case in found),
-        "largest_mb": max(case.mb for case in found),
-        "seconds": round(seconds),
-    }
+def summary(found: Sequence[Ended], command: str, kept: Mapping[str, Any]) -> dict[str, Any]:
+    """What is written: the counts of each kind, with the command that made them.
+
+    Args:
+        kept: What was written before, of other kinds.
+    """
+    commit = subprocess.run(
+        ["git", "rev-parse", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
+    ).stdout.strip()
+    of_kinds = dict(kept.get("kinds", {}))
+    for kind in {case.kind for case in found}:
+        cases = [case for case in found if case.kind == kind]
+        of_kinds[kind] = {
+            "command": command,
+            "commit": commit,
+            "version": __version__,
+            "python": platform.python_version(),
+            "cases": len(cases),
+            "wrong": sum(case.ending not in FINE for case in cases),
+            "endings": dict(sorted(Counter(case.ending for case in cases).items())),
+            "levels": dict(sorted(Counter(case.level for case in cases).items())),
+            "slowest_s": max(case.cpu_s for case in cases),
+            "largest_mb": max(case.mb for case in cases),
+        }
+    total = {name: sum(of[name] for of in of_kinds.values()) for name in ("cases", "wrong")}
+    return {**total, "kinds": dict(sorted(of_kinds.items()))}
 
 
 if __name__ == "__main__":

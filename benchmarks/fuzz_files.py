@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,19 +18,10 @@ from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
+from benchmarks.fuzz_foreign import foreign_kinds
+from benchmarks.fuzz_kind import Kind
 
 SCENARIO = "stick_in_tower"
-
-
-class Kind(NamedTuple):
-    """Files of a folder, one of which is changed, and what is then asked of it."""
-
-    files: Mapping[str, bytes]
-    changed: Sequence[str]
-    commands: Sequence[Sequence[str]]
-    """Arguments of `apo-bench`; `read-plan` stands for the function of that name, which no command calls."""
-    weight: int = 10
-    """How often it is drawn."""
 
 
 def kinds(work: Path) -> Mapping[str, Kind]:
@@ -57,8 +47,11 @@ def kinds(work: Path) -> Mapping[str, Kind]:
             ["rod.xml"],
             (*[["scenarios", "s.toml"]] * 3, ["scene", "s.toml", "--out", "scene.xml"]),
             18,
+            ("scene.xml",),
         ),
-        "scenario": Kind({"s.toml": scenario}, ["s.toml"], (*show, ["scene", "s.toml", "--out", "scene.xml"]), 16),
+        "scenario": Kind(
+            {"s.toml": scenario}, ["s.toml"], (*show, ["scene", "s.toml", "--out", "scene.xml"]), 16, ("scene.xml",)
+        ),
         "scenario with groups": Kind({"s.toml": pockets}, ["s.toml"], show, 8),
         "sweep": Kind({"w.toml": _SWEEP, "taken": b""}, ["w.toml"], (["sweep", "w.toml", "--out", "taken"],), 12),
         "noise": Kind({"n.toml": noise}, ["n.toml"], (["noise", "card", "n.toml"],), 4),
@@ -77,6 +70,7 @@ def kinds(work: Path) -> Mapping[str, Kind]:
             ["e.csv", "t.csv", "g.json"],
             [["noise", "fit", "--estimates", "e.csv", "--truth", name, *more] for name, more in _TRUTHS],
             8,
+            ("n.toml", "x.csv"),
         ),
         "residuals": Kind(
             {"r.csv": _residuals(work, estimates, truth)}, ["r.csv"], (["noise", "card", "empirical:r.csv"],), 4
@@ -86,11 +80,13 @@ def kinds(work: Path) -> Mapping[str, Kind]:
             [f"a/{file}" for file in run],
             (["report", "a", "--pictures", "0"], *[["compare", "a", "b", "--out", "c"]] * 3),
             10,
+            _REPORTS,
         ),
     }
-    return made
+    return {**made, **foreign_kinds(work)}
 
 
+_REPORTS = ("a/report.html", "a/tables/*", "a/figures/*", "c/*")
 _TRUTHS = (
     ("t.csv", []),
     ("g.json", ["--scene-id", "1"]),

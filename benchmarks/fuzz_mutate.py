@@ -8,11 +8,14 @@ import json
 import re
 import sys
 import tomllib
+import zipfile
 from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+
+from benchmarks.fuzz_binary import by_stl, by_zip
 
 Chance = np.random.Generator
 RAN = "code that a file names was run"
@@ -50,6 +53,7 @@ NASTY = (
         "\ud83d\ude00",
     ),
     *(
+        "fifo",
         "/dev/zero",
         "/dev/stdin",
         "/proc/self/mem",
@@ -96,6 +100,26 @@ TAGS = (
     "plugin",
     "a/b",
 )
+LARGE = (
+    '<include file="fifo"/>',
+    '<include file="/dev/zero"/>',
+    '<replicate count="1000000"><geom size=".01"/></replicate>',
+    '<replicate count="9"><replicate count="9999"><body><geom size=".01"/></body></replicate></replicate>',
+    '<flexcomp name="x" type="grid" count="300 300 9" spacing=".1 .1 .1" radius=".01" dim="3"/>',
+    '<asset><hfield name="x" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+    '<asset><mesh name="x" file="/dev/zero"/></asset>',
+    '<asset><texture name="x" type="2d" builtin="flat" width="60000" height="60000"/></asset>',
+    '<body mocap="true"><geom size=".01"/></body>',
+    '<body><freejoint/><geom size=".01"/></body>',
+    '<body><geom size=".01" mass="1e9" friction="1e6"/></body>',
+    '<composite type="cable" count="99999 1 1" size="1"><geom size=".01"/></composite>',
+    '<size memory="100G" nuserdata="1000000000"/>',
+    '<option timestep="1e-9" margin="1" solver="PGS" iterations="1000000000"/>',
+    '<equality><weld body1="base" body2="world"/></equality>',
+    '<default><material name="x"/></default>',
+    '<extension><plugin plugin="mujoco.elasticity.cable"/></extension>',
+)
+"""Elements of MJCF that wait, grow, or hold something fast."""
 KEYS = (
     "gravity",
     "mass",
@@ -132,18 +156,31 @@ def named(*_: object) -> None:
     print(RAN, file=sys.stderr, flush=True)
 
 
-def mutated(raw: bytes, suffix: str, rng: Chance) -> tuple[str, bytes]:
-    """The level and the file, changed in one to four places."""
+def mutated(
+    raw: bytes, suffix: str, rng: Chance, structure: Callable[[bytes, Chance], bytes] | None = None
+) -> tuple[str, bytes]:
+    """The level and the file, changed in one to four places.
+
+    Args:
+        structure: How its structure is changed; None: as its ending says.
+    """
     levels: tuple[tuple[str, Callable[[bytes, Chance], bytes]], ...] = (
         ("bytes", by_bytes),
         ("tokens", by_tokens),
-        ("structure", STRUCTURES[suffix]),
+        ("structure", structure or STRUCTURES[suffix]),
     )
     level, change = levels[int(rng.integers(len(levels)))]
     for _ in range(int(rng.choice([1, 2, 3, 4], p=[0.6, 0.2, 0.1, 0.1]))):
         try:
             raw = change(raw, rng)
-        except (ValueError, KeyError, RecursionError, ElementTree.ParseError):  # no longer a document: changed as bytes
+        except (
+            ValueError,
+            KeyError,
+            RecursionError,
+            ElementTree.ParseError,
+            StopIteration,
+            zipfile.BadZipFile,
+        ):  # no longer a document: changed as bytes
             raw = by_bytes(raw, rng)
     return level, raw
 
@@ -254,8 +291,10 @@ def by_xml(raw: bytes, rng: Chance) -> bytes:
         one.set(list(one.attrib)[int(rng.integers(len(one.attrib)))], _nasty(rng))
     elif kind == 3 and one is not root and other not in one.iter():
         other.append(one)
-    elif kind == 4:
+    elif kind == 4 and rng.random() < 0.5:
         one.append(ElementTree.Element(TAGS[int(rng.integers(len(TAGS)))], {"name": "x"}))
+    elif kind == 4:
+        one.append(ElementTree.fromstring(LARGE[int(rng.integers(len(LARGE)))]))
     elif kind == 5 and len(one):
         one.remove(one[int(rng.integers(len(one)))])
     else:
@@ -270,6 +309,10 @@ STRUCTURES = {
     ".toml": by_toml,
     ".csv": by_csv,
     ".xml": by_xml,
+    ".txt": by_tokens,
+    ".obj": by_tokens,
+    ".stl": by_stl,
+    ".3mf": by_zip,
 }
 
 
