@@ -169,13 +169,16 @@ def run_case(made: Mapping[str, Kind], seed: int, case: int, work: Path, *, show
     else:
         level, before[changed] = mutated(path.read_bytes(), path.suffix, rng, kind.structure)
         path.write_bytes(before[changed])
-    if "--out" in arguments and rng.random() < SPECIAL:
-        level = _linked(place / arguments[arguments.index("--out") + 1], work)
+    special = () if changed in before else (changed,)
+    out = arguments[arguments.index("--out") + 1] if "--out" in arguments else ""
+    if out and not (place / out).exists() and rng.random() < SPECIAL:
+        (place / out).symlink_to(work / ELSEWHERE)
+        level, special = "link at --out", (*special, out)
     if show:
         print(f"{name}, {level}, {path.name}: apo-bench {' '.join(arguments)}")
         print(path.read_bytes()[:4000].decode(errors="replace") if path.is_file() else level)
     ending, cpu_s, mb, said = _forked(place, arguments, kind.longest_s, kind.largest_mb)
-    changes = changed_files(place, before, kind.writes, special=() if changed in before else (changed,))
+    changes = changed_files(place, before, kind.writes, special)
     if ending in FINE and (changes or (work / ELSEWHERE).read_bytes()):
         ending, said = WROTE, f"{changes}\n{said}"
         (work / ELSEWHERE).write_bytes(b"")
@@ -183,14 +186,6 @@ def run_case(made: Mapping[str, Kind], seed: int, case: int, work: Path, *, show
         print(said)
     shutil.rmtree(place)
     return Ended(case, name, level, arguments, ending, cpu_s, mb, said if ending not in FINE else "")
-
-
-def _linked(out: Path, work: Path) -> str:
-    """A link to a file elsewhere in the place of what is to be written."""
-    if out.exists():
-        return "nothing linked"
-    out.symlink_to(work / ELSEWHERE)
-    return "link at --out"
 
 
 def _special(path: Path, rng: np.random.Generator) -> str:

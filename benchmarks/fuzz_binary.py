@@ -31,7 +31,8 @@ def by_stl(raw: bytes, rng: Chance) -> bytes:
     elif kind == 4:
         rows = [row[:12] + rows[j][12:24] + row[24:] if k == i else row for k, row in enumerate(rows)]
     elif kind == 5:
-        corners = np.frombuffer(b"".join(row[:48] for row in rows), "<f4") * np.float32(rng.choice(_ODD))
+        with np.errstate(all="ignore"):
+            corners = np.frombuffer(b"".join(row[:48] for row in rows), "<f4") * np.float32(rng.choice(_ODD))
         rows = [corners[12 * k : 12 * k + 12].astype("<f4").tobytes() + b"\0\0" for k in range(len(rows))]
     else:
         return head[:80] + struct.pack("<I", int(rng.choice([0, 1, 2**31, 2**32 - 1]))) + b"".join(rows)

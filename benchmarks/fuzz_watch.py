@@ -27,6 +27,7 @@ _TEMPORARY = "temporary"
 
 def lay_out(files: Mapping[str, bytes], place: Path, *, traps: bool = True) -> None:
     """Files of a case, a folder for what is temporary, a pipe that nobody writes, and modules that nobody may run."""
+    place.mkdir(parents=True)
     for name, raw in files.items():
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         (place / name).write_bytes(raw)
@@ -53,7 +54,7 @@ def watch(place: Path) -> None:
         else:
             paths = given[: _CHANGES.get(event, 0)]
         for path in paths:
-            if isinstance(path, str | bytes | os.PathLike) and not _is_within(os.fsdecode(path), inside):
+            if isinstance(path, str | bytes | os.PathLike) and not _is_within(os.fsdecode(path), inside, event):
                 os.write(2, f"{WROTE}: {event} {path!r}\n".encode())
 
     sys.addaudithook(hook)
@@ -84,6 +85,10 @@ def _is_own(program: Any) -> bool:
     return os.fsdecode(program) == sys.executable or os.path.basename(os.fsdecode(program)) in ("uname", "ldconfig")
 
 
-def _is_within(path: str, folder: str) -> bool:
-    real = os.path.realpath(path)
-    return real == os.devnull or real.startswith(folder + os.sep) or real == folder
+def _is_within(path: str, folder: str, event: str) -> bool:
+    """Whether what an event changes lies in a folder, or is compiled code beside its source."""
+    if event == "open":
+        real = os.path.realpath(path)
+    else:  # of a link itself
+        real = os.path.join(os.path.realpath(os.path.dirname(path) or "."), os.path.basename(path))
+    return real == os.devnull or real.startswith(folder + os.sep) or real == folder or "__pycache__" in real

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -100,6 +101,9 @@ def _unit(path: Path, asked: str | None, stated: str | None, size: float) -> tup
 def _by_trimesh(path: Path, raw: bytes, kind: str) -> Mesh:
     import trimesh
 
+    log = logging.getLogger("trimesh")
+    before = log.level
+    log.setLevel(logging.CRITICAL)  # its modules print the tracebacks of errors that they then handle
     try:
         more: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
         mesh: Any = trimesh.load(BytesIO(raw), file_type=kind, force="mesh", process=False, **more)
@@ -109,6 +113,8 @@ def _by_trimesh(path: Path, raw: bytes, kind: str) -> Mesh:
         raise
     except Exception as error:
         raise InputError(f"{path}: this is no {kind.upper()} file that can be read; save the part again.") from error
+    finally:
+        log.setLevel(before)
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(corners)):
         raise InputError(f"{path}: a triangle has a corner that the file does not hold; save the part again.")
     return Mesh(corners, triangles)

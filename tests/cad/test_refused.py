@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import tomllib
 import zipfile
 from collections.abc import Callable
@@ -103,6 +105,21 @@ def test_what_is_no_part_is_refused_in_one_sentence(
     assert "\n" not in str(raised.value)
     assert main(["part", "import", str(tmp_path / "none.stl"), "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_word_where_a_text_stl_has_a_normal_prints_no_traceback(tmp_path: Path) -> None:
+    """In a process of its own, where nothing else takes what trimesh logs."""
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in each)
+        + "endloop\nendfacet\n"
+        for each in triangles(block(20, 20, 20))
+    )
+    path = tmp_path / "a.stl"
+    path.write_text(f"solid a\n{facets}endsolid a\n".replace("normal 0 0 0", "normal ten 0 0", 1))
+    command = [sys.executable, "-m", "apo_bench", "part", "import", str(path), "--out", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, ""), "normals are not needed"
 
 
 def test_a_part_of_a_tenth_of_a_millimetre_is_refused(tmp_path: Path) -> None:
