@@ -1,5 +1,5 @@
 # Two commands do everything, on a machine with Python 3.11 or 3.12 and make:
-#   make sweep   set up, run a small benchmark, print the table, write the report
+#   make sweep   set up, run a small benchmark (4 minutes on two cores), print the table, write the report
 #   make test    set up, check style and types, build the documentation, run every test
 # and one the headline of the project (40 trials per cell take some 40 minutes on two cores):
 #   make headline [TRIALS=40] [FIDELITY=contact]
@@ -7,7 +7,7 @@
 PYTHON ?= python3
 WORKERS ?= 2
 FIDELITY ?= contact
-sweep: TRIALS ?= 4
+sweep: TRIALS ?= 10
 sweep: OUT ?= runs/sweep
 headline: TRIALS ?= 40
 headline: OUT ?= runs/headline_$(FIDELITY)
@@ -25,9 +25,8 @@ export OPENBLAS_NUM_THREADS := 1
 .PHONY: sweep headline test style types walls site compiled test-extras test-cad numeric docs lowest clean
 
 sweep: $(VENV)/.installed
-	$(BIN)/apo-bench sweep stick_in_tower stick_on_castles --levels 0,0.5,1 --careless 1 \
-	    --methods oracle,none,paper,contact --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
-	@$(BIN)/apo-bench report $(OUT) | tail -n 3
+	$(BIN)/apo-bench sweep benchmarks/demo.toml --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
+	@$(BIN)/apo-bench report $(OUT) | sed -n '/^Answer/,$$p'
 
 headline: $(VENV)/.installed
 	$(BIN)/apo-bench sweep benchmarks/headline.toml --trials $(TRIALS) --fidelity $(FIDELITY) --workers $(WORKERS) \

@@ -11,6 +11,7 @@ from typing import Any
 
 from apo_bench.records.method import knows_relations, knows_truth
 from apo_bench.records.row import Row, look_up
+from apo_bench.records.short_names import CORRECTOR
 from apo_bench.statistics.levels.half_level import HalfLevel
 from apo_bench.statistics.over_seeds import FEWEST_SEEDS, Contrast, Results, contrast, pooled
 from apo_bench.statistics.rate_text import percent
@@ -19,7 +20,7 @@ from apo_bench.statistics.summary import Summary
 
 ALIKE = 0.05
 """Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
-_AGAINST = ("none", "paper", "contact")
+_AGAINST = ("none", "paper", "contact", CORRECTOR)
 """The best method is compared with these; if none of them was tried, with the next best."""
 _NAMED = 3
 """Of methods that are as good as the best so many are named."""
@@ -169,6 +170,10 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     """Where its curve over the level falls to one half; of several settings the worst and the best."""
     ends = sorted(half, key=lambda h: (h.beyond == "above", h.level or 0.0, h.largest))
     worst, best = (_half(ends[i]) for i in (0, -1))
+    if len(ends) > 1 and ends[0].beyond == "above":
+        return (
+            f"Its curve over the level stays above one half up to the largest tried, in each of {len(ends)} settings."
+        )
     if len(ends) == 1:
         between = "" if ends[0].level is None else f" (95 % interval: {_between(ends[0])})"
         return f"Its curve over the level {worst}{between}."

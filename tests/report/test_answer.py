@@ -115,6 +115,19 @@ def test_levels_that_do_not_reach_one_half_say_so(h: float, words: str) -> None:
     assert words in said(rows)
 
 
+def test_of_several_settings_the_worst_and_the_best_curve_are_told() -> None:
+    def at(scenario: str, h: float) -> list[dict[str, Any]]:
+        return [row("contact", i, x < h, level=x, level_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)]
+
+    every = "Its curve over the level stays above one half up to the largest tried, in each of 2 settings."
+    assert every in said(at("one", 9.0) + at("two", 9.0))
+    assert re.search(
+        "In the worst of 2 settings its curve over the level falls to one half at level [0-9.]+; in the best it stays "
+        "above one half up to level 4, the largest tried.",
+        said(at("one", 9.0) + at("two", 2.0)),
+    )
+
+
 def test_wrong_relations_do_not_count_where_right_ones_were_told() -> None:
     rows = [row("contact", i) for i in range(5)] + [row("contact", i, False, relations="missed") for i in range(5)]
     assert said(rows).startswith("`contact` succeeds in 5 of 5 trials")

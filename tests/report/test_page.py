@@ -78,6 +78,34 @@ def test_the_page_asks_for_nothing_and_says_every_number(made: Report, chromium:
         assert not re.search(r"https?://(?!www\.w3\.org)", made.page.read_text(encoding="utf-8"))
 
 
+def test_a_folder_that_is_called_sweep_is_called_so_once(tmp_path: Path) -> None:
+    for name, title in (("sweep", "sweep"), ("mine", "Sweep mine"), ("my_sweep", "my_sweep")):
+        assert f"<title>{title}</title>" in report(write(tmp_path / name, [row()])).page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("panels", [1, 2, 3, 7])
+def test_plots_use_the_width_of_the_page(panels: int, tmp_path: Path, chromium: Any) -> None:
+    """A line of two where there are several, however many; one alone is not taller than the window."""
+    rows = [
+        row(scenario=f"s{i}", seed=seed, level=x, level_deg=x)
+        for i in range(panels)
+        for x in (1.0, 2.0)
+        for seed in (0, 1)
+    ]
+    made = report(write(tmp_path / "run", rows))
+    for width in (1280, 390):
+        with opened(chromium, made.page, width) as (page, _, _):
+            boxes = page.evaluate(
+                "[...document.querySelector('#levels').parentElement.querySelectorAll('.panel')]"
+                ".map(e => e.getBoundingClientRect()).map(r => [r.left, r.right, r.height])"
+            )
+            inner = page.evaluate("document.querySelector('main').clientWidth")
+            used = max(right for _, right, _ in boxes) - min(left for left, _, _ in boxes)
+            assert used > (0.95 if panels > 1 or width == 390 else 0.65) * inner
+            assert max(height for _, _, height in boxes) < 600
+            assert overflow(page) <= 0
+
+
 def test_markup_in_names_and_sentences_is_text(made: Report, chromium: Any) -> None:
     with opened(chromium, made.page) as (page, said, _):
         page.locator("h3", has_text="evil").wait_for()

@@ -9,6 +9,7 @@ import pytest
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from apo_bench.records.key import trial_key
+from apo_bench.records.short_names import CORRECTOR
 from apo_bench.resources import folder
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.sweep import run_sweep
@@ -219,3 +220,13 @@ def test_grids_of_one_sweep_have_one_arm_and_fidelity() -> None:
         run_sweep([first, SweepSettings(("block_on_block",), fidelity="contact")], "/no/such/folder")
     with pytest.raises(InputError, match="no grid was given"):
         run_sweep([], "/no/such/folder")
+
+
+def test_the_demo_meets_what_a_first_look_needs() -> None:
+    """Careful and careless humans, levels enough for a curve, measured errors, and the default corrector."""
+    grids = read_sweep(Path(__file__).parents[2] / "benchmarks" / "demo.toml")
+    assert {x for grid in grids for x in grid.careless} == {0.0, 1.0}
+    assert len(grids[0].levels) >= 7
+    assert "megapose-tless" in {name for grid in grids for name in grid.noises}
+    assert {"none", "snap", "by-heart", "contact", CORRECTOR, "oracle"} == {m for grid in grids for m in grid.methods}
+    assert all(grid.trials >= 10 for grid in grids)

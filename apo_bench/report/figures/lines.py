@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from apo_bench.report.figures.sheet import SAMPLE, Entry, Panel, Tips
+from apo_bench.report.figures.sheet import DPI, SAMPLE, Entry, Panel, Tips
 from apo_bench.report.figures.styles import INK, RULE, SOFT, Style
 
-DODGE, SPREAD = 0.05, 0.32
+DODGE, SPREAD = 0.08, 0.4
 """Methods stand this far from each other at one level, so that equal values do not hide each other; and all of them
 within this part of the way to the next level."""
+LIFT, RANGE = 1.8, 8.0
+"""For the same reason lines stand this far above each other, and all of them within this range, in px."""
 
 
 class Point(NamedTuple):
@@ -61,8 +63,10 @@ def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[MethodLine], rule: 
                 tip(drawn, [rule.tip])
         for line in lines:
             _band(axis, line)
-        for line in lines:
-            tip(_marks(axis, line), [f"{line.name}, {point.tip}" for point in line.points])
+        step = min(LIFT, RANGE / max(len(lines), 1))
+        for i, line in enumerate(lines):
+            lift = step * ((len(lines) - 1) / 2 - i)
+            tip(_marks(axis, line, lift), [f"{line.name}, {point.tip}" for point in line.points])
 
     return Panel(title, draw)
 
@@ -120,10 +124,16 @@ def _band(axis: Any, line: MethodLine) -> None:
         axis.fill([*at, *at[::-1]], [*low, *high[::-1]], color=line.style.color, alpha=0.13, linewidth=0)
 
 
-def _marks(axis: Any, line: MethodLine) -> Any:
-    at, values = [p.x for p in line.points], [p.value for p in line.points]
+def _marks(axis: Any, line: MethodLine, lift: float) -> Any:
+    from matplotlib.transforms import ScaledTranslation
+
+    at = [p.x for p in line.points]
+    values = [p.value for p in line.points]
     color, marker, dashes = line.style
-    axis.plot(at, values, color=color, linestyle=dashes, linewidth=1.7, clip_on=False)
-    (made,) = axis.plot(at, values, color=color, marker=marker, linestyle="", markersize=6.5, clip_on=False)
-    made.set(markeredgecolor="#ffffff" if marker != "1" else color, markeredgewidth=0.6)
+    higher = axis.transData + ScaledTranslation(0.0, lift / DPI, axis.figure.dpi_scale_trans)
+    shared = {"color": color, "clip_on": False, "transform": higher}
+    axis.plot(at, values, linestyle=dashes, linewidth=1.7, **shared)
+    thin = marker == "1" or isinstance(marker, tuple)  # a white edge would cover most of them
+    (made,) = axis.plot(at, values, marker=marker, linestyle="", markersize=8.0 if thin else 6.5, **shared)
+    made.set(markeredgecolor=color if thin else "#ffffff", markeredgewidth=0.6)
     return made

@@ -17,16 +17,17 @@ class Style(NamedTuple):
     """How the line of a method looks; told apart without colour too."""
 
     color: str
-    marker: str
+    marker: Any
+    """As matplotlib takes it: a letter, or a star as (points, 1, turned by degrees)."""
     dashes: Any
 
 
 STYLES = {
     "none": Style("#d55e00", "o", _SOLID),
     "search": Style("#e7298a", "8", _DASHED),
-    "by-heart": Style("#999933", "$H$", _DASHED),
+    "by-heart": Style("#999933", (3, 1, 0), _DASHED),
     "contact": Style("#332288", "p", _SOLID),
-    "contact-robust": Style("#aa3377", "$R$", _DASHED),
+    "contact-robust": Style("#aa3377", (4, 1, 0), _DASHED),
     "paper": Style("#0072b2", "s", _SOLID),
     "paper-track": Style("#009e73", "D", _SOLID),
     "last-only": Style("#e69f00", "v", _DASHED),

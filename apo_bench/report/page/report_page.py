@@ -90,7 +90,7 @@ def report_page(found: Found) -> str:
             pictured[numbers[place], picture.row["seed"]] = k
     return page(
         "report.html",
-        title=f"Sweep {found.name}",
+        title=found.name if "sweep" in found.name.lower() else f"Sweep {found.name}",
         sections=_SECTIONS,
         answer=found.answer,
         older=verdicts.verdict_warning(found.verdict),
