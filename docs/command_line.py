@@ -16,6 +16,9 @@ HEAD = """# Command line
 produced, also that of a replay that failed physically; 1 where none was produced; 2 where the request was wrong, with
 one sentence on standard error; 128 and the number of the signal where a signal ended it.
 
+`apo-bench --install-completion` lets bash, zsh and fish complete commands, options, and names of scenarios, methods,
+noise models and arms when Tab is pressed.
+
 In place of a name, `package.module:name` names something of your own. The module may lie in the current folder.
 """
 

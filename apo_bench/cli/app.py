@@ -33,6 +33,7 @@ from apo_bench.cli import show as cli_show
 from apo_bench.cli import sweep_command as cli_sweep
 from apo_bench.cli import view as cli_view
 from apo_bench.cli.arguments import NO_RESULT, check_writable
+from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import Interrupted
 from apo_bench.errors import InputError
@@ -40,7 +41,7 @@ from apo_bench.io import streams
 from apo_bench.io.plain_text import brief, clean
 
 app = typer.Typer(
-    add_completion=False,
+    cls=Grouped,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Does a robot's replay of an observed assembly fit, with and without correction by face contacts?",

@@ -9,8 +9,9 @@ import numpy as np
 import typer
 
 from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.help_groups import Grouped
 
-arm = typer.Typer(add_completion=False, rich_markup_mode=None, help="Arms: those that come along, and any other.")
+arm = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Arms: those that come along, and any other.")
 
 _SIZE = (960, 720)
 _VIEW = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)

@@ -8,11 +8,12 @@ from typing import Annotated
 import typer
 
 from apo_bench.cli.arguments import NO_RESULT, check_writable
+from apo_bench.cli.help_groups import Grouped
 from apo_bench.errors import InputError
 
 _HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
-noise = typer.Typer(add_completion=False, rich_markup_mode=None, help=_HELP)
+noise = typer.Typer(cls=Grouped, rich_markup_mode=None, help=_HELP)
 
 
 def register(app: typer.Typer) -> None:

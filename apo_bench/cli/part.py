@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from apo_bench.cli.arguments import path_given
+from apo_bench.cli.help_groups import Grouped
 from apo_bench.errors import InputError
 
 if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
     from apo_bench.cad.raw import RawSolid
 
-part = typer.Typer(add_completion=False, rich_markup_mode=None, help="Parts from CAD files.")
+part = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
 
 
 def register(app: typer.Typer) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import numbers
+from apo_bench.cli.help_groups import Grouped
 from apo_bench.errors import InputError
 
 _HELP = "How many trials it takes: for a rate, for a difference, for no loss; and what so many can show."
@@ -18,7 +19,7 @@ _QUESTIONS = """How many trials does it take?
   apo-bench power margin --margin 0.03                  to show that a method is not worse by 3 points
   apo-bench power shows --trials 100                    what so many can show"""
 _SCHEMA = "apo-bench/power/1"
-power = typer.Typer(add_completion=False, rich_markup_mode=None, help=_HELP)
+power = typer.Typer(cls=Grouped, rich_markup_mode=None, help=_HELP)
 
 _Power = Annotated[float, typer.Option(help="How often it shall be shown if it is so.")]
 _Win = Annotated[float | None, typer.Option(help="Share of the seeds at which the method alone is right.")]

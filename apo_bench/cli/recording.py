@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import check_writable, numbers, path_given, whole_numbers
+from apo_bench.cli.help_groups import Grouped
 from apo_bench.errors import InputError
 
-recording = typer.Typer(add_completion=False, rich_markup_mode=None, help="Logs of pose trackers.")
+recording = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Logs of pose trackers.")
 
 
 def register(app: typer.Typer) -> None:

@@ -9,12 +9,11 @@ from typing import Annotated
 import typer
 
 from apo_bench.cli.arguments import NO_RESULT, check_writable, path_given
+from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 
-scenario = typer.Typer(
-    add_completion=False, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks."
-)
+scenario = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks.")
 
 
 def register(app: typer.Typer) -> None:

@@ -10,11 +10,17 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from apo_bench.cli.arguments import numbers, path_given, whole_numbers, words
+from apo_bench.cli.completion import beginning, completion_of, scenarios
 from apo_bench.records.run.replay_command import milli, number
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import LEVEL, SETTINGS
 
-ScenarioArgument = Annotated[str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")]
+ScenarioArgument = Annotated[
+    str,
+    typer.Argument(
+        help="A name out of `apo-bench scenarios`, or a scenario file.", autocompletion=beginning(scenarios)
+    ),
+]
 CorrectorLimit = Annotated[
     float,
     typer.Option(metavar="SECONDS", help="A corrector given as package.module:name that takes longer has failed."),
@@ -76,12 +82,18 @@ def _of_trial(info: SettingInfo) -> Parameter:
     said = f"{info.help}; default: {shown_default(info)}."
     if info.name == "salt":
         return _option(info.keyword, Path, said, parser=path_given, metavar="<path>")
-    return _option(info.keyword, info.kind.__origin__ if hasattr(info.kind, "__origin__") else info.kind, said)
+    kind = info.kind.__origin__ if hasattr(info.kind, "__origin__") else info.kind
+    return _option(info.keyword, kind, said, autocompletion=completion_of(info))
 
 
 def _axis(info: SettingInfo) -> Parameter:
     usual = ",".join(_shown(info, value) for value in info.swept) or shown_default(info)
-    return _option(axis_option(info), str, f"{info.help}; several with commas; default: {usual}.")
+    return _option(
+        axis_option(info),
+        str,
+        f"{info.help}; several with commas; default: {usual}.",
+        autocompletion=completion_of(info),
+    )
 
 
 def _option(name: str, kind: Any, said: str, **more: Any) -> Parameter:

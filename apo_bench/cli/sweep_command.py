@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import cores, path_given
+from apo_bench.cli.completion import beginning
+from apo_bench.cli.completion import scenarios as completed_scenarios
 from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, axis_option, read_axis, sweep_options, takes
 from apo_bench.errors import InputError
 from apo_bench.records.asked import in_python
@@ -47,7 +49,12 @@ def register(app: typer.Typer) -> None:
 @takes(sweep_options())
 def sweep(
     scenarios: Annotated[
-        list[str], typer.Argument(metavar="SCENARIO... | FILE.toml", help="Names, scenario files, or one sweep file.")
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO... | FILE.toml",
+            help="Names, scenario files, or one sweep file.",
+            autocompletion=beginning(completed_scenarios),
+        ),
     ],
     out: Annotated[
         Path,

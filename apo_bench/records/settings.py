@@ -142,7 +142,12 @@ class TrialSettings:
     """`friction`, or `weld` for an ideal gripper."""
     arm: Name = field(
         default="six_axis",
-        metadata=about("Name of the arm, FILE.toml, or package.module:name", shared=True, scene=True),
+        metadata=about(
+            "A name out of `apo-bench arm list`, FILE.toml, menagerie:NAME (of MuJoCo Menagerie), robosuite:NAME, or "
+            "package.module:name",
+            shared=True,
+            scene=True,
+        ),
     )
     """The robot, by name, as a file, or `module:name`."""
     robot_error: Name = field(

@@ -1,0 +1,104 @@
+"""`--help` in groups, and what a shell offers when Tab is pressed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import typer
+
+from apo_bench.cli import completion
+from apo_bench.cli.app import app, main
+from apo_bench.cli.help_groups import GROUPS
+from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.records.method import checked_method
+from apo_bench.records.relations import checked_relations
+from apo_bench.scenario.file import scenario_names
+from apo_bench.simulation.scene.arm import arm_names
+
+
+def commands(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    yield words, command
+    for name, one in getattr(command, "commands", {}).items():
+        yield from commands(one, (*words, name))
+
+
+EVERY = dict(commands(typer.main.get_command(app)))
+
+
+def complete(shell: str, typed: str) -> list[str]:
+    """What the program answers a shell; bash counts words, the others send the line."""
+    program = "import sys; sys.argv[0] = 'apo-bench'; from apo_bench.cli.app import main; sys.exit(main([]))"
+    asked = {
+        "_APO_BENCH_COMPLETE": f"complete_{shell}",
+        "COMP_WORDS": typed,
+        "COMP_CWORD": str(len(typed.split(" ")) - 1),
+        "_TYPER_COMPLETE_ARGS": typed,
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+    }
+    done = subprocess.run([sys.executable, "-c", program], env=asked, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+def test_every_command_stands_under_one_heading() -> None:
+    grouped = [name for names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(name for words in EVERY if len(words) == 1 for name in words)
+
+
+@pytest.mark.parametrize("words", [w for w, one in EVERY.items() if hasattr(one, "commands")], ids=" ".join)
+def test_help_cuts_no_sentence(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    main([*words, "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "..." not in said.replace("[ARGS]...", "")
+    for name in EVERY[words].commands:
+        first = " ".join(EVERY[(*words, name)].help.split("\n\n")[0].split())
+        assert first.split(". ")[0].rstrip(".") in said
+
+
+def test_the_arms_of_other_collections_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("replay", "sweep", "scene"):
+        main([command, "--help"])
+        said = capsys.readouterr().out
+        assert "menagerie:NAME" in said
+        assert "robosuite:NAME" in said
+
+
+def test_names_that_are_offered_are_the_names_there_are() -> None:
+    assert tuple(completion.scenarios()) == scenario_names()
+    assert {name for name in completion.arms() if not name.endswith(":")} == set(arm_names())
+    assert [checked_method(name) for name in completion.methods()] == completion.methods()
+    assert [checked_relations(name) for name in completion.relations() if name != "shifted"]
+    assert set(NOISES) < set(completion.noises())
+    for name in completion.noises():
+        assert make_noise(name, Level(1.0, 1.0))
+
+
+def test_after_a_comma_what_is_there_is_not_offered_again() -> None:
+    offered = completion.beginning(lambda: ("contact", "contact-robust", "none"))
+    assert offered("con") == ["contact", "contact-robust"]
+    assert offered("contact,con") == ["contact,contact-robust"]
+    assert offered("x") == []
+
+
+@pytest.mark.parametrize(
+    ("shell", "typed", "words", "not_offered"),
+    [
+        ("bash", "apo-bench com", "compare", "sweep"),
+        ("bash", "apo-bench sweep stick_in_tower --methods none,contact", "none,contact-robust", "paper"),
+        ("zsh", "apo-bench replay stick", "stick_in_tower", "pocket"),
+        ("fish", "apo-bench replay stick_in_tower --noise mega", "megapose-tless", "isotropic"),
+    ],
+)
+def test_a_shell_is_offered_names_and_commands(shell: str, typed: str, words: str, not_offered: str) -> None:
+    offered = " ".join(complete(shell, typed))
+    assert words in offered
+    assert not_offered not in offered
+
+
+def test_completion_loads_no_simulator() -> None:
+    program = "import sys, apo_bench.cli.app, apo_bench.cli.completion as c; c.scenarios(), c.noises(), c.arms()"
+    check = f"{program}; sys.exit(any(name in sys.modules for name in ('mujoco', 'scipy', 'matplotlib', 'mink')))"
+    assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
