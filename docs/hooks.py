@@ -1,17 +1,20 @@
-"""What `mkdocs build` does beside HTML: it writes four pages of the reference, and refuses to load from a network.
+"""What `mkdocs build` does beside HTML: it writes four pages of the reference, sets formulas, and refuses to load from
+a network.
 
 The command line, the keys of files, the settings of a trial and the columns of a row are read from the package while
 the site is built, so these pages are never older than the code. A page that would load anything from a network is an
-error: the site opens offline.
+error: the site opens offline. Formulas, `$..$` and `$$..$$` as on GitHub, become MathML, which browsers set themselves.
 """
 
 from __future__ import annotations
 
+import html
 import re
 import sys
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
@@ -31,6 +34,8 @@ LOADED = re.compile(
     r"<(?:(?:script|img|iframe|source|video)\b[^>]*\bsrc|link\b[^>]*\bhref)=[\"']?(?:https?:)?//[^>]*>", re.IGNORECASE
 )
 
+FORMULA = re.compile(r"<(?P<tag>span|div) class=\"arithmatex\">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>", re.DOTALL)
+
 
 def on_config(config: Any) -> Any:
     """The settings, without a page that a benchmark has yet to write."""
@@ -47,6 +52,17 @@ def on_files(files: Files, config: Any) -> Files:
     for path, write in GENERATED.items():
         files.append(File.generated(config, path, content=write()))
     return files
+
+
+def on_page_content(content: str, page: Any, config: Any, files: Files) -> str:
+    """The page with its formulas as MathML: those in lines as they come, those alone as blocks that scroll."""
+
+    def typeset(formula: re.Match[str]) -> str:
+        block = formula["tag"] == "div"
+        mathml = convert(html.unescape(formula["latex"]).strip(), display="block" if block else "inline")
+        return f'<div class="formula">{mathml}</div>' if block else mathml
+
+    return FORMULA.sub(typeset, content)
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:
