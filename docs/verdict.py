@@ -18,8 +18,10 @@ from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
+from tests import audited_more_rounds as more
 from tests import audited_rounds as rounds
 from tests import audited_states as audited
+from tests import audited_wholes as wholes
 from tests.end_states import reached, verdict
 from tests.judging import test_verdict as first
 
@@ -48,6 +50,12 @@ GROUPS = {
     "Shafts that lie, and shafts through two parts": rounds.SHAFTS,
     "Cones": rounds.CONES,
     "Tilted faces": rounds.TILTED,
+    "Wholes that were moved": wholes.WHOLES,
+    "Halves that were moved": wholes.HALVES,
+    "Pegs, moved": more.PEGS,
+    "Shafts, moved": more.SHAFTS,
+    "Cones, moved": more.CONES,
+    "Tilted faces, moved and in their play": more.TILTED,
 }
 
 FLIPS = """
@@ -91,9 +99,9 @@ verdict of a person who sees how they ended, before the judge was asked. In {sam
 
 
 def main() -> None:
-    states = {seen.what: seen for seen in (*audited.STATES, *rounds.STATES)}
+    states = {seen.what: seen for group in (audited, rounds, wholes, more) for seen in group.STATES}
     cases = [*first.RIGHT, *first.NEARLY, *first.WRONG]
-    apart = {**audited.DIFFERS, **rounds.DIFFERS}
+    apart = {**audited.DIFFERS, **rounds.DIFFERS, **wholes.DIFFERS, **more.DIFFERS}
     lines = [BEGIN, FLIPS.format(n=len(cases), flipped=len(first.FLIPPED)).rstrip("\n")]
     lines += [f"| {what} | {reason} |" for what, reason in first.FLIPPED.items()]
     revised = {**audited.REVISED, **rounds.REVISED}

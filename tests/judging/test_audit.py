@@ -11,7 +11,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.revolution import revolution
 from apo_bench.geometry.symmetry import symmetries
 from apo_bench.judging.finished import fixtures
-from tests import audited_rounds, rounds, scenes
+from tests import audited_more_rounds, audited_rounds, audited_wholes, rounds, scenes
 from tests.audited_states import DIFFERS as FLAT_DIFFERS
 from tests.audited_states import LOOSE, Loose, Seen, aligned_twice, kept, stop_for_two, used_later
 from tests.audited_states import REVISED as FLAT_REVISED
@@ -19,8 +19,9 @@ from tests.audited_states import STATES as FLAT_STATES
 from tests.end_states import END, Edit, moved, shift, verdict
 from tests.judging.test_verdict import FLIPPED
 
-STATES = [*FLAT_STATES, *audited_rounds.STATES]
-DIFFERS = {**FLAT_DIFFERS, **audited_rounds.DIFFERS}
+NUDGED = [*audited_wholes.STATES, *audited_more_rounds.STATES]
+STATES = [*FLAT_STATES, *audited_rounds.STATES, *NUDGED]
+DIFFERS = {**FLAT_DIFFERS, **audited_rounds.DIFFERS, **audited_wholes.DIFFERS, **audited_more_rounds.DIFFERS}
 REVISED = {**FLAT_REVISED, **audited_rounds.REVISED}
 
 
@@ -31,7 +32,8 @@ def test_a_person_says_the_same_unless_the_rule_says_otherwise(seen: Seen) -> No
 
 def test_every_difference_is_of_a_state() -> None:
     names = [seen.what for seen in STATES]
-    assert min(len(FLAT_STATES), len(audited_rounds.STATES)) >= 60
+    assert min(map(len, (FLAT_STATES, audited_rounds.STATES, audited_more_rounds.STATES))) >= 60
+    assert len(audited_wholes.STATES) >= 20
     assert len(set(names)) == len(names)
     assert set(DIFFERS) <= set(names)
     assert set(REVISED) <= {seen.what for seen in STATES if seen.right}
