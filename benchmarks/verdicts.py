@@ -1,211 +1,257 @@
-"""Old verdicts against new ones: `python benchmarks/verdicts.py runs/headline_contact [--trials N] [--pictures N]`.
+"""The old rule of `success` against the new one, on the same replays: `python benchmarks/verdicts.py FOLDER`.
 
-Reads the sweep of a headline, finished or not, and the verdicts of the headline before `success` came to mean the
-finished assembly (results/headline/before.jsonl.xz: of each row its key, verdict, stage and code). Writes
-docs/results/verdicts.md and results/headline/verdicts.csv: per cell the old success, the new one, and what is
-as demonstrated; seed by seed where the last two rules part, and where a success was lost because a corner of a part lay
-more than 1 mm from where it was put. `--pictures N` draws how the first N of those ended, `--draw
-stick_in_tower,paper,4,1,17` the trial of that scenario, method, level, carelessness and seed.
+Reads the rows of a sweep that was made with the new rule, and says of each what the rule before it would have said:
+then no corner of a part was to be more than `pushed_mm` from where it was after its last operation, in the room, and a
+face that fits could be apart by its own clearance and `fit_margin_mm` only. The first is in the rows (`pushed_mm`); the
+second is measured anew where the parts ended (`reached`), at the contacts that may be farther apart today. Writes
+docs/results/verdicts.md, cell by cell, with the reason of every trial whose verdict is another one (`--page`,
+`--trials N` take another file and the first N seeds). Trials whose demonstration was refused have no verdict.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
-import json
-import lzma
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from apo_bench.assembly.placement import placements
+from apo_bench.assembly.topology import Contact
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.symmetry import nearest_alike
+from apo_bench.judging.finished import fixtures
+from apo_bench.judging.play import joint_play_mm
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.show.failure_pictures import failure_pictures
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.scenario import Scenario
 from apo_bench.statistics.rates import rank
+from apo_bench.trial.stages import LAYOUT, stream
 
 ROOT = Path(__file__).parents[1]
-KEPT = ROOT / "benchmarks" / "results" / "headline"
-BEFORE, TABLE = KEPT / "before.jsonl.xz", KEPT / "verdicts.csv"
 PAGE = ROOT / "docs" / "results" / "verdicts.md"
-KEY = ("scenario", "method", "level", "careless", "seed")
-CELL = KEY[:-1]
-COLUMNS = (*CELL, "trials", "before", "as_demonstrated", "success", "differ", "lost_at_corners")
+CELL = ("scenario", "careless", "level", "method")
 
 Row = Mapping[str, Any]
 
 
+class Wide(NamedTuple):
+    """A contact that may be farther apart than by the old rule."""
+
+    contact: Contact
+    old_mm: float
+    new_mm: float
+
+
+class Compared(NamedTuple):
+    """A trial by both rules."""
+
+    row: Row
+    old: bool
+    new: bool
+    why: str
+    """What makes the difference; empty where there is none."""
+
+
 class Counts(NamedTuple):
-    """Of the trials of a cell, how many were right; None where there was no such cell before."""
+    """Of a cell."""
 
     trials: int
-    before: int | None
-    as_demonstrated: int
-    success: int
-    differ: int
-    """Trials whose old success is not what `as_demonstrated` says."""
-    lost_at_corners: int
+    old: int
+    new: int
+    pushed: int
+    """Trials that are right today although a part moved in the room."""
+    gap: int
+    """Trials that are right today although a face was farther apart than its own clearance."""
+    refused: int
+    """Trials that were right by the old rule and are not today."""
 
 
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    asked.add_argument("folder", type=Path, help="a sweep of benchmarks/headline.toml, or a part of one")
+    asked.add_argument("folder", type=Path, help="a sweep, finished or not")
     asked.add_argument("--trials", type=int, help="how many seeds to take")
-    asked.add_argument("--pictures", type=int, default=0, help="how many successes lost at corners to draw")
-    asked.add_argument("--draw", action="append", default=[], help="SCENARIO,METHOD,LEVEL,CARELESS,SEED")
     asked.add_argument("--page", type=Path, default=PAGE)
-    asked.add_argument("--table", type=Path, default=TABLE)
     given = asked.parse_args()
-    rows = sorted(read_rows(given.folder), key=place)
+    rows = sorted((row for row in read_rows(given.folder) if row["success"] is not None), key=place)
+    if not rows:
+        asked.error(f"no row of {given.folder} has a verdict; name the folder of a sweep")
     if given.trials is not None:
         rows = [row for row in rows if row["seed"] < rows[0]["seed"] + given.trials]
-    before = old_verdicts()
-    chosen = [row for row in rows if spelled(row) in given.draw]
-    missing = sorted(set(given.draw) - {spelled(row) for row in chosen})
-    if missing:
-        asked.error(
-            f"there is no trial {' nor '.join(missing)} in {given.folder}; such as {spelled(rows[0])} is needed"
-        )
-    drawn = draw([*lost(rows)[: given.pictures], *chosen], given.folder, given.page.parent / "pictures")
-    given.page.write_text("\n".join([*page(rows, before), *drawn]) + "\n", encoding="utf-8")
-    with given.table.open("w", newline="", encoding="utf-8") as file:
-        told = csv.writer(file)
-        told.writerow(COLUMNS)
-        told.writerows((*cell, *counts) for cell, counts in cells(rows, before).items())
-    print(f"Wrote {given.page} and {given.table}")
-
-
-def old_verdicts() -> dict[tuple[Any, ...], Row]:
-    lines = lzma.decompress(BEFORE.read_bytes()).splitlines()
-    return {key(row): row for row in map(json.loads, lines)}
-
-
-def key(row: Row) -> tuple[Any, ...]:
-    return tuple(row[name] for name in KEY)
-
-
-def spelled(row: Row) -> str:
-    """`stick_in_tower,paper,4,1,17`, for names of files too."""
-    return f"{row['scenario']},{row['method']},{row['level']:g},{row['careless']:g},{row['seed']}"
+    given.page.write_text("\n".join(page([compared(row) for row in rows])) + "\n", encoding="utf-8")
+    print(f"Wrote {given.page}")
 
 
 def place(row: Row) -> tuple[Any, ...]:
     return row["seed"], row["scenario"], row["careless"], row["level"], rank(row["method"]), row["method"]
 
 
-def at_corners(row: Row) -> bool:
-    """Whether nothing but the displacement of corners is wrong, and that of centres is not known to be."""
-    found = [fault for fault, there in (row["conditions"] or {}).items() if there]
-    return not row["success"] and found == ["pushed"] and row["as_demonstrated_code"] != "pushed"
+def compared(row: Row) -> Compared:
+    """What both rules say of a row, and why they differ."""
+    conditions = dict(row["conditions"] or {"not_made": True})
+    scenario = load_scenario(row["scenario"])
+    limit = row["thresholds"]["pushed_mm"]
+    moved = row["pushed_mm"] or 0.0
+    # Where the way counts, both rules ask for the same displacement.
+    pushed = conditions.get("pushed", False) if scenario.success_means == "as_demonstrated" else moved > limit
+    wide = None if conditions.get("gap", True) else too_wide(scenario, row)
+    before = conditions | {"pushed": pushed, "gap": conditions.get("gap", False) or wide is not None}
+    old, new = not any(before.values()), bool(row["success"])
+    if old == new:
+        return Compared(row, old, new, "")
+    if old:
+        return Compared(row, old, new, f"refused: {row['sentence']}")
+    reasons = []
+    if pushed:
+        reasons.append(f"pushed: a corner moved by {moved:.2f} mm in the room, but nothing slid so on what it touches")
+    if wide is not None:
+        reasons.append(
+            f"gap: {wide[0].contact} is off by {wide[1]:.2f} mm, {wide[0].old_mm:g} then, {wide[0].new_mm:.2f} today"
+        )
+    return Compared(row, old, new, "; ".join(reasons))
 
 
-def lost(rows: Iterable[Row]) -> list[Row]:
-    return [row for row in rows if at_corners(row)]
+def too_wide(scenario: Scenario, row: Row) -> tuple[Wide, float] | None:
+    """The contact that was the farthest too far apart at the end by the old rule, and its largest |e|, [mm]."""
+    goals = truth(row["scenario"], row["seed"], row["salt"], row["clearance_mm"])
+    wides = wide_contacts(row["scenario"], goals.tobytes(), row["clearance_mm"], row["thresholds"]["fit_margin_mm"])
+    if not wides or row["reached"] is None:
+        return None
+    poses = {part: posed(numbers) for part, numbers in row["reached"].items()}
+    assembly = scenario.assembly
+    true = placements(assembly, poses, goals)[-1]
+    seen = {
+        part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
+        for part, T in poses.items()
+    }
+    found = [(wide, off_mm(scenario, wide.contact, seen)) for wide in wides]
+    over = [(wide, off) for wide, off in found if off > wide.old_mm]
+    return max(over, key=lambda each: each[1] - each[0].old_mm, default=None)
 
 
-def differing(rows: Iterable[Row], before: Mapping[tuple[Any, ...], Row]) -> list[tuple[Row, Row]]:
-    """Trials whose old success is not what `as_demonstrated` says, with their old rows."""
-    both = [(row, before[key(row)]) for row in rows if key(row) in before]
-    return [(new, old) for new, old in both if new["as_demonstrated"] != old["success"]]
+@lru_cache(maxsize=4096)
+def truth(scenario: str, seed: int, salt: Any, clearance_mm: float) -> Array:
+    """The true goals of a seed, (n, 4, 4), [m]."""
+    return np.array(draw_layout(load_scenario(scenario), stream(seed, LAYOUT, salt), clearance_mm).goals)
 
 
-def why(new: Row, old: Row) -> str:
-    """Which of the rules decides, else that the replay ended otherwise."""
-    if at_corners(new) and new["as_demonstrated_code"] == "ok":
-        return f"corners: {new['pushed_mm']:.2f} mm"
-    if not new["success"] and new["as_demonstrated_code"] == "ok":
-        return f"only the finished assembly is wrong: {new['failure_code']}"
-    ended = [
-        f"{row['failure_stage']}, {row['failure_code']}" if not right else "right"
-        for row, right in ((old, old["success"]), (new, new["as_demonstrated"]))
-    ]
-    return f"the replay ended otherwise: {ended[0]} before, {ended[1]} now ({new['as_demonstrated_code']})"
+@lru_cache(maxsize=4096)
+def wide_contacts(name: str, goals: bytes, clearance_mm: float, margin_mm: float) -> tuple[Wide, ...]:
+    """The contacts that stand at the end and that the play of all faces together lets farther apart."""
+    scenario = load_scenario(name)
+    assembly = scenario.assembly
+    history = placements(assembly, scenario.start, np.frombuffer(goals).reshape(-1, 4, 4))
+    away, found = fixtures(assembly), []
+    for contact, made, lost in assembly.relations():
+        if lost is None and not away & {end.part for end in contact}:
+            play = joint_play_mm(assembly, contact, made, history[made], clearance_mm)
+            if play is not None and play > clearance_mm:
+                found.append(Wide(contact, clearance_mm + margin_mm, play + margin_mm))
+    return tuple(found)
 
 
-def cells(rows: Iterable[Row], before: Mapping[tuple[Any, ...], Row]) -> dict[tuple[Any, ...], Counts]:
-    """The counts of every cell, of trials whose demonstration was right."""
-    found: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        if row["success"] is not None:
-            found.setdefault(tuple(row[name] for name in CELL), []).append(row)
-    return {cell: counted(found[cell], before) for cell in sorted(found, key=by_cell)}
+def off_mm(scenario: Scenario, contact: Contact, poses: Mapping[str, Array]) -> float:
+    """The largest distance of a corner of the overlap of two flat faces from the plane of the first, [mm]."""
+    m, e = contact
+    face, T = scenario.assembly.face(m), poses[m.part]
+    corners = overlap(face, T, scenario.assembly.face(e), poses[e.part]).corners
+    return 1e3 * float(np.abs((corners - T[:3, 3]) @ T[:3, :3] @ face.plane[:3] + face.plane[3]).max(initial=0.0))
+
+
+def posed(numbers: Sequence[float]) -> Array:
+    """The pose of a row: mm and a quaternion."""
+    return pose.unpack([*(1e-3 * np.array(numbers[:3])), *numbers[3:]])
+
+
+def cells(found: Iterable[Compared]) -> dict[tuple[Any, ...], Counts]:
+    grouped: dict[tuple[Any, ...], list[Compared]] = {}
+    for each in found:
+        grouped.setdefault(tuple(each.row[name] for name in CELL), []).append(each)
+    return {cell: counted(grouped[cell]) for cell in sorted(grouped, key=by_cell)}
 
 
 def by_cell(cell: tuple[Any, ...]) -> tuple[Any, ...]:
-    scenario, method, level, careless = cell
+    scenario, careless, level, method = cell
     return scenario, careless, level, rank(method), method
 
 
-def counted(rows: Sequence[Row], before: Mapping[tuple[Any, ...], Row]) -> Counts:
-    known = [before[key(row)] for row in rows if key(row) in before]
+def counted(found: Sequence[Compared]) -> Counts:
     return Counts(
-        trials=len(rows),
-        before=sum(bool(row["success"]) for row in known) if len(known) == len(rows) else None,
-        as_demonstrated=sum(row["as_demonstrated"] for row in rows),
-        success=sum(row["success"] for row in rows),
-        differ=len(differing(rows, before)),
-        lost_at_corners=len(lost(rows)),
+        trials=len(found),
+        old=sum(each.old for each in found),
+        new=sum(each.new for each in found),
+        pushed=sum("pushed: " in each.why for each in found if each.new),
+        gap=sum("gap: " in each.why for each in found if each.new),
+        refused=sum(each.old and not each.new for each in found),
     )
 
 
-def page(rows: Sequence[Row], before: Mapping[tuple[Any, ...], Row]) -> list[str]:
-    every = cells(rows, before)
-    apart = {cell: n for cell, n in every.items() if len({n.before, n.as_demonstrated, n.success}) > 1}
-    known = {cell: n for cell, n in apart.items() if n.before is not None}
-    paired = sum(key(row) in before for row in rows)
-    differ, gone, seeds = differing(rows, before), lost(rows), [row["seed"] for row in rows]
+def page(found: Sequence[Compared]) -> list[str]:
+    every, changed = cells(found), [each for each in found if each.why]
+    seeds = [each.row["seed"] for each in found]
+    whole = counted(found)
+    apart = {cell: n for cell, n in every.items() if n.pushed or n.gap or n.refused}
     return [
-        "<!-- Written by `python benchmarks/verdicts.py`; change that, not this page. -->",
+        "<!-- Written by `python benchmarks/verdicts.py FOLDER`; change that, not this page. -->",
         "",
-        "# Old verdicts and new ones",
+        "# The old rule of success and the new one",
         "",
-        f"Of {len(rows)} trials of the headline, seeds {min(seeds)} to {max(seeds)}; {paired} of them were in the "
-        "headline before. *Before* is the success of then, which asked for every contact "
-        "also when it was made. *As demonstrated* asks for that and for the finished assembly, *success* for the "
-        "finished assembly alone ([the rules](../how/judge.md)). All cells are in "
-        "`benchmarks/results/headline/verdicts.csv`.",
+        "The same replays by two rules. By the old one no corner of a part was to move by more than 1 mm in the room "
+        "after it was put, and a face that fits could be apart by its own clearance and 0.1 mm only. By the new one "
+        "[what slid on what it touches](../how/judge.md#displacement) counts, and [the play of all faces]"
+        "(../how/judge.md#play) is allowed. Nothing else differs.",
         "",
-        f"## Cells in which the verdicts differ ({len(known)} of {sum(n.before is not None for n in every.values())})",
+        f"Of {whole.trials} replays, seeds {min(seeds)} to {max(seeds)}, {whole.old} are right by the old rule and "
+        f"{whole.new} by the new one; {len(changed)} verdicts differ: in {whole.pushed} something was nudged that kept "
+        f"its place in the whole, in {whole.gap} a part lay within its play, and {whole.refused} are refused today.",
         "",
-        "| scenario | careless | level | method | trials | before | as demonstrated | success | gained |",
-        "|---|---|---|---|---|---|---|---|---|",
+        f"## Cells in which they differ ({len(apart)} of {len(every)})",
+        "",
+        "| scenario | careless | level | method | n | old | new | nudged | in its play | refused |",
+        "|---|---|---|---|---|---|---|---|---|---|",
         *(
-            f"| {scenario} | {careless:g} | {level:g} | `{method}` | {n.trials} | {n.before} | {n.as_demonstrated} "
-            f"| {n.success} | {n.success - (n.before or 0):+d} |"
-            for (scenario, method, level, careless), n in known.items()
+            f"| {scenario} | {careless:g} | {level:g} | `{method}` | {n.trials} | {n.old} | {n.new} "
+            f"| {n.pushed} | {n.gap} | {n.refused} |"
+            for (scenario, careless, level, method), n in apart.items()
         ),
         "",
-        f"## As demonstrated, and the success of before: {len(differ)} of {paired} trials differ",
+        "In all other cells both rules count the same successes:",
         "",
-        *listed((new, why(new, old)) for new, old in differ),
+        "| scenario | careless | level | right by both rules, of all |",
+        "|---|---|---|---|",
+        *same(every),
         "",
-        f"## Successes lost at the corners: {len(gone)} of {len(rows)} trials",
+        f"## Each trial ({len(changed)})",
         "",
-        "Nothing is wrong with the finished assembly but that a corner of a part lies more than 1 mm from where the "
-        "part was put.",
-        "",
-        *listed((row, f"{row['pushed_mm']:.2f} mm; at the centres: {row['as_demonstrated_code']}") for row in gone),
+        *listed(changed),
     ]
 
 
-def listed(found: Iterable[tuple[Row, str]]) -> list[str]:
+def same(every: Mapping[tuple[Any, ...], Counts]) -> list[str]:
+    """One line per scenario, carelessness and level: each method whose cell is the same."""
+    lines: dict[tuple[Any, ...], list[str]] = {}
+    for (*where, method), n in every.items():
+        if not (n.pushed or n.gap or n.refused):
+            lines.setdefault(tuple(where), []).append(f"`{method}` {n.new} of {n.trials}")
+    return [f"| {s} | {c:g} | {level:g} | {', '.join(told)} |" for (s, c, level), told in lines.items()]
+
+
+def listed(changed: Sequence[Compared]) -> list[str]:
+    if not changed:
+        return ["None."]
     lines = [
-        f"| {row['scenario']} | {row['careless']:g} | {row['level']:g} | `{row['method']}` | {row['seed']} | {what} |"
-        for row, what in found
+        f"| `{replay_command(each.row).removeprefix('apo-bench replay ')}` | {each.why} |"
+        for each in sorted(
+            changed, key=lambda each: (by_cell(tuple(each.row[name] for name in CELL)), each.row["seed"])
+        )
     ]
-    head = ["| scenario | careless | level | method | seed | why |", "|---|---|---|---|---|---|"]
-    return [*head, *lines] if lines else ["None."]
-
-
-def draw(rows: Sequence[Row], folder: Path, pictures: Path) -> list[str]:
-    """Pictures of how trials ended, and the command that replays each."""
-    made, missed = failure_pictures(rows, folder)
-    lines = ["", *missed] if missed else []
-    for found in made:
-        name = f"verdict_{spelled(found.row).replace(',', '_')}.jpg"
-        (pictures / name).write_bytes(found.jpeg)
-        lines += ["", f"![{spelled(found.row)}](pictures/{name})", ""]
-        lines += [f"`{replay_command(found.row)}`: {found.row['sentence']} ({found.words})."]
-    return lines
+    return ["| `apo-bench replay` .. | why |", "|---|---|", *lines]
 
 
 if __name__ == "__main__":

@@ -1,73 +1,94 @@
-"""Old verdicts against new ones: what decides is told apart."""
+"""The old rule of success against the new one: what a row would have been, and why it is another verdict today."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+import pytest
+
+from apo_bench.assembly.placement import placements
+from apo_bench.assembly.reached import Reached, Snapshot
+from apo_bench.geometry import pose
+from apo_bench.judging.judgement import FAULTS
+from apo_bench.judging.verdict import judge
+from apo_bench.records.thresholds import Criteria
+from apo_bench.scenario.file import load_scenario
 from benchmarks import verdicts
+from tests.scenes import mm
 
-OLD = {"scenario": "s", "method": "paper", "level": 1.0, "careless": 0.0, "success": True, "failure_stage": None}
-
-
-def old(seed: int, **said: Any) -> dict[str, Any]:
-    return {**OLD, "seed": seed, "failure_code": None, **said}
+ROW = {"method": "search", "level": 1.0, "level_deg": 1.0, "careless": 0.0, "salt": None, "clearance_mm": 0.25}
 
 
-def new(seed: int, code: str = "ok", *faults: str, **said: Any) -> dict[str, Any]:
-    """A row whose rule of every state found `code`, and whose finished assembly has these faults."""
-    right = {"success": not faults, "as_demonstrated": not faults and code == "ok", "as_demonstrated_code": code}
-    ended = {"failure_stage": "judge" if faults else None, "failure_code": faults[0] if faults else None}
-    conditions = {fault: fault in faults for fault in ("gap", "pushed")}
-    return {**OLD, **right, **ended, "seed": seed, "conditions": conditions, "pushed_mm": 1.16, **said}
-
-
-ROWS = [
-    new(0),
-    new(1, "ok", "pushed"),
-    new(2, "gap"),
-    new(3, "gap", "gap"),
-    new(4, "pushed", "pushed"),
-    new(5, "overlap", "pushed"),
-    new(6, "ok", "gap", "pushed"),
-    new(7, method="search"),
-]
-BEFORE = {
-    verdicts.key(row): row
-    for row in [
-        *(old(seed) for seed in (0, 1, 3, 6)),
-        *(old(seed, success=False, failure_stage="judge", failure_code="gap") for seed in (2, 4, 5)),
-    ]
-}
-
-
-def test_what_decides_is_told_apart() -> None:
-    told = {new["seed"]: verdicts.why(new, old) for new, old in verdicts.differing(ROWS, BEFORE)}
-    assert told == {
-        1: "corners: 1.16 mm",
-        3: "the replay ended otherwise: right before, judge, gap now (gap)",
-        6: "only the finished assembly is wrong: gap",
+def ended(name: str, seed: int, **moved: np.ndarray) -> dict[str, Any]:
+    """A row of the judge of today, where parts lie elsewhere at the end than where they were put."""
+    scenario = load_scenario(name)
+    goals = verdicts.truth(name, seed, None, 0.25)
+    history = placements(scenario.assembly, scenario.start, goals)
+    final = {part: T @ moved.get(part, np.eye(4)) for part, T in history[-1].items()}
+    after = tuple(Snapshot(dict(poses), 0.0, 0.0, 0.0, True) for poses in history)
+    criteria = Criteria(scenario.thresholds, 0.25, scenario.success_means)
+    found = judge(scenario.assembly, Reached(after, Snapshot(final, 0.0, 0.0, 0.0, True)), goals, criteria)
+    packed = {part: pose.pack(T) for part, T in final.items()}
+    return {
+        **ROW,
+        "scenario": name,
+        "seed": seed,
+        "success": found.success,
+        "conditions": dict(found.rests_on.conditions),
+        "pushed_mm": found.rests_on.pushed_mm,
+        "thresholds": asdict(scenario.thresholds),
+        "reached": {part: [*(1e3 * p[:3]), *p[3:]] for part, p in packed.items()},
+        "sentence": found.rests_on.why,
     }
 
 
-def test_a_success_is_lost_at_corners_if_nothing_else_is_wrong() -> None:
-    assert [row["seed"] for row in verdicts.lost(ROWS)] == [1, 5]
+def whole(name: str, T: np.ndarray) -> dict[str, Any]:
+    """All that is loose, moved as one."""
+    scenario = load_scenario(name)
+    final = placements(scenario.assembly, scenario.start, verdicts.truth(name, 3, None, 0.25))[-1]
+    loose = scenario.assembly.solids.keys() - scenario.assembly.fixed
+    return ended(name, 3, **{part: pose.inverse(final[part]) @ T @ final[part] for part in loose})
 
 
-def test_cells_are_counted_and_new_ones_have_no_before() -> None:
-    counts = {method: n for (_, method, _, _), n in verdicts.cells(ROWS, BEFORE).items()}
+NUDGED = whole("stick_in_tower", mm(1.25, 0, 0))
+SUNK = ended("dovetail", 4, slide=mm(0, 0.4, -0.25))
+SLID = ended("stick_in_tower", 3, stick=mm(1.5, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("row", "old", "new", "why"),
+    [
+        (ended("stick_in_tower", 3), True, True, ""),
+        (NUDGED, False, True, "pushed: a corner moved by 1.25 mm in the room"),
+        (SUNK, False, True, "gap: slide.lean_"),
+        (SLID, False, False, ""),
+        (ended("dovetail", 4, slide=mm(0, 0, 1.0)), False, False, ""),
+    ],
+)
+def test_what_a_row_would_have_been(row: dict[str, Any], old: bool, new: bool, why: str) -> None:
+    found = verdicts.compared(row)
+    assert (found.old, found.new, found.why[: len(why)], bool(found.why)) == (old, new, why, old != new)
+
+
+def test_a_row_that_only_the_new_rule_refused_would_be_told() -> None:
+    """No row is like that: a part that slid moved in the room."""
+    row = {**SLID, "pushed_mm": 0.7}
+    assert verdicts.compared(row)[1:3] == (True, False)
+    assert set(SLID["conditions"]) == set(FAULTS)
+
+
+def test_cells_and_reasons_are_counted_and_listed() -> None:
+    found = [verdicts.compared(row) for row in (NUDGED, SLID, SUNK)]
+    counts = {cell[0]: n for cell, n in verdicts.cells(found).items()}
     assert counts == {
-        "paper": verdicts.Counts(trials=7, before=4, as_demonstrated=1, success=2, differ=3, lost_at_corners=2),
-        "search": verdicts.Counts(trials=1, before=None, as_demonstrated=1, success=1, differ=0, lost_at_corners=0),
+        "stick_in_tower": verdicts.Counts(trials=2, old=0, new=1, pushed=1, gap=0, refused=0),
+        "dovetail": verdicts.Counts(trials=1, old=0, new=1, pushed=0, gap=1, refused=0),
     }
 
 
-def test_the_old_verdicts_are_those_of_the_whole_headline() -> None:
-    before = verdicts.old_verdicts()
-    assert len(before) == 24400
-    assert sum(row["success"] for row in before.values()) == 17343
-
-
-def test_the_page_lists_seeds() -> None:
-    page = "\n".join(verdicts.page(ROWS, BEFORE))
-    assert "| s | 0 | 1 | `paper` | 7 | 4 | 1 | 2 | -2 |" in page
-    assert "| s | 0 | 1 | `paper` | 1 | corners: 1.16 mm |" in page
+def test_the_contacts_that_may_be_farther_apart_are_those_of_the_dovetail() -> None:
+    for name, contacts in (("dovetail", 3), ("stick_in_tower", 0), ("pocket_table", 0)):
+        goals = verdicts.truth(name, 0, None, 0.25)
+        assert len(verdicts.wide_contacts(name, goals.tobytes(), 0.25, 0.1)) == contacts
