@@ -5,9 +5,12 @@ it is first asked for. `demonstrate`, `replay`, `run_trial`, `run_sweep` and pic
 Static types are those of `__init__.pyi`.
 """
 
-from __future__ import annotations
-
 import sys
+from os.path import dirname
+
+if sys.argv[:1] == ["-m"] and not sys.flags.safe_path and sys.path[0] != dirname(dirname(__file__)):
+    del sys.path[0]  # the current folder, where `python -m apo_bench` would find any file that is called like a package
+
 from importlib import import_module
 from types import MappingProxyType
 from typing import Any

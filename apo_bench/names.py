@@ -1,13 +1,86 @@
-"""Everything a user may bring comes by short name, as `module:name`, or as the object itself."""
+"""Everything a user may bring comes by short name, as `module:name`, or as the object itself.
+
+A command also finds such a module in the current folder, which is on no path: what else lies there is not imported.
+"""
 
 from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Mapping
-from typing import Any
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.machinery import ModuleSpec, PathFinder
+from types import FrameType, ModuleType
+from typing import Any, final
 
 from apo_bench.errors import InputError, unknown
+
+
+@final
+class OwnModules:
+    """Finds modules in one folder, after all other places: those admitted by name, and what they import in turn.
+
+    Where a dependency tries an optional package, as `pandas`, a file of that name in the folder is not its package.
+    """
+
+    def __init__(self, folder: str) -> None:
+        self.folder = folder
+        self._admitted: set[str] = set()
+        self._found: set[str] = set()
+
+    def admit(self, module: str) -> None:
+        """Let a module be found, by its whole name."""
+        self._admitted.add(module.partition(".")[0])
+
+    def find_spec(self, name: str, path: Sequence[str] | None, _: ModuleType | None = None) -> ModuleSpec | None:
+        """As the import system asks; submodules are found by the path of their package."""
+        if path is not None or not (name in self._admitted or _importer() in self._found):
+            return None
+        spec = PathFinder.find_spec(name, [self.folder])
+        if spec is not None:
+            self._found.add(name)
+        return spec
+
+
+def _importer() -> str:
+    """The package or module whose code imports something now."""
+    frame: FrameType | None = sys._getframe(2)
+    while frame is not None:
+        name = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if name not in ("importlib", "_frozen_importlib", "_frozen_importlib_external"):
+            return name
+        frame = frame.f_back
+    return ""
+
+
+@contextmanager
+def own_modules_in(folder: str) -> Iterator[None]:
+    """For a while, find in a folder the modules that are named as `module:name`; nowhere if it is empty."""
+    before = [finder for finder in sys.meta_path if isinstance(finder, OwnModules)]
+    finder = OwnModules(folder)
+    for other in before:
+        sys.meta_path.remove(other)
+    if folder:
+        sys.meta_path.append(finder)
+    try:
+        yield
+    finally:
+        if folder:
+            sys.meta_path.remove(finder)
+        sys.meta_path.extend(before)
+
+
+def folder_of_own_modules() -> str:
+    """The folder of `own_modules_in`, for another process; empty without one."""
+    return next((finder.folder for finder in sys.meta_path if isinstance(finder, OwnModules)), "")
+
+
+def admit(module: str) -> None:
+    """Say that a person named a module, so that it is found in the folder of `own_modules_in` too."""
+    for finder in sys.meta_path:
+        if isinstance(finder, OwnModules):
+            finder.admit(module)
 
 
 def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
@@ -32,6 +105,7 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
         raise InputError(
             f"the {kind} '{given}' is not of the form 'package.module:name'; name a module and what is in it."
         )
+    admit(module_name)
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:

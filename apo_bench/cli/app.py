@@ -39,6 +39,7 @@ from apo_bench.cli.sweep_command import Interrupted
 from apo_bench.errors import InputError
 from apo_bench.io import streams
 from apo_bench.io.plain_text import brief, clean
+from apo_bench.names import own_modules_in
 
 app = typer.Typer(
     cls=Grouped,
@@ -55,10 +56,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code. What `module:name` names may lie in the current folder."""
     try:
         here = streams.prepare()
-        if here not in sys.path:
-            sys.path.append(here)
         given = list(sys.argv[1:] if arguments is None else arguments)
-        code = app(args=given or ["--help"], prog_name="apo-bench", standalone_mode=False)
+        with own_modules_in(here):
+            code = app(args=given or ["--help"], prog_name="apo-bench", standalone_mode=False)
         streams.finish()
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)

@@ -6,12 +6,29 @@ import ctypes
 import os
 import signal
 import sys
-from collections.abc import Collection
-from contextlib import suppress
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Without it, `python -c` looks for Python's own modules in the current folder, and so do processes of a pool."""
 _ROUNDS = 100
 """What goes on starting others while it is being ended is looked for so many times."""
+
+
+@contextmanager
+def environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """What processes that are started meanwhile find in their environment besides."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def descendants(pid: int) -> list[int]:

@@ -16,6 +16,7 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.files import json_forms as files
 from apo_bench.io.reading import read_bytes
+from apo_bench.names import admit
 from apo_bench.observation.presets import noise_path
 from apo_bench.records.relations import WRONG
 from apo_bench.records.settings import ROW, TrialSettings
@@ -104,6 +105,7 @@ def _module_hash(module: str) -> str | None:
 
 def _located(module: str) -> ModuleSpec | None:
     """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
+    admit(module)
     found, path = None, None
     for end in range(1, module.count(".") + 2):
         name = ".".join(module.split(".")[:end])

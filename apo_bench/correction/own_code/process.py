@@ -17,12 +17,13 @@ from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, Mess
 from apo_bench.correction.own_code.server import NOTICE
 from apo_bench.errors import InputError
 from apo_bench.io.processes import descendants, end_descendants
+from apo_bench.names import folder_of_own_modules
 
 _NOTICE_S = 2.0
 """How long a fork may be gone before that is said."""
 _START = (
-    "import sys; fd, module, fork, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
-    "from apo_bench.correction.own_code.server import serve; serve(int(fd), module, fork == 'True')"
+    "import sys; fd, module, fork, folder, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
+    "from apo_bench.correction.own_code.server import serve; serve(int(fd), module, fork == 'True', folder)"
 )
 
 
@@ -104,8 +105,9 @@ class Server:
         self._control, theirs = _pair()
         where = None if _is_open(2) else subprocess.DEVNULL
         with theirs:
+            said = (str(theirs.fileno()), self._module, str(can_fork()), folder_of_own_modules())
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _START, str(theirs.fileno()), self._module, str(can_fork()), *sys.path],
+                [sys.executable, "-P", "-c", _START, *said, *sys.path],
                 stdin=subprocess.DEVNULL,
                 stdout=2 if where is None else where,
                 stderr=where,

@@ -23,6 +23,7 @@ from apo_bench.correction.own_code.forms import correction_message, parse_observ
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
 from apo_bench.errors import InputError
 from apo_bench.io.processes import end_descendants, flush
+from apo_bench.names import admit, own_modules_in
 
 NOTICE = struct.Struct("!Ii")
 """To the process that asks: how many requests there were, and the exit code of the one that ended; first 0, 0."""
@@ -39,13 +40,14 @@ _IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
 """For the process that asks, which ends this one."""
 
 
-def serve(control: int, module: str, fork: bool) -> None:
+def serve(control: int, module: str, fork: bool, folder: str = "") -> None:
     """The life of the process.
 
     Args:
         control: File descriptor of a socket on which requests come.
         module: To be imported first; what that raises is said in answer to requests.
         fork: Whether every request has a fork; else it does one request.
+        folder: Where the module may lie besides the path of this process; empty for nowhere.
     """
     for name in _IGNORED:
         signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -57,12 +59,14 @@ def serve(control: int, module: str, fork: bool) -> None:
             resource.setrlimit(what, (most, most))
     import_module(_USUAL)
     _prctl(_DEATH_SIGNAL, signal.SIGKILL)
-    with suppress(BaseException):
-        import_module(module)
-    flush()
-    _prctl(_DEATH_SIGNAL, 0)
-    with socket.socket(fileno=control) as asking:
-        _serve(asking, fork)
+    with own_modules_in(folder):
+        admit(module)
+        with suppress(BaseException):
+            import_module(module)
+        flush()
+        _prctl(_DEATH_SIGNAL, 0)
+        with socket.socket(fileno=control) as asking:
+            _serve(asking, fork)
     end_descendants(os.getpid())
     os.killpg(0, signal.SIGKILL)
 

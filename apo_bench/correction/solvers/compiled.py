@@ -7,6 +7,7 @@ Needs the extra `fast`. Numba (Lam, Pitrou and Seibert, 2015) compiles `loops` w
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
@@ -158,13 +159,14 @@ def compiled_loops() -> Kernels:
 
 def _compiled(kept: bool) -> Kernels:
     try:
-        from numba import njit
+        from numba import config, njit
         from numba.extending import register_jitable
     except ImportError as error:
         raise InputError(
             f"the compiled solver needs Numba, which cannot be imported ({error}); "
             "pip install 'apo_bench[fast]', or use the corrector 'contact'."
         ) from error
+    config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")  # not what a file in the current folder says
     for function in HELPERS:
         register_jitable(fastmath=set(_SAFE))(function)
     compiler: Any = njit(fastmath=set(_SAFE), error_model="numpy", cache=kept)

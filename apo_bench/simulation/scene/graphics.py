@@ -11,14 +11,15 @@ import importlib
 import os
 import sys
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
 from apo_bench.errors import InputError
+from apo_bench.io.processes import SAFE_PATH, environment
 
 _VARIABLE = "MUJOCO_GL"
+_NO_BACKEND, _CHILDREN = {_VARIABLE: "disable"}, {SAFE_PATH: "1"}
+"""While MuJoCo is imported; while GLFW is, which starts a Python of its own."""
 _SHADOW_TEXELS, _SHADOW_REACH = 4096, 0.5
 """Texels of the shadow map along a side, and its half width over the size of the scene: 0.4 mm on the table each."""
 
@@ -27,7 +28,7 @@ def import_mujoco() -> None:
     """Import MuJoCo; `mujoco.GLContext` is there when somebody uses it."""
     if "mujoco" in sys.modules:
         return
-    with _without_backend():
+    with environment(_NO_BACKEND):
         mujoco = importlib.import_module("mujoco")
     contexts = importlib.import_module("mujoco.rendering.classic.gl_context")
     for module in (contexts, mujoco, importlib.import_module("mujoco.gl_context")):
@@ -37,23 +38,10 @@ def import_mujoco() -> None:
 def import_mjcf() -> Any:
     """dm-control's mjcf; its renderer is there when somebody uses it."""
     if "dm_control._render" not in sys.modules:
-        with _without_backend():
+        with environment(_NO_BACKEND):
             render = importlib.import_module("dm_control._render")
         _choose_later(render, render, "Renderer", "BACKEND", "USING_GPU")
     return importlib.import_module("dm_control.mjcf")
-
-
-@contextmanager
-def _without_backend() -> Iterator[None]:
-    before = os.environ.get(_VARIABLE)
-    os.environ[_VARIABLE] = "disable"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_VARIABLE]
-        else:
-            os.environ[_VARIABLE] = before
 
 
 def _choose_later(module: ModuleType, source: ModuleType, *names: str) -> None:
@@ -73,6 +61,7 @@ def _choose_later(module: ModuleType, source: ModuleType, *names: str) -> None:
     vars(module)["__getattr__"] = chosen
 
 
+@environment(_CHILDREN)
 def renderer(model: Any, width: int, height: int) -> Any:
     """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
 
@@ -102,6 +91,7 @@ def renderer(model: Any, width: int, height: int) -> Any:
         ) from error
 
 
+@environment(_CHILDREN)
 def need_window() -> None:
     """Refuse what MuJoCo's viewer would end the process for.
 

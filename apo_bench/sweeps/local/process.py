@@ -17,9 +17,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import connection, resource_tracker
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
-from apo_bench.io.processes import end_descendants
+from apo_bench.io.processes import SAFE_PATH, end_descendants, environment
+from apo_bench.names import folder_of_own_modules, own_modules_in
 from apo_bench.sweeps.messages import Message, checked, last_message
 from apo_bench.sweeps.stopping import SIGNALS, Check
 
@@ -28,6 +29,16 @@ _TURN_S = 0.1
 _CLOSING_S = 0.25
 """Between the end of its pipe and that of a process."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Children inherit one thread per linear algebra library: the processes already fill the cores."""
+
+
+class _Place(NamedTuple):
+    """What a process is told of the one that starts it."""
+
+    folder: str
+    """Of modules that are named as `module:name`."""
+    safe: str | None
+    """PYTHONSAFEPATH there, for what the process starts in turn."""
 
 
 @final
@@ -43,11 +54,13 @@ class Process:
         """
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_live, args=(work, given, theirs))
+        place = _Place(folder_of_own_modules(), os.environ.get(SAFE_PATH))
+        self._process = context.Process(target=_live, args=(work, given, theirs, place))
         self._is_open = True
-        resource_tracker.ensure_running()
-        with _one_thread_each(), _undisturbed():
-            self._process.start()
+        with environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
+            resource_tracker.ensure_running()
+            with _undisturbed():
+                self._process.start()
         theirs.close()
 
     @property
@@ -107,8 +120,11 @@ class Process:
         self._pipe.close()
 
 
-def _live(work: Callable[..., None], given: tuple[Any, ...], pipe: Any) -> None:
+def _live(work: Callable[..., None], given: tuple[Any, ...], pipe: Any, place: _Place) -> None:
     """The life of the process: its work, and why that ends if it does too early."""
+    del os.environ[SAFE_PATH]
+    if place.safe is not None:
+        os.environ[SAFE_PATH] = place.safe
     if hasattr(os, "setsid"):
         os.setsid()
     for one in SIGNALS:
@@ -123,7 +139,7 @@ def _live(work: Callable[..., None], given: tuple[Any, ...], pipe: Any) -> None:
             os._exit(1)  # code that forked and came back from both is heard once
         pipe.send(message)
 
-    with suppress(OSError):
+    with suppress(OSError), own_modules_in(place.folder):
         try:
             work(*given, say, pipe)
         except Exception as error:
@@ -155,18 +171,3 @@ def _undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Children inherit one thread per linear algebra library: the processes already fill the cores."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

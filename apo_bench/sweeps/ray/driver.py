@@ -101,11 +101,12 @@ def _connect(plan: ClusterPlan, say: Callable[..., None]) -> None:
         runtime: dict[str, Any] = {"env_vars": dict.fromkeys(THREADS, "1")}
         if "MUJOCO_GL" in os.environ:
             runtime["env_vars"]["MUJOCO_GL"] = os.environ["MUJOCO_GL"]
-        if plan.files:
-            for name, path in plan.files.items():
-                (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(path, Path(folder) / name)
-            runtime["working_dir"] = folder
+        for name, path in plan.files.items():
+            (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, Path(folder) / name)
+        if not plan.files:
+            (Path(folder) / "no-files").touch()
+        runtime["working_dir"] = folder  # without one, Ray puts the current folder first on the path of its workers
         quiet = {"runtime_env": runtime, "log_to_driver": False, "logging_level": "error"}
         try:
             if plan.address != "local":
