@@ -166,7 +166,7 @@ def _compiled(kept: bool) -> Kernels:
             f"the compiled solver needs Numba, which cannot be imported ({error}); "
             "pip install 'apo_bench[fast]', or use the corrector 'contact'."
         ) from error
-    config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")  # not what a file in the current folder says
+    vars(config)["CACHE_DIR"] = os.environ.get("NUMBA_CACHE_DIR", "")  # not what a file in the current folder says
     for function in HELPERS:
         register_jitable(fastmath=set(_SAFE))(function)
     compiler: Any = njit(fastmath=set(_SAFE), error_model="numpy", cache=kept)
