@@ -67,8 +67,8 @@ FAULTS = (
     ),
     Fault(
         "judging/contacts.py",
-        "np.abs((found.corners - T_m[:3, 3]) @ n + plane[3])",
-        "((found.corners - T_m[:3, 3]) @ n + plane[3])",
+        "max(0.0, float(-e.min()))",
+        "0.0",
         "faces that are inside each other have no gap",
     ),
     Fault("judging/finished.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
