@@ -29,8 +29,8 @@ def bored_plate() -> Body:
 
 
 def peg() -> Body:
-    """10 mm thick, 50 mm long; stands on its tip."""
-    return shaft(5, 0, 50, "side", bottom="tip", top="head")
+    """10 mm thick, 70 mm long; stands on its tip."""
+    return shaft(5, 0, 70, "side", bottom="tip", top="head")
 
 
 def bracket() -> Body:

@@ -42,8 +42,9 @@ FIRST, LAST = "<!-- rates -->", "<!-- end of rates -->"
 COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation", "sentence")
 CHECK = "check"
 """In place of a method: all but the trials of `scenario check`."""
-FEW, METHODS = 5, ("oracle", "contact", "none")
+FEW, METHODS = 5, ("oracle", "contact", "none", "snap", "snap+search", "by-heart")
 """Seeds of all methods; of `contact` there are more."""
+HEADS = {"oracle": "`oracle`"} | {method: f"`{method}` at 1 mm" for method in METHODS[1:]}
 
 Line = Mapping[str, str]
 
@@ -135,14 +136,15 @@ def draw(paths: Sequence[Path]) -> None:
 
 
 def tables(lines: Sequence[Line]) -> str:
+    methods = [method for method in METHODS if any(line["method"] == method for line in lines)]
     made = [
-        "| assembly | kind | parts | contacts | checked | `oracle` | `contact` at 1 mm | `none` at 1 mm |",
-        "|---|---|---|---|---|---|---|---|",
+        f"| assembly | kind | parts | contacts | checked | {' | '.join(HEADS[m] for m in methods)} |",
+        f"|---|---|---|---|---|{'---|' * len(methods)}",
     ]
     for name in dict.fromkeys(line["assembly"] for line in lines):
         own = [line for line in lines if line["assembly"] == name]
-        made.append(f"| {name} | {' | '.join(_cells(int(name), own))} |")
-    every = " | ".join(rate(lines, method) for method in METHODS)
+        made.append(f"| {name} | {' | '.join(_cells(int(name), own, methods))} |")
+    every = " | ".join(rate(lines, method) for method in methods)
     made += [
         f"| all | | | | {rate(lines, CHECK, False)} | {every} |",
         "",
@@ -154,14 +156,14 @@ def tables(lines: Sequence[Line]) -> str:
     return "\n".join(made if wrong else made[:-3])
 
 
-def _cells(assembly: int, own: Sequence[Line]) -> Iterator[str]:
+def _cells(assembly: int, own: Sequence[Line], methods: Sequence[str]) -> Iterator[str]:
     yield FAMILIES[assembly % len(FAMILIES)].__name__
     yield str(len(generated(assembly).places))
     check = next(line for line in own if line["method"] == CHECK)
     contacts = re.search(r"\((.*)\)", check["sentence"])
     yield contacts[1] if check["success"] == "1" and contacts else ""
     yield "yes" if check["success"] == "1" else check["sentence"]
-    yield from (rate(own, method) for method in METHODS)
+    yield from (rate(own, method) for method in methods)
 
 
 def rate(lines: Sequence[Line], method: str, interval: bool = True) -> str:

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import argparse
 import csv
+import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from apo_bench.records.row import Row
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import wilson
+from benchmarks.asked import ROBUST, block
 
 ROOT = Path(__file__).parents[1]
 KEPT, PAGE = ROOT / "benchmarks" / "results" / "robust.csv", ROOT / "docs" / "results" / "robust.md"
@@ -82,6 +86,8 @@ def page(rows: list[Row], cells: Mapping[Place, Count]) -> list[str]:
         "`benchmarks/results/robust.csv`. Success: the finished assembly is right; Wilson's 95 % intervals, the four "
         "tasks pooled, the same seeds for every method. `--looks N` lets `contact-robust` see operations again up to "
         "N times, with the same noise, outliers included.",
+        "",
+        block(ROBUST),
         "",
         f"| noise, level 1 | method | looks | all | {' | '.join(scenarios)} |",
         f"|---|---|---|---|{'---|' * len(scenarios)}",

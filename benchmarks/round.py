@@ -9,19 +9,27 @@ from __future__ import annotations
 
 import argparse
 import csv
+import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from apo_bench.records.row import Row
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics.rates import wilson
+from benchmarks.asked import ROUND, block
 
 ROOT = Path(__file__).parents[1]
 KEPT, PAGE = ROOT / "benchmarks" / "results" / "round.csv", ROOT / "docs" / "results" / "round.md"
-METHODS = ("oracle", "none", "search", "paper", "contact")
+METHODS = ("oracle", "none", "search", "by-heart", "snap", "snap+search", "paper", "contact")
+CHAINED = ("none", "search", "paper", "contact")
+"""Methods of the table of one long chain."""
+PLAY = ("oracle", "none", "search", "contact")
+"""Methods of the table of less play."""
 RECOGNISED = "recognised"
 CHAIN = "gearbox"
 """Ten operations, one on the other."""
@@ -101,6 +109,8 @@ def page(cells: Mapping[Place, Cell], rows: list[Row], half: list[Row]) -> list[
         "`oracle` is told the true poses, so that neither human nor level changes what it does. Planned wrong by: how "
         "far, in the median, `none` and `contact` planned parts from where they belong, along what contacts fix.",
         "",
+        block(ROUND),
+        "",
         f"## Success at a play of {SHOWN} mm",
         "",
         *success_table(cells),
@@ -137,12 +147,12 @@ def success_table(cells: Mapping[Place, Cell]) -> list[str]:
     lines = sorted({(p.scenario, p.careless, p.level) for p in plain if p.method != "oracle"})
     lines = [line for line in lines if line[0] != CHAIN or line[2] in LEVELS]
     made = [
-        "| scenario | human | level | `none` | `search` | `paper` | `contact` | planned wrong by, mm |",
-        "|---|" + "---|" * 7,
+        f"| scenario | human | level | {' | '.join(f'`{m}`' for m in METHODS[1:])} | planned wrong by, mm |",
+        "|---|" + "---|" * (len(METHODS) + 2),
     ]
     for scenario in sorted({p.scenario for p in plain}):
         told = [c for p, c in plain.items() if p.scenario == scenario and p.method == "oracle"]
-        made.append(f"| {scenario} | `oracle` | | {rate(sum_of(told))} | | | | |")
+        made.append(f"| {scenario} | `oracle` | | {rate(sum_of(told))}{' |' * len(METHODS)}")
         for _, careless, level in (line for line in lines if line[0] == scenario):
             each = {m: plain.get(Place(scenario, float(SHOWN), careless, level, "given", m)) for m in METHODS}
             said = " | ".join(rate(each[m]) for m in METHODS[1:])
@@ -158,7 +168,7 @@ def play_table(cells: Mapping[Place, Cell]) -> list[str]:
     ]
     less = {p: c for p, c in cells.items() if p.clearance_mm < float(SHOWN) and p.relations == "given"}
     for scenario, play, level in sorted({(p.scenario, p.clearance_mm, p.level) for p in less}):
-        each = (Place(scenario, play, 0.0, level, "given", method) for method in METHODS if method != "paper")
+        each = (Place(scenario, play, 0.0, level, "given", method) for method in PLAY)
         made.append(f"| {scenario} | {play:g} | {level:g} | {' | '.join(rate(less.get(place)) for place in each)} |")
     return made
 
@@ -180,14 +190,14 @@ def chain_table(rows: Iterable[Row]) -> list[str]:
     ]
     mine = [row for row in rows if (row["scenario"], row["careless"], row["relations"]) == (CHAIN, 0.0, "given")]
     for level in sorted({float(row["level"] or 0.0) for row in mine}):
-        of = {m: [row for row in mine if row["method"] == m and row["level"] == level] for m in METHODS[1:]}
+        of = {m: [row for row in mine if row["method"] == m and row["level"] == level] for m in CHAINED}
         if all(of.values()):
             planned = [middle(row["planned_error_fixed_mm"] for row in of[m]) for m in ("none", "paper", "contact")]
             ends = [
                 middle(row[name] for row in of["contact"]) for name in ("pose_error_fixed_mm", "pose_error_free_mm")
             ]
             failed = [row["failure_operation"] for row in of["none"] if not row["success"]]
-            said = [f"{level:g}", *(rate(cell_of(of[m])) for m in METHODS[1:]), *planned, *ends, middle(failed, 0)]
+            said = [f"{level:g}", *(rate(cell_of(of[m])) for m in CHAINED), *planned, *ends, middle(failed, 0)]
             made.append(f"| {' | '.join(said)} |")
     return made
 

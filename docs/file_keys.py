@@ -98,7 +98,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "contacts": "pairs `[face of what moves, part.face of what rests]`, or tables",
             "attach": "a preference for the way to the goal; else it is found",
             "grasp": "where the gripper takes the part; else above the middle of boxes, or as its shape offers",
-            "vary": "a shift that each trial draws, or a list of them (20 in a scenario at most)",
+            "vary": "a shift or a turn that each trial draws, or a list of them (20 in a scenario at most)",
         },
         "operations, contacts": {
             "faces": "the pair of faces",
@@ -113,7 +113,13 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "at_mm": "point between the fingers, frame of the part, at most 10 mm over it: pads reach so far down",
             "across": f"axis along which the fingers close, level when the part is picked; {SHIFT}",
         },
-        "operations, vary": {"along": SHIFT, "mm": "lowest and highest shift"},
+        "operations, vary": {
+            "along": f"direction of a shift, {SHIFT}",
+            "mm": "lowest and highest shift",
+            "about": f"in their place: axis of a turn, {SHIFT}",
+            "deg": "lowest and highest turn",
+            "at_mm": "a point of that axis, frame of the part; else its origin",
+        },
         "site": {
             "center_mm": "middle of the places, x and y in the world",
             "spread_mm": "how far from it in x and y, to either side",

@@ -76,6 +76,13 @@ def _cases(scenario: Scenario) -> Iterator[Case]:
             shifts = [length if j == i else 0.0 for j in range(len(scenario.shifts))]
             words = f" when it is varied by {1e3 * length:g} mm"
             yield Case(layout_at(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words)
+    for i, turn in enumerate(scenario.turns):
+        for angle in (turn.low_rad, turn.high_rad):
+            turns = [angle if j == i else 0.0 for j in range(len(scenario.turns))]
+            words = f" when it is turned by {np.degrees(angle):g} degrees"
+            yield Case(
+                layout_at(scenario, x, y, middle, turns_rad=turns), f"operation {turn.operation + 1}, vary", words
+            )
     for i, j, yaw in product((-1, 1), (-1, 1), sorted({middle, *site.yaw_rad})):
         x, y = site.center_m[0] + i * site.spread_m[0], site.center_m[1] + j * site.spread_m[1]
         words = f" when the site is at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"

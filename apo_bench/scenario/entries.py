@@ -22,7 +22,7 @@ from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario.keys import LARGEST_MM, read_pose, read_span, read_unit_axis, refuse, refuse_name
-from apo_bench.scenario.scenario import Grasp, Shift
+from apo_bench.scenario.scenario import Grasp, Shift, Turn
 
 _MOST_PARTS, _MOST_OPERATIONS, _MOST_CONTACTS, _MOST_SHIFTS = 50, 100, 50, 20
 """In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
@@ -61,7 +61,7 @@ class OperationEntry(NamedTuple):
     """(4, 4), frame of the assembly, [m]."""
     attach: Preference
     grasp: Grasp
-    shifts: tuple[Shift, ...]
+    varies: tuple[Shift | Turn, ...]
 
 
 def read_parts(node: JsonNode, folder: Path) -> Mapping[str, PartEntry]:
@@ -128,7 +128,7 @@ def read_operations(node: JsonNode, parts: Mapping[str, PartEntry]) -> tuple[Ope
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
-    if sum(len(entry.shifts) for entry in entries) > _MOST_SHIFTS:
+    if sum(len(entry.varies) for entry in entries) > _MOST_SHIFTS:
         refuse(node, f"at most {_MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends")
     return tuple(entries)
 
@@ -160,7 +160,7 @@ def _entry(
         goal,
         _attach(keys["attach"]) if "attach" in keys else Preference(),
         _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
-        _shifts(keys["vary"], k) if "vary" in keys else (),
+        _varies(keys["vary"], k) if "vary" in keys else (),
     )
 
 
@@ -254,11 +254,25 @@ def _above_middle(solid: Solid, T: Array) -> Array:
     return np.clip(point, low, high)
 
 
-def _shifts(node: JsonNode, operation: int) -> tuple[Shift, ...]:
+def _varies(node: JsonNode, operation: int) -> tuple[Shift | Turn, ...]:
     many = node.items(node.key) if isinstance(node.value, list) else (node,)
-    shifts = []
-    for each in many:
-        keys = each.fields(("along", "mm"))
-        low, high = read_span(keys["mm"], -LARGEST_MM, LARGEST_MM)
-        shifts.append(Shift(operation, read_unit_axis(keys["along"]), 1e-3 * low, 1e-3 * high))
-    return tuple(shifts)
+    return tuple(_turn(each, operation) if _is_turn(each) else _shift(each, operation) for each in many)
+
+
+def _is_turn(node: JsonNode) -> bool:
+    return isinstance(node.value, dict) and "about" in node.value
+
+
+def _shift(node: JsonNode, operation: int) -> Shift:
+    keys = node.fields(("along", "mm"))
+    low, high = read_span(keys["mm"], -LARGEST_MM, LARGEST_MM)
+    return Shift(operation, read_unit_axis(keys["along"]), 1e-3 * low, 1e-3 * high)
+
+
+def _turn(node: JsonNode, operation: int) -> Turn:
+    keys = node.fields(("about", "deg"), ("at_mm",))
+    low, high = np.radians(read_span(keys["deg"], -360.0, 360.0))
+    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else np.zeros(3)
+    if np.abs(point).max() > 1e-3 * LARGEST_MM:
+        keys["at_mm"].fail(f"three lengths from -{LARGEST_MM:g} to {LARGEST_MM:g} mm are needed")
+    return Turn(operation, read_unit_axis(keys["about"]), point, float(low), float(high))

@@ -24,7 +24,7 @@ from apo_bench.scenario.attach import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
 from apo_bench.scenario.keys import LARGEST_MM, read_span, read_unit_axis, refuse
-from apo_bench.scenario.scenario import Carelessness, Scenario, Site
+from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 
 _SCHEMA = 1
 _LARGEST_CLEARANCE_MM = 5.0
@@ -116,7 +116,8 @@ def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, .
         attach=(),
         grasps=tuple(entry.grasp for entry in entries),
         site=_site(top["site"]) if "site" in top else Site(),
-        shifts=tuple(shift for entry in entries for shift in entry.shifts),
+        shifts=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Shift)),
+        turns=tuple(vary for entry in entries for vary in entry.varies if isinstance(vary, Turn)),
         careless=_careless(top["careless"], entries) if "careless" in top else None,
         thresholds=thresholds,
         success_means=means,

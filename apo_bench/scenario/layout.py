@@ -1,4 +1,4 @@
-"""The truth of a trial: where a seed puts the assembly, and how far it shifts what no contact fixes."""
+"""The truth of a trial: where a seed puts the assembly, and how far it shifts and turns what no contact fixes."""
 
 from __future__ import annotations
 
@@ -17,18 +17,26 @@ from apo_bench.scenario.scenario import Scenario
 def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: float | None = None) -> Layout:
     """A consistent layout: every contact of the scenario stays closed.
 
-    Uniform draws in this order: x, y and yaw of the site, then one for each shift of the scenario. Parts start where
+    Uniform draws in this order: x, y and yaw of the site, then one for each shift and one for each turn of
+    the scenario. Parts start where
     the scenario says, in the world; only fixed parts that follow the site move with it.
 
     Args:
         clearance_mm: Of the parts that are used (none: the scenario's): a part that stands on a fit face at its start
             stands that much lower.
     """
-    site, unit = scenario.site, rng.uniform(-1.0, 1.0, size=3 + len(scenario.shifts))
+    site, first_turn = scenario.site, 3 + len(scenario.shifts)
+    unit = rng.uniform(-1.0, 1.0, size=first_turn + len(scenario.turns))
     x, y = np.asarray(site.center_m) + unit[:2] * site.spread_m
     yaw = _between(*site.yaw_rad, unit[2])
-    shifts = [_between(shift.low_m, shift.high_m, u) for shift, u in zip(scenario.shifts, unit[3:], strict=True)]
-    return layout_at(scenario, x, y, yaw, shifts, scenario.clearance_mm if clearance_mm is None else clearance_mm)
+    shifts = [
+        _between(shift.low_m, shift.high_m, u) for shift, u in zip(scenario.shifts, unit[3:first_turn], strict=True)
+    ]
+    turns = [
+        _between(turn.low_rad, turn.high_rad, u) for turn, u in zip(scenario.turns, unit[first_turn:], strict=True)
+    ]
+    clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
+    return layout_at(scenario, x, y, yaw, shifts, clearance, turns)
 
 
 def layout_at(
@@ -38,18 +46,22 @@ def layout_at(
     yaw_rad: float,
     shifts_m: Sequence[float] | None = None,
     clearance_mm: float = 0.0,
+    turns_rad: Sequence[float] | None = None,
 ) -> Layout:
-    """The layout with the assembly at (x, y), turned by yaw about the vertical, and given shifts (none: all zero).
+    """The layout with the assembly at (x, y), turned by yaw about the vertical, given shifts and turns (none: zero).
 
     Without a clearance it is that of the nominal parts.
 
-    Goals are T_world_assembly T_assembly_part, each shifted along its axis in the frame of its own part.
+    Goals are T_world_assembly T_assembly_part, each shifted, then turned, in the frame of its own part.
     """
     T_world_assembly = pose.at((x_m, y_m, 0.0), (0.0, 0.0, np.degrees(yaw_rad)))
     goals = T_world_assembly @ scenario.goals
     lengths = [0.0] * len(scenario.shifts) if shifts_m is None else shifts_m
     for shift, length in zip(scenario.shifts, lengths, strict=True):
         goals[shift.operation] = goals[shift.operation] @ pose.at(length * shift.axis)
+    angles = [0.0] * len(scenario.turns) if turns_rad is None else turns_rad
+    for turn, angle in zip(scenario.turns, angles, strict=True):
+        goals[turn.operation] = goals[turn.operation] @ turn.by(angle)
     start = {part: T_world_assembly @ T if part in scenario.follows_site else T for part, T in scenario.start.items()}
     return Layout(goals, {part: _at_rest(scenario, part, T, 1e-3 * clearance_mm) for part, T in start.items()})
 

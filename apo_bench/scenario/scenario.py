@@ -12,6 +12,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses, frozen_poses
 from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.records import copyable
 from apo_bench.insertion.line import Attach
@@ -51,6 +52,31 @@ class Shift:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", frozen(self.axis, 3))
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """How far the truth of an operation may turn about an axis, where no contact fixes that."""
+
+    operation: int
+    """Counted from 0."""
+    axis: Array
+    """Unit vector, (3,), in the frame of the main part at its goal."""
+    point: Array
+    """A point of the axis, (3,), in that frame, [m]."""
+    low_rad: float
+    high_rad: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", frozen(self.axis, 3))
+        object.__setattr__(self, "point", frozen(self.point, 3))
+
+    def by(self, rad: float) -> Array:
+        """The turn by an angle, (4, 4), in the frame of the part: T = P R P^-1 with P to the point."""
+        there = pose.at(self.point)
+        return there @ pose.exp(np.concatenate([np.zeros(3), rad * self.axis])) @ pose.inverse(there)
 
 
 @final
@@ -121,6 +147,8 @@ class Scenario:
     """Largest |e| at which the contact equations count as solved."""
     success_means: Meaning = "assembled"
     """What the judge calls a success: that the finished assembly is right, or that it was made as demonstrated."""
+    turns: tuple[Turn, ...] = ()
+    """What may turn in each layout; drawn after the shifts."""
     follows_site: frozenset[str] = frozenset()
     """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,23 +17,33 @@ from apo_bench.insertion.states import classify
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.play import joint_play_mm
 from apo_bench.scenario.human_error import NOTHING_M, spread_error
-from apo_bench.scenario.scenario import Carelessness, Scenario
+from apo_bench.scenario.scenario import Carelessness, Scenario, Turn
 from apo_bench.show.axes import holds_axis
 from apo_bench.show.words import listed_words
 
+NOTHING: Mapping[str, str] = MappingProxyType({})
 _LEVEL = 0.01
 """A face is upright if its normal rises or falls by less."""
 
 
-def cards(scenarios: Sequence[Scenario], command: str, picture: str) -> str:
-    """A page with the cards of all, written by `command`; `picture` is the path of a graph with `{}` for the name."""
+def cards(
+    scenarios: Sequence[Scenario], command: str, picture: str, said: str = "", measured: Mapping[str, str] = NOTHING
+) -> str:
+    """A page with the cards of all, written by `command`; `picture` is the path of a graph with `{}` for the name.
+
+    Args:
+        said: What stands above the cards of what was measured.
+        measured: Scenario -> what was measured of it, in Markdown.
+    """
     lines = [f"<!-- Written by `{command}`; change the scenarios, not this page. -->", "", "# Scenarios", ""]
     lines += [f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios]
     lines += ["", "What is asked for under *Success*: [the two verdicts](../how/judge.md)."]
+    lines += ["", said] if said else []
     for s in scenarios:
         head, _, rest = scenario_card(s, 2).partition("\n\n")
         shown = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"
         lines += ["", f'<a id="{s.name}"></a>', "", head, "", shown, "", rest.rstrip("\n")]
+        lines += ["", "### What it asks for", "", measured[s.name]] if s.name in measured else []
     return "\n".join(lines) + "\n"
 
 
@@ -128,6 +139,10 @@ def _varies(scenario: Scenario) -> Iterator[str]:
         main = scenario.assembly.operations[shift.operation].main
         span = _span(shift.low_m, shift.high_m)
         yield f"Operation {shift.operation + 1}: {main} by {span} mm along {_axis(shift.axis)}."
+    for turn in scenario.turns:
+        main, (low, high) = scenario.assembly.operations[turn.operation].main, np.degrees([turn.low_rad, turn.high_rad])
+        about = f"{_axis(turn.axis)}{_through(turn)}"
+        yield f"Operation {turn.operation + 1}: {main} by {low:g} to {high:g} degrees about {about}."
 
 
 def _success(scenario: Scenario) -> Iterator[str]:
@@ -178,6 +193,11 @@ def _wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
 
 def _span(low_m: float, high_m: float) -> str:
     return f"{low_m * 1e3:g} to {high_m * 1e3:g}"
+
+
+def _through(turn: Turn) -> str:
+    """` through (-30, 0, 0) mm`, unless that is the origin of the part."""
+    return f" through ({', '.join(f'{1e3 * x:g}' for x in turn.point)}) mm" if turn.point.any() else ""
 
 
 def _axis(axis: Array) -> str:

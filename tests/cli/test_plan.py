@@ -64,7 +64,7 @@ TABLE = {
     ],
     "dovetail": [("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
     "gearbox": [
-        ("S -> A", [DOWN]),
+        ("S -> C", [DOWN, "slide-to-contact +x"]),
         *[("S -> H", INTO)] * 4,
         ("S -> A", [DOWN]),
         *[("S -> H", INTO)] * 2,
@@ -72,10 +72,13 @@ TABLE = {
         ("S -> H", INTO),
     ],
     "l_bracket_on_plate": [("S -> A", [DOWN]), ("S -> H", INTO)],
-    "nested_bushings": [("S -> A", [DOWN]), ("S -> H", INTO), ("S -> H", INTO)],
+    "nested_bushings": [("S -> C", [DOWN, "slide-to-contact +x"]), ("S -> H", INTO), ("S -> H", INTO)],
     "peg_in_hole": [("S -> A", [DOWN]), ("S -> H", INTO)],
-    "shaft_through_brackets": [("S -> A", [DOWN]), ("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
-    "wedge_under_roof": [("S -> A", [DOWN]), ("S -> F", [DOWN, "slide-to-contact +y", "slide-to-contact +x"])],
+    "shaft_through_brackets": [("S -> A", [DOWN]), ("S -> E", ["insert-into +x"])],
+    "wedge_under_roof": [
+        ("S -> C", [DOWN, "slide-to-contact +y"]),
+        ("S -> F", [DOWN, "slide-to-contact +y", "slide-to-contact +x"]),
+    ],
 }
 """Every operation of every example: state before and after, and the macros, directions in the frame of the assembly."""
 LENGTHS_MM = {
@@ -86,16 +89,16 @@ LENGTHS_MM = {
     ("pocket_table", 6): 6.0,
     ("stick_on_castles", 3): 10.0,
     ("vanished_fixture", 5): 10.0,
-    ("dovetail", 2): 75.0,
+    ("dovetail", 2): 120.0,
     ("l_bracket_on_plate", 2): 18.516,
     ("nested_bushings", 2): 35.0,
     ("nested_bushings", 3): 60.0,
-    ("peg_in_hole", 2): 20.0,
-    ("shaft_through_brackets", 3): 123.016,
+    ("peg_in_hole", 2): 40.0,
+    ("shaft_through_brackets", 2): 123.016,
 }
 LENGTHS_MM |= {("gearbox", axle): 10.016 for axle in (2, 4, 7, 9)}
 LENGTHS_MM |= {("gearbox", disc): 39.016 for disc in (3, 5, 8)} | {("gearbox", 10): 17.016}
-TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 3): (2, 0, 4)}
+TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 2): (2, 0, 4)}
 TURNING |= {("nested_bushings", 2): (1, 1, 4), ("nested_bushings", 3): (1, 1, 4)}
 TURNING |= {("gearbox", k): (1, 1, 4) for k in (2, 3, 4, 5, 7, 8, 9)}
 """Of shafts, which turn in their bores, where the faces of the letter alone leave no turn."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from shapely import MultiPoint
 
+from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
@@ -19,7 +20,7 @@ from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.solid import Solid
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout, layout_at
-from apo_bench.scenario.scenario import Grasp, Scenario, Site
+from apo_bench.scenario.scenario import Grasp, Scenario, Site, Turn
 from tests import scenes
 from tests.shipped import BOXES
 
@@ -270,3 +271,39 @@ def test_everything_is_within_reach(name: str):
     distance = np.linalg.norm(np.array(held)[:, :2, 3] - BASE_M, axis=1)
     assert distance.min() > 0.25
     assert distance.max() < 0.72
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (-0.03, 0.01, 0.0)])
+def test_a_turn_is_one_about_its_point_and_leaves_what_shifts_draw(point: tuple[float, float, float]):
+    """The point stays where it is, the part turns by what was asked, and shifts of the same seed stay the same."""
+    plain = SCENARIOS["stick_in_tower"]
+    turn = Turn(0, np.array([0.0, 0.0, 1.0]), np.array(point), -0.2, 0.4)
+    turned = replace(plain, turns=(turn,))
+    for angle in (-0.2, 0.4):
+        layout, before = layout_at(turned, 0.1, 0.0, 0.3, turns_rad=[angle]), layout_at(plain, 0.1, 0.0, 0.3)
+        moved = pose.inverse(before.goals[0]) @ layout.goals[0]
+        np.testing.assert_allclose(pose.apply(moved, np.array([point])), [point], rtol=0, atol=1e-12)
+        assert np.arctan2(moved[1, 0], moved[0, 0]) == pytest.approx(angle)
+        assert (layout.goals[1:] == before.goals[1:]).all()
+    found, drawn = [], [draw_layout(s, np.random.default_rng([7, 0])) for s in (plain, turned)]
+    assert (drawn[0].goals[1:] == drawn[1].goals[1:]).all()
+    for seed in GENERATOR_SEEDS:
+        each = [draw_layout(s, np.random.default_rng([seed, 0])).goals[0] for s in (plain, turned)]
+        found.append(np.arctan2(*(pose.inverse(each[0]) @ each[1])[[1, 0], [0, 0]]))
+    assert -0.2 <= min(found) < -0.17
+    assert 0.37 < max(found) <= 0.4
+
+
+ELSEWHERE = {name: load_scenario(name) for name in ("peg_in_hole", "l_bracket_on_plate")}
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_what_is_bolted_to_the_table_follows_the_site_and_turned_parts_still_touch(name: str):
+    """Relations hold in every layout: the checks of a file at the ends of its turns, here at drawn ones."""
+    scenario = ELSEWHERE[name]
+    bolted = next(iter(scenario.follows_site))
+    for seed in range(20):
+        layout = draw_layout(scenario, np.random.default_rng([seed, 0]))
+        site = layout.goals[-1] @ pose.inverse(scenario.goals[-1])
+        np.testing.assert_allclose(layout.start[bolted], site @ scenario.start[bolted], rtol=0, atol=1e-12)
+        assert largest_gap(scenario.assembly, layout.start, layout.goals) < 1e-9

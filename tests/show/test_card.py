@@ -9,7 +9,10 @@ import pytest
 
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.show.card import cards, scenario_card
+from benchmarks.asks import HEAD, asks, by_heart
+from benchmarks.baselines import kept
 
+JUDGE = Path(__file__).parents[2] / "docs" / "how" / "judge.md"
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 
 
@@ -62,5 +65,13 @@ def test_every_scenario_says_all_of_it(name: str) -> None:
 @pytest.mark.skipif(not PAGE.exists(), reason="the documents are not part of a source archive")
 def test_the_page_is_what_the_scenarios_say() -> None:
     scenarios = [load_scenario(name) for name in scenario_names()]
-    written = cards(scenarios, "python docs/cards.py", "../pictures/graph_{}.png")
+    measured = {scenario.name: asks(scenario, kept()) for scenario in scenarios}
+    written = cards(scenarios, "python docs/cards.py", "../pictures/graph_{}.png", HEAD, measured)
     assert PAGE.read_text(encoding="utf-8") == written, "run: python docs/cards.py"
+    assert by_heart(scenarios, kept()) in JUDGE.read_text(encoding="utf-8"), "run: python docs/cards.py"
+
+
+def test_a_card_says_what_may_turn_and_about_which_axis() -> None:
+    assert "- Operation 1: plate by -40 to 40 degrees about its z axis." in scenario_card(load_scenario("peg_in_hole"))
+    line = "- Operation 1: plate2 by -20 to 20 degrees about its z axis through (-30, 0, 0) mm."
+    assert line in scenario_card(load_scenario("l_bracket_on_plate"))
