@@ -86,7 +86,7 @@ def test_the_true_layout_is_assembled(name: str, request: pytest.FixtureRequest)
     assert 1.0 < result.peak_force_n < 60.0
     assert [each.operation for each in result.in_hand] == list(range(len(scene.scenario.assembly)))
     most = np.max([(each.moved_m, each.moved_rad) for each in result.in_hand], axis=0)
-    assert 0.0 < most[0] < 2e-3, "boxes creep along the pads while they are carried"
+    assert 0.0 < most[0] < 2e-3, "what is put in is pushed along the pads"
     assert most[1] < np.radians(0.5)
 
 

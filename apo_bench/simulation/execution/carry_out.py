@@ -56,7 +56,7 @@ def _lift(robot: Robot, t: Transfer) -> None:
     if t.carried:
         robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
-    robot.steady(True)
+    robot.steady(not t.drawn)
     robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
     robot.steady(False)
 

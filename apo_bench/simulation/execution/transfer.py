@@ -118,6 +118,11 @@ class Transfer:
         return () if self.out.level else tuple(macro.way for macro in self.departs if abs(macro.way[2]) < 0.5)
 
     @property
+    def drawn(self) -> bool:
+        """Whether it is drawn up out of walls while it is lifted."""
+        return any(macro.way[2] > 0.5 for macro in self.departs)
+
+    @property
     def floats(self) -> float:
         """How far up a part must be to be free all round: seen at rest it lay on the floor of its slot, [m]."""
         return 0.5 * self.clearance

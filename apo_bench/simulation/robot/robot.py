@@ -25,8 +25,9 @@ from apo_bench.simulation.robot.opening import fingers_of
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
 from apo_bench.simulation.robot.reach import along, at_end, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.steadying import Carried, steadied
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, place, timestep, unfelt
+from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
@@ -34,8 +35,6 @@ _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
 _REST_RAD_S, _REST_M_S = 2e-3, 3e-3
 """Joints and fingers that move slower than this rest."""
-_CREEP_M = 5e-5
-"""What moves farther in the hand in a tick does not creep: it slips."""
 _SHIFT_M = 0.001
 """How far the tip is shifted in thought to see how the joints turn."""
 
@@ -82,7 +81,7 @@ class Robot:
         self.step: Step | None = None
         self._held: tuple[str, ...] = ()
         self.hold_watch = HoldWatch()
-        self._kept: dict[str, Array] = {}
+        self._carried: Carried | None = None
         self._handled: int | None = None
         self.peak_force_n = 0.0
         self._find_joints()
@@ -292,27 +291,9 @@ class Robot:
             self.weld(self._held[0], True)
 
     def steady(self, on: bool) -> None:
-        """Keep all that is in the hand where it is in the hand, or no longer, where the scene asks for it.
-
-        The engine's friction holds speeds, not places, and does not see that contacts turn with the arm: in the air a
-        part creeps along the pads, by up to 0.4 mm, under a hundredth of the force that would make it slip. Once a tick
-        it is put back; what slips in earnest is left to slip.
-        """
-        tip = pose.inverse(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
-        kept = self._held if on and self.scene.steadies else ()
-        self._kept = {part: tip @ part_pose(self.scene.work, self.data, part) for part in kept}
-
-    def _put_back(self) -> None:
-        T_tip = self.scene.kinematics.forward(self.data.qpos[self._qpos])
-        for part, T in tuple(self._kept.items()):
-            wanted, now = T_tip @ T, part_pose(self.scene.work, self.data, part)
-            if np.linalg.norm((wanted - now)[:3, 3]) > _CREEP_M:
-                del self._kept[part]
-                continue
-            v = self.scene.work.dof[part]
-            speed = np.array(self.data.qvel[v : v + 6])
-            place(self.scene.work, self.data, part, wanted)
-            self.data.qvel[v : v + 6] = speed
+        """From now on what is in the hand is carried through the air, or no longer; begin and end at rest."""
+        friction = self.scene.grasp == "friction"
+        self._carried = Carried(self._held) if on and friction and self._held else None
 
     def _spans(self, line: Trajectory, s: Array) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: all of them, or those where something is near; at last the end."""
@@ -386,8 +367,9 @@ class Robot:
         """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""
         if has_failed(self.data):
             raise Halt(self.stage, "unstable_simulation")
-        if self._kept:
-            self._put_back()
+        if self._carried is not None:
+            tip = self.scene.kinematics.forward(self.data.qpos[self._qpos])
+            self._carried = steadied(self.scene.work, self.data, tip, self._carried)
         self._feel()
         if self._on_arm_flat @ self._on_arm_flat > _COLLISION_N**2:
             struck, force = self._hardest_blow()

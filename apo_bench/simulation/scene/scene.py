@@ -65,16 +65,6 @@ class Scene:
     kinematics: Kinematics
 
     @property
-    def steadies(self) -> bool:
-        """Whether what is carried through the air does not creep in the hand (`Robot.steady`): with round parts.
-
-        A box has one direction across its slot, in which the fingers centre it; a shaft has two.
-        """
-        return self.grasp == "friction" and any(
-            not all_boxes(solid.pieces) for solid in self.scenario.assembly.solids.values()
-        )
-
-    @property
     def criteria(self) -> Criteria:
         """What the judge decides by."""
         return Criteria(self.scenario.thresholds, self.clearance_mm, self.scenario.success_means)

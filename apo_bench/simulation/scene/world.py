@@ -164,6 +164,14 @@ def _released(world: World, data: Any) -> bool:
     return not bool(data.eq_active[welds].any() or ((a >= 0) != (b >= 0)).any())
 
 
+def touch_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
+    """Whether any of these movable parts touches another part; that they touch each other, or the arm, is not meant."""
+    ours = np.array([world.free.index(part) for part in parts])
+    a, b = _contact_parts(world, data)
+    mine, its = np.isin(a, ours), np.isin(b, ours)
+    return bool(((mine & (b >= 0)) | (its & (a >= 0)))[mine != its].any())
+
+
 def _contact_parts(world: World, data: Any) -> tuple[Ints, Ints]:
     if data.ncon == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
