@@ -114,9 +114,9 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "across": f"axis along which the fingers close, level when the part is picked; {SHIFT}",
         },
         "operations, vary": {
-            "along": f"direction of a shift, {SHIFT}",
+            "along": f"of a shift, with `mm`: its direction, {SHIFT}",
             "mm": "lowest and highest shift",
-            "about": f"in their place: axis of a turn, {SHIFT}",
+            "about": f"of a turn, with `deg`: its axis, {SHIFT}",
             "deg": "lowest and highest turn",
             "at_mm": "a point of that axis, frame of the part; else its origin",
         },
@@ -321,12 +321,14 @@ def listening() -> Iterator[list[tuple[str, tuple[str, ...], tuple[str, ...]]]]:
 
 
 def named(heard: Iterable[tuple[str, tuple[str, ...], tuple[str, ...]]], table_of: object) -> Keys:
+    """The keys of each table; of one with several forms all of them, and as needed what every form needs."""
     assert callable(table_of)
     tables: Keys = {}
     for key, required, optional in heard:
         table = table_of(key)
         if table is not None:
-            tables[table] = frozenset(required), frozenset((*required, *optional))
+            needed, allowed = tables.get(table, (frozenset(required), frozenset[str]()))
+            tables[table] = needed & set(required), allowed.union(required, optional)
     return tables
 
 
