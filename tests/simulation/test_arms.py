@@ -192,7 +192,8 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
 def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "broken.xml").write_text("<mujoco><worldbody><geom/></worldbody>")
     (tmp_path / "meshes.xml").write_text(
-        '<mujoco><asset><mesh file="link.stl"/></asset><worldbody><geom type="mesh" mesh="link"/></worldbody></mujoco>'
+        '<mujoco><asset><mesh file="link.stl"/></asset><worldbody><body><geom type="mesh" mesh="link"/></body>'
+        "</worldbody></mujoco>"
     )
     path = tmp_path / "arm.toml"
     path.write_text(text.replace("ARMS", str(ARMS)))

@@ -13,9 +13,11 @@ import numpy as np
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.resources import folder
+from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.description import ArmDescription, read_description
 from apo_bench.simulation.arms.home import find_home
-from apo_bench.simulation.arms.loading import compiled, files_of, load_model
+from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
@@ -49,8 +51,15 @@ def read_described(said: ArmDescription) -> Arm:
     if times not in _BUILT:
         while len(_BUILT) >= _MOST_BUILT:
             del _BUILT[next(iter(_BUILT))]
-        _BUILT[times] = build_arm(said)
+        _BUILT[times] = build_arm(said) if _is_ours(said) else build_apart(said)
     return _BUILT[times]
+
+
+def _is_ours(said: ArmDescription) -> bool:
+    """Whether the models come with the package."""
+    ours = folder("assets").resolve()
+    models = (said.mjcf, said.gripper.mjcf or said.mjcf)
+    return all(each.resolve().is_relative_to(ours) for each in models)
 
 
 def build_arm(said: ArmDescription) -> Arm:
@@ -61,6 +70,7 @@ def build_arm(said: ArmDescription) -> Arm:
     """
     spec = load_model(said.mjcf, "arm")
     model = compiled(spec, said.mjcf)
+    check_surroundings(model, said.mjcf)
     flange, T_flange = _flange(model, said)
     joints = _joints(model, flange, said)
     if said.gripper.mjcf is not None:

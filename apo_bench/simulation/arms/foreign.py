@@ -11,6 +11,7 @@ from types import MappingProxyType
 from apo_bench.errors import InputError, unknown
 from apo_bench.simulation.arms.building import read_described
 from apo_bench.simulation.arms.description import USUAL_BASE, ArmDescription, GripperDescription
+from apo_bench.simulation.arms.tree import read_model_tree
 from apo_bench.simulation.scene.arm import Arm
 
 MENAGERIE, ROBOSUITE = "APO_BENCH_MENAGERIE", "APO_BENCH_ROBOSUITE"
@@ -111,11 +112,6 @@ def _robosuite() -> Path | None:
 
 def _has_fingers(mjcf: Path) -> bool:
     """Whether an actuator, by its name or what it drives, is of a gripper."""
-    import mujoco
-
-    try:
-        spec = mujoco.MjSpec.from_file(str(mjcf))
-    except (ValueError, RuntimeError):
-        return False
-    names = [f"{joint.name} {joint.parent.name}".lower() for joint in spec.joints]
-    return any(word in name for name in names for word in _WITH_FINGERS)
+    root = read_model_tree(mjcf, "arm").root
+    names = (f"{body.get('name')} {joint.get('name')}" for body in root.iter("body") for joint in body.iter("joint"))
+    return any(word in name.lower() for name in names for word in _WITH_FINGERS)

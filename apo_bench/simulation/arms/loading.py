@@ -2,45 +2,42 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
+import numpy as np
 
 from apo_bench.errors import InputError, one_line
-from apo_bench.io.reading import opened, read_bytes
+from apo_bench.simulation.arms.allowed import MOST_MESH_BYTES
+from apo_bench.simulation.arms.tree import checked_size, read_model_tree
 
-_LONGEST, _LARGEST_BYTES = 200, 50_000_000
+_LONGEST, _LARGEST_BASE_M = 200, 0.5
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
-_NAMED_FILE = re.compile(r"""\bfile\s*=\s*["']([^"']+)["']""")
-_NAMED_FOLDER = re.compile(r"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)["']""")
 
 
 def load_model(path: Path, kind: str) -> Any:
     """An MJCF file as `MjSpec`, without sensors, key frames, cameras, lights and pictures of its own.
 
     Every body, joint, geom, site and actuator has a name in it. Shapes that touch nothing are left out where they are
-    meshes, which would have to be compiled with every scene.
+    meshes, which would have to be compiled with every scene. How it is simulated is left to the scene.
 
     Args:
         kind: What the file should be, for the message: `arm`, `gripper`.
 
     Raises:
-        InputError: There is no such file, MuJoCo cannot read it, or a file that it names is missing.
+        InputError: There is no such file, it says what it may not, MuJoCo cannot read it, or a mesh is missing.
     """
-    with opened(path, f"MJCF file of the {kind}"):
-        pass
-    spec = _parsed(path, kind)
-    folder = Path(spec.modelfiledir or path.parent)
-    for plural in ("sensors", "keys", "cameras", "lights", "texts", "numerics", "tuples", "pairs"):
-        for each in list(getattr(spec, plural)):
-            spec.delete(each)
+    tree = read_model_tree(path, kind)
+    try:
+        spec = mujoco.MjSpec.from_string(tree.text)
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        raise InputError(f"{path}: MuJoCo cannot read this MJCF file of the {kind}: {_said(error)}.") from error
+    _check_world(spec, path, kind)
     for geom in list(spec.geoms):
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH and not geom.contype and not geom.conaffinity:
             spec.delete(geom)
-    _keep_meshes(spec, folder, path, kind)
+    _keep_meshes(spec, path, kind)
     for plural in _NAMED:
         for i, each in enumerate(getattr(spec, plural)):
             if not each.name:
@@ -61,64 +58,81 @@ def compiled(spec: Any, path: Path) -> Any:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """A file of an arm, and the files that it names, beside it or in a folder that it names for them."""
+    """A file of an arm, with the files that it includes and the meshes that it names."""
     try:
-        text = read_bytes(path, "MJCF file", _LARGEST_BYTES).decode("utf-8", errors="replace")
+        return tuple(dict.fromkeys(read_model_tree(path, "arm").files))
     except InputError:
         return (path,)
-    folders = [path.parent, *(path.parent / name for name in _NAMED_FOLDER.findall(text))]
-    named = (folder / name for folder in folders for name in _NAMED_FILE.findall(text))
-    return (path, *dict.fromkeys(each for each in named if each.is_file()))
 
 
-def _parsed(path: Path, kind: str) -> Any:
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        if "repeated name" in str(error):
-            return _without_repeats(path, kind)
-        raise InputError(f"{path}: MuJoCo cannot read this MJCF file of the {kind}: {_said(error)}.") from error
+def _check_world(spec: Any, path: Path, kind: str) -> None:
+    """One thing, of hinges and slides, that nothing ties to the world."""
+    for joint in spec.joints:
+        if joint.type not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+            raise InputError(
+                f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
+                "grippers hinges and slides."
+            )
+    moving = [body.name for body in spec.worldbody.bodies if _has_joint(body)]
+    if len(moving) > 1:
+        raise InputError(
+            f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one."
+        )
+    for equality in spec.equalities:
+        to_body = equality.type in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT)
+        if to_body and (equality.objtype == mujoco.mjtObj.mjOBJ_BODY) and _is_world(equality):
+            raise InputError(
+                f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves."
+            )
 
 
-def _without_repeats(path: Path, kind: str) -> Any:
-    """Of assets that have one name the first, as robosuite takes them."""
-    try:
-        root = ElementTree.fromstring(read_bytes(path, f"MJCF file of the {kind}", _LARGEST_BYTES))
-        seen: set[tuple[str, str | None]] = set()
-        for assets in root.iter("asset"):
-            for each in list(assets):
-                key = (each.tag, each.get("name"))
-                if key in seen and key[1] is not None:
-                    assets.remove(each)
-                seen.add(key)
-        spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    except (ElementTree.ParseError, ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise InputError(f"{path}: MuJoCo cannot read this MJCF file of the {kind}: {_said(error)}.") from error
-    spec.modelfiledir = str(path.parent)
-    return spec
+def check_surroundings(model: Any, path: Path) -> None:
+    """Raise an `InputError` if what stands fast in the file of an arm reaches farther than a base does."""
+    first = int(model.jnt_bodyid[0]) if model.njnt else 0
+    at = model.body_pos[model.body_rootid[first]][:2]
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for geom in range(model.ngeom):
+        touches = model.geom_contype[geom] or model.geom_conaffinity[geom]
+        if not touches or model.body_weldid[model.geom_bodyid[geom]]:
+            continue
+        is_plane = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_PLANE)
+        R = data.geom_xmat[geom].reshape(3, 3)
+        middle = data.geom_xpos[geom] + R @ model.geom_aabb[geom, :3]
+        half = np.abs(R) @ model.geom_aabb[geom, 3:]
+        reach = float(np.linalg.norm(np.abs(middle[:2] - at) + half[:2]))
+        if is_plane or reach > _LARGEST_BASE_M:
+            raise InputError(
+                f"{path}: the geom '{model.geom(geom).name}' stands fast and reaches farther than "
+                f"{_LARGEST_BASE_M:g} m from the arm; remove it, what is around the arm belongs to the scenario."
+            )
 
 
-def _keep_meshes(spec: Any, folder: Path, path: Path, kind: str) -> None:
-    """Meshes that something touches by, each by its whole path; no textures."""
-    used = {geom.meshname for geom in spec.geoms if geom.meshname}
-    for geom in spec.geoms:
-        geom.material = ""
-    for plural in ("materials", "textures", "skins"):
-        for each in list(getattr(spec, plural)):
-            spec.delete(each)
-    meshes = folder / spec.meshdir if spec.meshdir else folder
+def _has_joint(body: Any) -> bool:
+    return bool(body.find_all("joint"))
+
+
+def _is_world(equality: Any) -> bool:
+    return any(name in ("", "world") for name in (equality.name1, equality.name2))
+
+
+def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
+    """Meshes that something touches by."""
+    used, size = {geom.meshname for geom in spec.geoms if geom.meshname}, 0
     for mesh in list(spec.meshes):
-        name = mesh.name or Path(mesh.file).stem
-        if name not in used:
+        if mesh.name not in used:
             spec.delete(mesh)
         elif mesh.file:
-            file = meshes / mesh.file
+            file = Path(mesh.file)
             if not file.is_file():
                 raise InputError(
                     f"{path}: the mesh file {one_line(str(file), _LONGEST)} of the {kind} is missing; bring it there."
                 )
-            mesh.name, mesh.file = name, str(file.resolve())
-    spec.meshdir = ""
+            size += checked_size(file, kind)
+    if size > MOST_MESH_BYTES:
+        raise InputError(
+            f"{path}: the meshes that touch something have {size / 1e6:.0f} MB; {MOST_MESH_BYTES / 1e6:g} are the most."
+        )
 
 
 def _said(error: Exception) -> str:
