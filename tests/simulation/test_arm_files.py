@@ -95,7 +95,7 @@ def test_what_stands_around_an_arm_is_refused_and_its_base_is_not(tmp_path: Path
     """A base may stand in the world itself, as that of Menagerie's rizon4."""
     text = (ARMS / "ur5e_primitive.xml").read_text()
     (tmp_path / "arm.xml").write_text(text.replace(WORLD, f"{WORLD}{beside}", 1))
-    with pytest.raises(InputError, match="reaches farther than 0.5 m from the arm; remove it"):
+    with pytest.raises(InputError, match=r"reaches farther than 0\.5 m from the arm; remove it"):
         check_surroundings(compiled(load_model(tmp_path / "arm.xml", "arm"), tmp_path), tmp_path)
     (tmp_path / "arm.xml").write_text(text.replace(WORLD, f'{WORLD}<geom size="0.1"/>', 1))
     check_surroundings(compiled(load_model(tmp_path / "arm.xml", "arm"), tmp_path), tmp_path)
