@@ -78,16 +78,22 @@ class KeptDemonstrations:
             return _made(settings, scene)
         key = demonstration_key(settings, scene)
         path = self.folder / f"{key}.json"
+        said = ""
         if os.path.lexists(path):
             try:
                 return _read(path, key, scene)
             except InputError as error:
-                _say(f"{str(error).rstrip('.')}; the demonstration is made again.")
+                said = f"{str(error).rstrip('.')}; the demonstration is made again"
         made = _made(settings, scene)
         try:
             write_whole(path, _written(key, made))
         except OSError as error:
-            _say(f"{path}: the demonstration cannot be kept ({error.strerror or error}).")
+            why = error.strerror or error
+            said = (
+                f"{said}, and cannot be kept ({why})" if said else f"{path}: the demonstration cannot be kept ({why})"
+            )
+        if said:
+            _say(f"{said}.")
         return made
 
 

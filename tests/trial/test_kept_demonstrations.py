@@ -174,6 +174,15 @@ def test_what_cannot_be_kept_is_used_all_the_same(tmp_path: Path, capsys: pytest
     assert "the demonstration cannot be kept (No such file or directory)." in capsys.readouterr().err
 
 
+def test_what_stands_in_the_way_of_a_file_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = KeptDemonstrations(tmp_path)
+    (tmp_path / f"{demonstration_key(SPEC, scene())}.json").mkdir()
+    assert kept.recording(SPEC, scene()).demonstration.code == "ok"
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert complaint.endswith("the demonstration is made again, and cannot be kept (Is a directory).\n")
+
+
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for wrong in (tmp_path / "file", tmp_path / "file" / "folder", Path("a\0b")):
