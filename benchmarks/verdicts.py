@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from apo_bench.assembly.goals import Layout
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.geometry import pose
@@ -119,13 +120,14 @@ def compared(row: Row) -> Compared:
 
 def too_wide(scenario: Scenario, row: Row) -> tuple[Wide, float] | None:
     """The contact that was the farthest too far apart at the end by the old rule, and its largest |e|, [mm]."""
-    goals = truth(row["scenario"], row["seed"], row["salt"], row["clearance_mm"])
-    wides = wide_contacts(row["scenario"], goals.tobytes(), row["clearance_mm"], row["thresholds"]["fit_margin_mm"])
+    true_goals = truth(row["scenario"], row["seed"], row["salt"], row["clearance_mm"]).goals
+    margin_mm = row["thresholds"]["fit_margin_mm"]
+    wides = wide_contacts(row["scenario"], row["seed"], row["salt"], row["clearance_mm"], margin_mm)
     if not wides or row["reached"] is None:
         return None
     poses = {part: posed(numbers) for part, numbers in row["reached"].items()}
     assembly = scenario.assembly
-    true = placements(assembly, poses, goals)[-1]
+    true = placements(assembly, poses, true_goals)[-1]
     seen = {
         part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
         for part, T in poses.items()
@@ -136,17 +138,16 @@ def too_wide(scenario: Scenario, row: Row) -> tuple[Wide, float] | None:
 
 
 @lru_cache(maxsize=4096)
-def truth(scenario: str, seed: int, salt: Any, clearance_mm: float) -> Array:
-    """The true goals of a seed, (n, 4, 4), [m]."""
-    return np.array(draw_layout(load_scenario(scenario), stream(seed, LAYOUT, salt), clearance_mm).goals)
+def truth(scenario: str, seed: int, salt: Any, clearance_mm: float) -> Layout:
+    """Where the parts of a seed start and belong."""
+    return draw_layout(load_scenario(scenario), stream(seed, LAYOUT, salt), clearance_mm)
 
 
 @lru_cache(maxsize=4096)
-def wide_contacts(name: str, goals: bytes, clearance_mm: float, margin_mm: float) -> tuple[Wide, ...]:
+def wide_contacts(name: str, seed: int, salt: Any, clearance_mm: float, margin_mm: float) -> tuple[Wide, ...]:
     """The contacts that stand at the end and that the play of all faces together lets farther apart."""
-    scenario = load_scenario(name)
-    assembly = scenario.assembly
-    history = placements(assembly, scenario.start, np.frombuffer(goals).reshape(-1, 4, 4))
+    assembly, layout = load_scenario(name).assembly, truth(name, seed, salt, clearance_mm)
+    history = placements(assembly, layout.start, layout.goals)
     away, found = fixtures(assembly), []
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:

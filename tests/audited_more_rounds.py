@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly.topology import Operation
-from apo_bench.scenario.file import load_scenario
+from apo_bench.parts import load_part
 from tests.audited_rounds import DOWN
 from tests.audited_states import HALF_Z, Seen
 from tests.end_states import END, moved, put, shift
@@ -28,18 +28,30 @@ from tests.rounds import (
 from tests.scenes import Scene, block, mm, scene, table, touch
 
 
-def shipped(name: str) -> Scene:
-    """A scenario of the package at its nominal goals."""
-    found = load_scenario(name)
-    return Scene(found.assembly, found.start, np.array(found.goals))
+def of_parts(names: dict[str, str], *operations: Operation, at: list[np.ndarray]) -> Scene:
+    """Parts of the package, by their names here."""
+    parts = [replace(load_part(file), name=name) for name, file in names.items()]
+    return scene([table(), *parts], operations, at)
 
 
 def sunk_slide() -> Scene:
-    return shipped("dovetail")
+    """A slide in a dovetail whose floor and walls recede."""
+    return of_parts(
+        {"base": "dovetail_base", "slide": "dovetail_slide"},
+        Operation("base", touch("base", "table", "bottom-top")),
+        Operation("slide", touch("slide", "base", "bottom-floor", "lean_n-slot_n", "lean_p-slot_p")),
+        at=[mm(0, 0, 0), mm(0, 0, 10)],
+    )
 
 
 def wedge_under_roof() -> Scene:
-    return shipped("wedge_under_roof")
+    """A wedge on the floor, at the wall and under the leaning roof of one part."""
+    return of_parts(
+        {"roof": "lean_to", "wedge": "wedge"},
+        Operation("roof", touch("roof", "table", "bottom-top")),
+        Operation("wedge", touch("wedge", "roof", "bottom-floor", "side_p-wall", "slope-under")),
+        at=[mm(0, 0, 0), mm(0, 5, 10)],
+    )
 
 
 def fixed(built: Scene, *parts: str) -> Scene:

@@ -86,8 +86,8 @@ def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], asked: int, at: bytes, 
     touches = [_touch(*pair, T, clearance_mm) for pair in faces]
     rows = np.concatenate([_rows(touch) for touch in touches])
     limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
-    widest = [_widest(row, rows, limits) for row in _rows(touches[asked])]
-    return round(max(widest), _DIGITS) if widest and np.isfinite(widest).all() else None
+    widest = _widest(_rows(touches[asked]), rows, limits)
+    return round(widest, _DIGITS) if np.isfinite(widest) else None
 
 
 def _rows(touch: _Touch) -> Array:
@@ -95,12 +95,19 @@ def _rows(touch: _Touch) -> Array:
     return np.concatenate([touch.normals, np.cross(1e3 * touch.points, touch.normals) / _LEVER_MM], axis=1)
 
 
-def _widest(row: Array, rows: Array, limits: Array) -> float:
-    """The most that a motion opens by one row, if no row closes by more than its limit; infinite without bound."""
+def _widest(own: Array, rows: Array, limits: Array) -> float:
+    """The most that a motion opens by one of its own rows, (k, 6), if no row closes by more than its limit; infinite
+    if one has no bound.
+
+    One program for all own rows, each with a motion of its own, since a call takes longer than what it solves.
+    """
     from scipy.optimize import linprog
 
-    found = linprog(-row, -rows, limits, bounds=[(None, None)] * 6)
-    return -float(found.fun) if found.success else np.inf
+    if not len(own):
+        return np.inf
+    together = np.kron(np.eye(len(own)), -rows)
+    found = linprog(-own.ravel(), together, np.tile(limits, len(own)), bounds=[(None, None)] * own.size)
+    return float((own * found.x.reshape(own.shape)).sum(axis=1).max()) if found.success else np.inf
 
 
 def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _Touch:
