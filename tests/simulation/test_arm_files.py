@@ -29,6 +29,14 @@ def with_gripper(folder: Path, arm: str) -> Path:
     return path
 
 
+def test_a_model_that_is_a_link_to_itself_is_refused(tmp_path: Path) -> None:
+    path = with_gripper(tmp_path, "")
+    (tmp_path / "arm.xml").unlink()
+    (tmp_path / "arm.xml").symlink_to(tmp_path / "arm.xml")
+    with pytest.raises(InputError, match="Too many levels of symbolic links"):
+        read_arm(path)
+
+
 ATTACKS = {
     "an include of a pipe": (END, '<include file="pipe"/></mujoco>', "a pipe was given"),
     "an include of itself": (END, '<include file="arm.xml"/></mujoco>', "arm.xml: the file is included twice"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -57,9 +58,9 @@ def read_described(said: ArmDescription) -> Arm:
 
 def _is_ours(said: ArmDescription) -> bool:
     """Whether the models come with the package."""
-    ours = folder("assets").resolve()
+    ours = os.path.realpath(folder("assets"))
     models = (said.mjcf, said.gripper.mjcf or said.mjcf)
-    return all(each.resolve().is_relative_to(ours) for each in models)
+    return all(Path(os.path.realpath(each)).is_relative_to(ours) for each in models)
 
 
 def build_arm(said: ArmDescription) -> Arm:
