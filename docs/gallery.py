@@ -1,0 +1,52 @@
+"""Draw the finished assembly of every scenario on one sheet: `python docs/gallery.py` (half a minute, no display needed)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.simulation.scene.render import camera_view, picture
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.stages import record_demonstration
+
+SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
+SIZE, COLUMNS, SEED = (600, 500), 5, 0
+AZIMUTH_DEG = {"wedge_under_roof": -35.0}
+"""From where it is looked at, if not from the usual side."""
+
+
+def main() -> None:
+    names = scenario_names()
+    figure, axes = plt.subplots(-(-len(names) // COLUMNS), COLUMNS, figsize=(13.0, 7.4), layout="constrained")
+    for axis in axes.flat:
+        axis.axis("off")
+    for axis, name in zip(axes.flat, names, strict=False):
+        axis.imshow(finished(name), interpolation="antialiased")
+        axis.set_title(name, fontsize=13, fontweight="bold", pad=5)
+    figure.savefig(SHEET, dpi=110)
+    plt.close(figure)
+
+
+def finished(name: str) -> NDArray[np.uint8]:
+    """What stands on the table when a careful person is done, as large as it fits."""
+    scene = build_scene(load_scenario(name))
+    scene.shown.model.vis.headlight.ambient[:] = 0.4
+    recording = record_demonstration(scene, 0.0, SEED)
+    poses = recording.demonstration.final
+    moved = np.array([poses[part][:3, 3] for part in scene.shown.free])
+    middle = (moved.min(axis=0) + moved.max(axis=0)) / 2
+    extent = float(np.linalg.norm(moved.max(axis=0) - moved.min(axis=0)))
+    azimuth = AZIMUTH_DEG.get(name, 128.0)
+    return picture(scene, poses, *SIZE, camera_view(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
+
+
+if __name__ == "__main__":
+    main()
