@@ -1,4 +1,4 @@
-"""Draw the finished assembly of every scenario on one sheet: `python docs/gallery.py` (half a minute, no display needed)."""
+"""Draw the finished assembly of every scenario on one sheet: `python docs/gallery.py` (half a minute)."""
 
 from __future__ import annotations
 
@@ -41,9 +41,10 @@ def finished(name: str) -> NDArray[np.uint8]:
     scene.shown.model.vis.headlight.ambient[:] = 0.4
     recording = record_demonstration(scene, 0.0, SEED)
     poses = recording.demonstration.final
-    moved = np.array([poses[part][:3, 3] for part in scene.shown.free])
-    middle = (moved.min(axis=0) + moved.max(axis=0)) / 2
-    extent = float(np.linalg.norm(moved.max(axis=0) - moved.min(axis=0)))
+    standing = {**{part: scene.scenario.start[part] for part in scene.shown.fixed if part != "table"}, **poses}
+    at = np.array([pose[:3, 3] for part, pose in standing.items() if part != "table"])
+    middle = (at.min(axis=0) + at.max(axis=0)) / 2
+    extent = float(np.linalg.norm(at.max(axis=0) - at.min(axis=0)))
     azimuth = AZIMUTH_DEG.get(name, 128.0)
     return picture(scene, poses, *SIZE, camera_view(middle, 0.22 + 1.15 * extent, azimuth, -26.0))
 
