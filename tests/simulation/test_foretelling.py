@@ -27,7 +27,7 @@ def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:
 
     assert said(0.25).code == "ok"
     tight = said(0.05)
-    assert (tight.operation, tight.code) == (2, "tip_error")
+    assert (tight.operation, tight.code) == (1, "tip_error")
     assert tight.size_mm == pytest.approx(0.09, abs=0.03)
     assert all(move.sag[2, 3] < 0.0 and (move.margin_deg or 0.0) > 5.0 for move in moves)
     far = pose.at((0.9, 0.0, 0.0), (0.0, 0.0, 0.0))
