@@ -85,7 +85,8 @@ class ReplayResult:
     reached: Reached
     outcome: Outcome
     peak_force_n: float
-    """Largest net contact force on a part that the robot held (the gripper's own forces excluded)."""
+    """Largest net contact force on a part that the robot held (the gripper's own forces excluded), behind a low-pass
+    filter of 20 ms, [N]."""
     sim_seconds: float
     timeline: tuple[tuple[Step, float], ...] = ()
     """Each step that was finished, with the simulated time at which it was over, [s]."""

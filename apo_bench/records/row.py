@@ -218,7 +218,7 @@ class Row(TypedDict, total=False):
     pose_error_free_mm: _Size | None
     """Root mean square distance of where the parts ended from the truth, along directions left free [mm]."""
     peak_force_n: _Size | None
-    """Largest contact force that the gripper met [N]."""
+    """Largest contact force on what was held, without the gripper's, behind a low-pass filter of 20 ms [N]."""
     moved_in_hand: list[MovedInHand] | None
     """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
     sim_seconds: _Size | None

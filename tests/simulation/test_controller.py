@@ -83,7 +83,7 @@ def test_the_true_layout_is_assembled(name: str, request: pytest.FixtureRequest)
     assert result.outcome.code == "ok"
     assert verdict.success
     assert verdict.loose_success
-    assert 1.0 < result.peak_force_n < 60.0
+    assert 1.0 < result.peak_force_n < 10.0, "parts of 50 to 80 g are put down on a guard of three times their weight"
     assert [each.operation for each in result.in_hand] == list(range(len(scene.scenario.assembly)))
     most = np.max([(each.moved_m, each.moved_rad) for each in result.in_hand], axis=0)
     assert 0.0 < most[0] < 2e-3, "what is put in is pushed along the pads"

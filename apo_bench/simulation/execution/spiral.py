@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.low_pass import LowPass
 from apo_bench.simulation.robot.robot import Guard
 
 RADIUS_M, PITCH_M = 0.002, 0.00035
@@ -30,16 +31,16 @@ _PATIENCE, _DOWN_S = 3.0, 1.0
 
 
 class _Felt:
-    """The force on the part, averaged: called once a physics step. Plain numbers, since arrays this small are slow."""
+    """The force on the part, averaged: called once a physics step."""
 
     def __init__(self, guard: Guard, step_s: float) -> None:
-        self._way, self._part, self._force = guard.way.tolist(), step_s / _FELT_S, [0.0, 0.0, 0.0]
+        self._way, self._step_s, self._averaged = guard.way.tolist(), step_s, LowPass(_FELT_S)
 
     def __call__(self, force: Sequence[float]) -> tuple[float, list[float]]:
         """How hard it is pushed back, [N], and the rest of the force, across, (3,), [N]."""
-        self._force = [mean + (now - mean) * self._part for mean, now in zip(self._force, force, strict=True)]
-        push = -sum(f * w for f, w in zip(self._force, self._way, strict=True))
-        return push, [f + push * w for f, w in zip(self._force, self._way, strict=True)]
+        averaged = self._averaged(force, self._step_s)
+        push = -sum(f * w for f, w in zip(averaged, self._way, strict=True))
+        return push, [f + push * w for f, w in zip(averaged, self._way, strict=True)]
 
 
 class Spiral:

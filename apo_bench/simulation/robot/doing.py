@@ -15,7 +15,7 @@ class Doing(NamedTuple):
     macro: str
     """The macros of the motion, or the stage where it is none: `pick`, `carry`, `insert-into, move-to-bottom`."""
     force_n: float
-    """On what is in the hand, [N]; 0 with an empty hand."""
+    """On what is in the hand, [N], as the sensor at the wrist shows it; 0 with an empty hand."""
     undoes: bool = False
     """Whether the operation is undone, to be done again later."""
 

@@ -20,6 +20,7 @@ from apo_bench.simulation.robot.doing import Doing, Inspector
 from apo_bench.simulation.robot.fast_forward import fast_forward, take_along
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.hold_watch import HoldWatch
+from apo_bench.simulation.robot.low_pass import WRIST_S, LowPass
 from apo_bench.simulation.robot.near import Moving, clear, near_spans
 from apo_bench.simulation.robot.opening import fingers_of
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
@@ -80,6 +81,7 @@ class Robot:
         self.stage, self.macro = "plan", ""
         self.step: Step | None = None
         self._held: tuple[str, ...] = ()
+        self._wrist = LowPass(WRIST_S)
         self.hold_watch = HoldWatch()
         self._carried: Carried | None = None
         self._handled: int | None = None
@@ -171,12 +173,12 @@ class Robot:
         """
         q, T, offset, passed = self.q, self.T, np.zeros(3), 0
         moves = np.array([self._across(q, T, axis) for axis in np.eye(3)])
-        force, ctrl, drives = self._feel(), self.data.ctrl, self._drives
+        force, ctrl, drives = self._net_force(), self.data.ctrl, self._drives
         while (asked := law(force)) is not None:
             offset, passed = asked, passed + 1
             ctrl[drives] = q + offset @ moves + self._off
             mujoco.mj_step(self.model, self.data)
-            force = self._feel()
+            force = self._feel(self.step_s)
             if passed % self._every == 0:
                 self._look()
         self.q, self.T = q + offset @ moves, shifted(T, offset, 1.0)
@@ -193,12 +195,21 @@ class Robot:
         steps = round(seconds / self.step_s)
         for done in range(0, steps, self._every):
             n = min(self._every, steps - done)
-            with timestep(self.model, self.step_s / parts), unfelt(self.model):
-                mujoco.mj_step(self.model, self.data, parts * n - 1)
             with timestep(self.model, self.step_s / parts):
-                mujoco.mj_step(self.model, self.data)
+                self._stand_still(parts * n, self.step_s / parts)
             if n == self._every:
                 self._look()
+
+    def _stand_still(self, steps: int, step_s: float) -> None:
+        """Step without a new command; forces are felt at every step while something is held, else after the last."""
+        if self._held:
+            for _ in range(steps):
+                mujoco.mj_step(self.model, self.data)
+                self._feel(step_s)
+            return
+        with unfelt(self.model):
+            mujoco.mj_step(self.model, self.data, steps - 1)
+        mujoco.mj_step(self.model, self.data)
 
     def stand(self, most_s: float = 0.1) -> None:
         """Stand still until the joints and the fingers rest, at most so long, [s]."""
@@ -241,14 +252,14 @@ class Robot:
 
     def memory(self) -> tuple[Any, ...]:
         """What the controller knows, apart from the physics; for `remember`."""
-        felt = (self.peak_force_n, self.left_out_s, self.hold_watch)
+        felt = (self.peak_force_n, self.left_out_s, self.hold_watch, self._wrist.force)
         return (self.q, self.T, self.stage, self._held, self._handled, *felt)
 
     def remember(self, memory: tuple[Any, ...]) -> None:
         """Go on from where a `memory` was made, once the physics are where they were then."""
         self.q, self.T, self.stage, held, self._handled, *felt = memory
-        self.peak_force_n, self.left_out_s, self.hold_watch = felt
         self.hold(*held)
+        self.peak_force_n, self.left_out_s, self.hold_watch, self._wrist.force = felt
 
     def load(self) -> float:
         """The weight that the gripper feels, [N]: of the held part and of what really hangs on it."""
@@ -257,7 +268,7 @@ class Robot:
     def hold(self, *parts: str) -> None:
         """Say which parts are in the hand: the held one and what it carries, or none."""
         free = self.scene.work.free
-        self._held = parts
+        self._held, self._wrist = parts, LowPass(WRIST_S)
         self._net = np.zeros((3, self.model.nsensordata))
         for i in map(free.index, parts):
             self._net[:, 3 * (len(free) + i) : 3 * (len(free) + i) + 3] += np.eye(3)
@@ -320,7 +331,9 @@ class Robot:
         return clear(self.scene, self.data, self._moving(max(to, self.opening())), (), self.T)
 
     def _pass(self, seconds: float) -> None:
+        """Let time pass in which nothing is felt."""
         self.data.time += seconds
+        self._wrist((0.0, 0.0, 0.0), min(seconds, WRIST_S))
         self.left_out_s += seconds
 
     def _reached(self, q: Array | None) -> Array:
@@ -341,7 +354,7 @@ class Robot:
         for i, row in enumerate(rows, start=1):
             ctrl[:] = row
             step(model, data)
-            x, y, z = feel()
+            x, y, z = feel(self.step_s)
             if -(x * a + y * b + z * c) > newton:
                 self._look()
                 return i
@@ -350,16 +363,22 @@ class Robot:
         return len(targets)
 
     def _run_free(self, rows: Array) -> None:
-        """Step through commands (n, controls) that no guard watches: forces are felt once a tick, when it looks."""
+        """Step through commands (n, controls) that no guard watches: an empty hand feels once a tick, when it looks."""
         model, data, step, ctrl = self.model, self.data, mujoco.mj_step, self.data.ctrl
         for i in range(0, len(rows), self._every):
             tick = rows[i : i + self._every]
-            with unfelt(model):
-                for row in tick[:-1]:
+            if self._held:
+                for row in tick:
                     ctrl[:] = row
                     step(model, data)
-            ctrl[:] = tick[-1]
-            step(model, data)
+                    self._feel(self.step_s)
+            else:
+                with unfelt(model):
+                    for row in tick[:-1]:
+                        ctrl[:] = row
+                        step(model, data)
+                ctrl[:] = tick[-1]
+                step(model, data)
             if len(tick) == self._every:
                 self._look()
 
@@ -370,7 +389,6 @@ class Robot:
         if self._carried is not None:
             tip = self.scene.kinematics.forward(self.data.qpos[self._qpos])
             self._carried = steadied(self.scene.work, self.data, tip, self._carried)
-        self._feel()
         if self._on_arm_flat @ self._on_arm_flat > _COLLISION_N**2:
             struck, force = self._hardest_blow()
             if force > _COLLISION_N:
@@ -378,20 +396,25 @@ class Robot:
         if self._inspect is not None:
             said = self.macro if self.stage == "attach" else self.stage
             k, undoes = self.step or (None, False)
-            self._inspect(self.data, Doing(k, said, float(np.linalg.norm(self._felt)), undoes))
+            self._inspect(self.data, Doing(k, said, math.hypot(*self._wrist.force), undoes))
         elif self.watch is not None:
             self.watch(self.data)
 
-    def _feel(self) -> list[float]:
+    def _feel(self, step_s: float) -> list[float]:
+        """The net force in the last step, (3,) world, [N]; the largest that the sensor shows is remembered."""
+        force = self._net_force()
+        shown = math.hypot(*self._wrist(force, step_s))
+        if shown > self.peak_force_n:
+            self.peak_force_n = shown
+        return force
+
+    def _net_force(self) -> list[float]:
         """The net force of everything but the gripper on what is in the hand, (3,) world, [N].
 
-        What the parts of a group exert on each other cancels. The largest so far is remembered.
+        What the parts of a group exert on each other cancels.
         """
-        x, y, z = f = np.dot(self._net, self._forces, self._felt).tolist()
-        size = math.sqrt(x * x + y * y + z * z)
-        if size > self.peak_force_n:
-            self.peak_force_n = size
-        return f
+        net: list[float] = np.dot(self._net, self._forces, self._felt).tolist()
+        return net
 
     def _hardest_blow(self) -> tuple[str, float]:
         """The part that the arm strikes hardest without handling it, and the force, [N]."""

@@ -1,0 +1,70 @@
+"""The force that is reported is that of a sensor, not of a step of the simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Plan
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.robot.low_pass import WRIST_S, LowPass
+from apo_bench.simulation.robot.paths import shifted, smooth
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.scene.scene import Scene, build_scene
+
+
+@pytest.mark.parametrize("step_s", [0.001, 0.0005, 0.0001])
+def test_a_blow_shows_its_impulse_whatever_the_step(step_s: float) -> None:
+    """0.06 Ns in one step, 60 N at 1 ms, are 3 N behind 20 ms."""
+    wrist = LowPass(WRIST_S)
+    assert wrist([0.0, 0.0, 0.06 / step_s], step_s)[2] == pytest.approx(3.0)
+
+
+def test_a_steady_push_is_shown_as_it_is_and_fades() -> None:
+    wrist = LowPass(WRIST_S)
+    for _ in range(20):
+        wrist([1.0, -2.0, 5.0], 0.001)
+    # (1 - 1/20)^20 = 0.358 are missing after one time constant.
+    assert wrist.force == pytest.approx([0.642, -1.283, 3.208], abs=2e-3)
+    for _ in range(200):
+        wrist([1.0, -2.0, 5.0], 0.001)
+    assert wrist.force == pytest.approx([1.0, -2.0, 5.0], abs=1e-3)
+    assert wrist([0.0, 0.0, 0.0], WRIST_S) == [0.0, 0.0, 0.0]
+
+
+def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = draw_layout(tower.scenario, np.random.default_rng([2, 0]), tower.clearance_mm)
+    plan, single = Plan(tower.scenario.assembly, layout.start, layout.goals), [0.0]
+    net_force = Robot._net_force
+
+    def look(robot: Robot) -> list[float]:
+        force = net_force(robot)
+        single[0] = max(single[0], math.hypot(*force))
+        return force
+
+    monkeypatch.setattr(Robot, "_net_force", look)
+    peaks, singles = [], []
+    for scene in (tower, build_scene(tower.scenario, timestep_s=0.0005)):
+        single[0] = 0.0
+        peaks.append(replay(plan, scene, fidelity="contact").peak_force_n)
+        singles.append(single[0])
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.25)
+    assert singles[1] > 1.3 * singles[0]
+    assert max(peaks) < 0.25 * min(singles)
+
+
+def test_what_is_held_is_felt_at_every_step_and_the_empty_hand_feels_nothing(tower: Scene) -> None:
+    """Also where no guard watches: the stick is said to be in the hand while it lies on the table."""
+    robot = Robot(tower, tower.scenario.start)
+    robot.wait(0.2)
+    robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.02), 0.2))
+    assert robot.peak_force_n == 0.0
+    robot.hold("stick")
+    weight = 9.81 * float(tower.work.model.body_subtreemass[tower.work.body["stick"]])
+    robot.wait(0.02)
+    assert robot.peak_force_n == pytest.approx(weight * (1 - 0.95**20), rel=0.02)
+    robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.02), 0.2))
+    assert robot.peak_force_n == pytest.approx(weight, rel=0.02)
