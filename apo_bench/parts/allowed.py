@@ -16,6 +16,11 @@ _FILE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*\.stl")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
+def _words(text: str) -> list[str]:
+    """Words between spaces, as MuJoCo reads them: other alphabets have spaces too, which are letters to it."""
+    return text.split() if text.isascii() else [text]
+
+
 class NumbersRule(NamedTuple):
     """Numbers with spaces between them."""
 
@@ -26,7 +31,7 @@ class NumbersRule(NamedTuple):
     unit: str = ""
 
     def allows(self, text: str) -> bool:
-        words = text.split()
+        words = _words(text)
         if not self.least <= len(words) <= len(self.spans) or not all(map(_NUMBER.fullmatch, words)):
             return False
         return all(low <= float(word) <= high for word, (low, high) in zip(words, self.spans, strict=False))
@@ -66,7 +71,7 @@ class CornersRule(NamedTuple):
     most: int
 
     def allows(self, text: str) -> bool:
-        words = text.split()
+        words = _words(text)
         if len(words) % 3 or not 12 <= len(words) <= 3 * self.most or not all(map(_NUMBER.fullmatch, words)):
             return False
         return all(abs(float(word)) <= _LARGEST_M for word in words)
