@@ -17,9 +17,8 @@ from apo_bench.scenario.scenario import Scenario
 def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: float | None = None) -> Layout:
     """A consistent layout: every contact of the scenario stays closed.
 
-    Uniform draws in this order: x, y and yaw of the site, then one for each shift and one for each turn of
-    the scenario. Parts start where
-    the scenario says, in the world; only fixed parts that follow the site move with it.
+    Uniform draws in this order: x, y and yaw of the site, then one for each shift and one for each turn of the
+    scenario. Parts start where the scenario says, in the world; only fixed parts that follow the site move with it.
 
     Args:
         clearance_mm: Of the parts that are used (none: the scenario's): a part that stands on a fit face at its start

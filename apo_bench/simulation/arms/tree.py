@@ -179,8 +179,8 @@ def _check_option(path: Path, option: Element) -> None:
     flags = {key for child in option for key in child.attrib}
     for key in (*sorted(set(option.attrib) - OPTIONS), *sorted(flags - FLAGS)):
         _refuse(path, f"<option> has {key[:60]}, which an arm may not say: the scene says how it is simulated")
-    for key in ("density", "viscosity", "wind", "magnetic"):
-        if any(word.strip("0.+-") for word in option.get(key, "").split()) and key != "magnetic":
+    for key in ("density", "viscosity", "wind"):
+        if any(word.strip("0.+-") for word in option.get(key, "").split()):
             _refuse(path, f"<option> has {key}=, which an arm may not say: it stands in still air")
 
 
