@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Layout
+from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.geometry import pose
@@ -26,7 +27,6 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.symmetry import nearest_alike
 from apo_bench.judging.finished import fixtures
-from apo_bench.judging.play import joint_play_mm
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.scenario.file import load_scenario

@@ -9,12 +9,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.kinds import ContactKind, contact_kind, play_mm
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.mate import Mate, mate
 from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.solid import Face
-from apo_bench.judging.play import joint_play_mm
 from apo_bench.records.thresholds import Thresholds
 
 Moment = Literal["made", "end"]

@@ -23,6 +23,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
+from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.kinds import contact_kind, play_mm
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation
@@ -259,8 +260,12 @@ def _fit(doing: _Doing, how: Attach | None, clearance_mm: float, thresholds: Thr
             a, b = map(doing.alone.face_of, contact)
             play = play_mm(a, b, clearance_mm)
             allowed = thresholds.support_mm if play is None else play + thresholds.fit_margin_mm
-            way = None if how is None else _way(doing, how)
-            found.append((1e3 * _misfit_m(doing, contact, way), allowed))
+            deep_m, apart_m = _misfits_m(doing, contact, None if how is None else _way(doing, how))
+            found.append((1e3 * deep_m, allowed))
+            if 1e3 * apart_m > allowed:
+                play = joint_play_mm(doing.alone, contact, 0, doing.planned, clearance_mm)
+                allowed = allowed if play is None else max(allowed, play + thresholds.fit_margin_mm)
+            found.append((1e3 * apart_m, allowed))
     size, allowed = max(found, key=lambda each: each[0] - each[1])
     return Measure(k, "fit", size, allowed)
 
@@ -279,17 +284,22 @@ def _tip(
     yield Measure(doing.operation, "tip", off.size + move.beside_mm, off.allowed)
 
 
-def _misfit_m(doing: _Doing, contact: Contact, way: Array | None) -> float:
-    """The largest |e| of a contact across a way; of round faces how far the axes are apart, across it."""
+def _misfits_m(doing: _Doing, contact: Contact, way: Array | None) -> tuple[float, float]:
+    """How deep and how far apart a contact is across a way at most; of round faces, twice, how far apart the axes are,
+    across it.
+    """
     a, b = map(doing.alone.face_of, contact)
     if contact_kind(a, b) not in ("plane on plane", "shaft on plane"):
         lie = between(doing.alone, contact, doing.planned)
         if way is None:
-            return lie.gap_m
+            return lie.gap_m, lie.gap_m
         beside = float(np.linalg.norm(lie.off - np.outer(lie.off @ way, way), axis=1).max())
-        return beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
+        off = beside if abs(lie.axis @ way) >= _ACROSS else max(beside, abs(lie.rise_m) * lie.sine)
+        return off, off
     e, n = residual(doing.alone, contact, doing.planned)
-    return float(np.abs(e).max()) if way is None or abs(n @ way) < _ACROSS else 0.0
+    if way is not None and abs(n @ way) >= _ACROSS:
+        return 0.0, 0.0
+    return max(0.0, -float(e.min())), max(0.0, float(e.max()))
 
 
 def _side_mm(doing: _Doing) -> float:

@@ -10,12 +10,12 @@ import numpy as np
 
 from apo_bench.assembly.goals import Layout
 from apo_bench.assembly.graph import Arc, Graph, relation_graph
+from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.touching import touched_contacts
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.states import classify
 from apo_bench.judging.finished import fixtures
-from apo_bench.judging.play import joint_play_mm
 from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario, Turn
 from apo_bench.show.axes import holds_axis

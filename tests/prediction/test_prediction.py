@@ -19,6 +19,7 @@ from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.prediction.resting import is_support, residual, resting_poses
 from apo_bench.records.thresholds import Thresholds
+from apo_bench.scenario.file import load_scenario
 from tests import rounds, scenes
 from tests.scenes import touch
 
@@ -303,6 +304,18 @@ def test_round_and_tilted_parts_that_are_planned_wrongly(
     found = said(scene, off(scene, operation, T), round_ways(name))
     assert found.code == code
     assert found.size_mm == pytest.approx(size_mm, abs=1e-3)
+
+
+@pytest.mark.parametrize(("low_mm", "fails"), [(0.0, True), (0.1, True), (0.25, False)])
+def test_walls_may_be_apart_by_the_play_of_all_faces_together(low_mm: float, fails: bool) -> None:
+    """As the judge has it: a slide that lies lower on its receded floor has more room between its leaning walls."""
+    scenario = load_scenario("dovetail")
+    goals = scenario.goals.copy()
+    goals[-1] = goals[-1] @ scenes.mm(0, 0.5, -low_mm)
+    found = predict(
+        Plan(scenario.assembly, scenario.start, goals), scenario.clearance_mm, scenario.thresholds, scenario.attach
+    )
+    assert found.fails == fails
 
 
 def test_a_shaft_comes_to_rest_on_both_sides_of_its_groove() -> None:

@@ -175,3 +175,15 @@ def test_what_takes_too_much_or_ends_its_process_is_one_sentence(
     path = with_gripper(tmp_path, (ARMS / "ur5e_primitive.xml").read_text())
     with pytest.raises(InputError, match=words):
         read_arm(path)
+
+
+def test_a_gripper_that_is_unstable_leaves_no_log_in_the_users_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = with_gripper(tmp_path, (ARMS / "ur5e_primitive.xml").read_text())
+    path.write_text(path.read_text().replace("-105", "2147483648"))
+    names = set(os.listdir(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="the gripper is unstable when it is driven"):
+        read_arm(path)
+    assert set(os.listdir(tmp_path)) == names

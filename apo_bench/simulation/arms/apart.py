@@ -17,7 +17,7 @@ from apo_bench.simulation.scene.arm import Arm
 _START = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms.apart import serve; serve()"
 _LIMIT_S, _WALL_S, _LIMIT_BYTES = 60, 180, 4_000_000_000
 _LARGEST_FILE = 100_000
-"""Bytes that MuJoCo may write into its log."""
+"""Bytes that a library may write into a file."""
 
 
 def build_apart(said: ArmDescription) -> Arm:
@@ -48,8 +48,12 @@ def build_apart(said: ArmDescription) -> Arm:
 
 def serve() -> None:
     """Read a description from the standard input, and write what came of it to the standard output, pickled."""
+    import mujoco
+
     from apo_bench.simulation.arms.building import build_arm
 
+    # otherwise MuJoCo writes MUJOCO_LOG.TXT into the user's folder when a stranger's gripper is unstable
+    mujoco.set_mju_user_warning(lambda _: None)
     said: ArmDescription = pickle.loads(sys.stdin.buffer.read())
     out = os.dup(1)
     os.dup2(2, 1)

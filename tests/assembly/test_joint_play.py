@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
@@ -16,7 +17,6 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.overlap import Overlap
 from apo_bench.judging.contacts import ContactJudge
-from apo_bench.judging.play import joint_play_mm
 from apo_bench.prediction.interference import physical_solids
 from apo_bench.records.thresholds import Thresholds
 from apo_bench.scenario.file import load_scenario
