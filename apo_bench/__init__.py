@@ -17,12 +17,9 @@ from typing import Any
 
 import gymnasium
 
-from apo_bench.moved import MovedModules
-
 __version__ = "0.1.0"
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
-sys.meta_path.append(MovedModules())
 
 _EXPORTS = MappingProxyType(
     {
