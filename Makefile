@@ -1,7 +1,7 @@
 # Two commands do everything, on a machine with Python 3.11 or 3.12 and make:
 #   make sweep   set up, run a small benchmark (4 minutes on two cores), print the table, write the report
 #   make test    set up, check style and types, build the documentation, run every test
-# and one the headline of the project (40 trials per cell take some 40 minutes on two cores):
+# and one the headline of the project (40 trials per cell take some two hours on two cores):
 #   make headline [TRIALS=40] [FIDELITY=contact]
 
 PYTHON ?= python3
