@@ -22,7 +22,7 @@ MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: sweep headline test style types walls site compiled test-extras test-cad numeric docs lowest clean
+.PHONY: sweep headline test style types walls site compiled test-extras numeric docs lowest clean
 
 sweep: $(VENV)/.installed
 	$(BIN)/apo-bench sweep benchmarks/demo.toml --trials $(TRIALS) --workers $(WORKERS) --out $(OUT)
@@ -59,13 +59,9 @@ walls: $(VENV)/.installed-dev
 compiled: $(VENV)/.installed-dev
 	@$(BIN)/apo-bench correct stick_in_tower --observation docs/seen.csv --method contact > /dev/null
 
-# the tests that start a Ray cluster
+# the tests that start a Ray cluster or read STEP files
 test-extras: $(VENV)/.installed-dev
 	$(BIN)/pytest -q -m extras $$(grep -rl pytest.mark.extras tests --include=test_*.py)
-
-# the tests that read STEP files, in an environment of their own: the extras cad and cadquery exclude each other
-test-cad: $(VENV)-cad/.installed
-	$(VENV)-cad/bin/pytest -q -m extras tests/cad/test_step.py
 
 # the tests marked numeric, under every other kernel of OpenBLAS, NumPy and Numba that the processor allows
 numeric: $(VENV)/.installed-dev
@@ -80,7 +76,7 @@ lowest: $(BIN)/python
 	$(BIN)/python benchmarks/lowest.py
 
 clean:
-	rm -rf $(VENV) $(VENV)-cad build dist runs .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist runs .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 $(BIN)/python:
 	@$(PYTHON) -c '$(MIN)' || { echo "Python 3.11 or 3.12 is needed; say which with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
@@ -88,11 +84,6 @@ $(BIN)/python:
 
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
 	$(PIP) install --editable .
-	@touch $@
-
-$(VENV)-cad/.installed: pyproject.toml
-	$(PYTHON) -m venv $(VENV)-cad
-	$(VENV)-cad/bin/python -m pip --quiet --disable-pip-version-check install --editable '.[cad]' pytest nbmake hypothesis
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python

@@ -40,7 +40,7 @@ def stated(*lists: list[str]) -> set[str]:
 
 def test_what_is_imported_is_stated_and_what_is_stated_is_imported() -> None:
     extras = PROJECT["optional-dependencies"]
-    optional = stated(*(extras[name] for name in ("fast", "gtsam", "cadquery", "cad", "ray", "view")))
+    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view")))
     assert stated(PROJECT["dependencies"]) == imported() - optional - set(BROUGHT)
     assert optional <= imported() | {BROUGHT[each] for each in set(BROUGHT) & imported()}
     assert {*BROUGHT.values()} <= stated(PROJECT["dependencies"]) | optional

@@ -23,8 +23,6 @@ CORRECTORS = MappingProxyType(
         "snap": "apo_bench.correction.baselines.snap:snap",
         "least-squares": "apo_bench.correction.baselines.least_squares:least_squares",
         "penalty": "apo_bench.correction.baselines.penalty:penalty",
-        "gtsam": "apo_bench.correction.baselines.gtsam_adapter:gtsam",
-        "cadquery": "apo_bench.correction.baselines.cadquery_adapter:cadquery",
     }
 )
 """The correctors that need an observation and nothing else."""

@@ -29,7 +29,7 @@ WAYS = MappingProxyType(
         UNCOMPILED: apo_bench.ContactCorrector(solver=nearest_goals),
         CONTACT: "contact",
         "scipy": "least-squares",
-        "gtsam": "gtsam",
+        "gtsam": "benchmarks.corrector_bench.peers_gtsam:gtsam",
         "pyceres": "benchmarks.corrector_bench.peers_ceres:ceres",
     }
 )

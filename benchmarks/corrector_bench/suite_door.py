@@ -19,7 +19,7 @@ from benchmarks.corrector_bench.runner import process
 
 PEERS = {
     "scipy": "SciPy `trf`: `correct(seen, 'least-squares')`",
-    "gtsam": "GTSAM: `correct(seen, 'gtsam')`",
+    "gtsam": "GTSAM: `correct(seen, 'peers_gtsam:gtsam')`",
     "pyceres": "pyceres: `correct(seen, 'peers_ceres:ceres')`",
 }
 TOGETHER = {"fig2": "<= 0.05", "fig3": "<= 0.07", "fig6": "<= 0.1"}

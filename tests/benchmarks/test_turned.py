@@ -11,8 +11,8 @@ from benchmarks.turned import OURS, SEED, faces_oppose, of_boxes, scenario_of, t
 
 
 def test_every_corrector_of_the_package_is_asked():
-    """`contact-fast` is another name of `contact`; GTSAM and CadQuery are others' solvers."""
-    assert set(OURS) == set(CORRECTORS) - {"contact-fast", "gtsam", "cadquery"}
+    """`contact-fast` is another name of `contact`."""
+    assert set(OURS) == set(CORRECTORS) - {"contact-fast"}
 
 
 def test_nothing_converges_with_faces_that_look_the_same_way():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,10 @@ from tests.cad.brep_made import brep_made, write_step
 from tests.cad.held import hold
 from tests.cad.made import MADE
 
-pytestmark = pytest.mark.extras
-pytest.importorskip("build123d")
+pytestmark = [
+    pytest.mark.extras,
+    pytest.mark.skipif(find_spec("build123d") is None, reason="the extra cad is not installed"),
+]
 EXACT_MM = 1e-6
 
 

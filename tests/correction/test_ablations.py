@@ -39,7 +39,7 @@ def changed(given: Observation, found: Correction) -> set[int]:
     return {k + 1 for k in np.flatnonzero((found.goals != given.goals).any(axis=(1, 2)))}
 
 
-@pytest.mark.parametrize("name", [name for name in CORRECTORS if name not in ("gtsam", "cadquery")])
+@pytest.mark.parametrize("name", CORRECTORS)
 def test_every_corrector_has_a_name_and_refuses_what_was_not_seen(name: str) -> None:
     given = seen("stick_in_tower")
     assert isinstance(correct(given, name), Correction)

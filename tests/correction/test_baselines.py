@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -216,48 +212,3 @@ def test_a_part_falls_onto_the_table_or_is_pushed_out_of_it(height_mm: float) ->
     made = settle(scenes.seen(built, goals))
     assert isinstance(made, np.ndarray)
     assert np.allclose(made[0, :3, 3], built.goals[0, :3, 3], atol=0.05e-3)
-
-
-ADAPTED = """
-from dataclasses import replace
-from typing import Any
-
-import numpy as np
-from apo_bench.correction.correctors import correct
-from apo_bench.assembly.equations import equations
-from tests.correction.test_baselines import noisy
-for name in ("stick_in_tower", "fixture"):
-    seen = noisy(name)
-    {check}
-blind = replace(seen, seen=~seen.seen)
-assert correct(blind, "{package}").sentence == "operation 1 was not seen"
-"""
-AGREES = 'assert np.allclose(correct(seen, "gtsam").goals, correct(seen, "least-squares").goals, atol=1e-7)'
-MATES = """made = correct(seen, "cadquery")
-    assert made.ok
-    standing = np.array([relation.lost is None for relation in seen.assembly.relations()])
-    assert equations(seen.assembly, seen.start, made.goals).gaps(made.goals)[standing].max() < 2e-5"""
-
-
-@pytest.mark.parametrize(("package", "check"), [("gtsam", AGREES), ("cadquery", MATES)])
-def test_adapters_solve_what_they_can_say(package: str, check: str) -> None:
-    """GTSAM finds the optimum of `least-squares`; mates hold at the end. Each in a process of its own."""
-    if find_spec(package) is None:
-        pytest.skip(f"{package} is not installed")
-    code = ADAPTED.format(check=check, package=package)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize("package", ["gtsam", "cadquery"])
-def test_an_adapter_without_its_package_says_what_to_install(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(InputError, match=rf"pip install 'apo_bench\[{package}\]'"):
-        correct(noisy("bridge"), package)
-
-
-@pytest.mark.parametrize(("package", "loaded"), [("gtsam", "casadi"), ("cadquery", "gtsam")])
-def test_adapters_do_not_meet_in_one_process(package: str, loaded: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, loaded, ModuleType(loaded))
-    with pytest.raises(InputError, match="processes of their own"):
-        correct(noisy("bridge"), package)

@@ -323,11 +323,6 @@ def test_parts_of_any_pieces_settle():
     assert made.goals[1, 2, 3] == pytest.approx(truth[1, 2, 3], abs=0.1 * MM)
 
 
-def test_a_message_of_cadquery_says_that_it_knows_flat_contacts_only():
-    with pytest.raises(InputError, match="'cadquery' knows flat contacts"):
-        correct(case("shaft in hole")[0], "cadquery")
-
-
 @pytest.mark.parametrize(
     ("kind", "gap"),
     [

@@ -73,7 +73,6 @@ def test_an_oracle_that_searches_runs_once_per_seed():
 
 def test_methods_that_may_look_are_those_that_can_ask():
     for name in CORRECTORS:
-        if name not in ("gtsam", "cadquery"):
-            assert may_look(name) == isinstance(resolve(name, CORRECTORS, "corrector"), LookingCorrector)
+        assert may_look(name) == isinstance(resolve(name, CORRECTORS, "corrector"), LookingCorrector)
     assert may_look("contact-robust+search")
     assert not any(map(may_look, ("oracle", "none", "search", "mine:correct")))

@@ -1,12 +1,12 @@
-"""A baseline: the same soft contacts and prior as `least-squares`, as a factor graph of GTSAM (Dellaert, 2012).
+"""GTSAM (Dellaert, 2012) as a corrector of somebody's own: contacts and prior of `least-squares` as a factor graph.
 
 One `Pose3` per operation; a `PriorFactorPose3` with its stated covariance at what was seen; one `CustomFactor` per
 contact ever made, with the face contact equations, their Jacobian and a standard deviation of `CONTACT_M`;
 Levenberg-Marquardt with multifrontal QR, begun at what was seen, `TURNS` turns at most. GTSAM writes a twist with the
 rotation first, and moves a pose by the same body twist as here.
 
-Needs the extra `gtsam`. GTSAM and CasADi, which CadQuery solves with, hung now and then in one process, so this refuses
-to start where CasADi is loaded.
+Needs `pip install gtsam`. GTSAM and CasADi, which CadQuery solves with, hung now and then in one process, so this
+refuses to start where CasADi is loaded.
 """
 
 from __future__ import annotations
@@ -51,15 +51,14 @@ def gtsam(observation: Observation, *, contact_m: float = CONTACT_M) -> Correcti
 def _module() -> Any:
     if "casadi" in sys.modules:
         raise InputError(
-            "the corrector 'gtsam' was asked for where CasADi is loaded, and the two can hang in one process; "
-            "run 'gtsam' and 'cadquery' in processes of their own."
+            "GTSAM was asked for where CasADi is loaded, and the two can hang in one process; "
+            "run them in processes of their own."
         )
     try:
         import gtsam as module
     except ImportError as error:
         raise InputError(
-            f"the corrector 'gtsam' needs GTSAM, which cannot be imported ({error}); "
-            "pip install 'apo_bench[gtsam]', or use another corrector."
+            f"GTSAM was asked for, which cannot be imported ({error}); pip install gtsam, or use another corrector."
         ) from error
     return module
 

@@ -1,4 +1,4 @@
-"""A baseline: the mates of a CAD program, solved by CadQuery's assembly solver (IPOPT through CasADi).
+"""CadQuery as a corrector of somebody's own: the mates of a CAD program, solved by IPOPT through CasADi.
 
 What mates can say is where parts stand at the end: every contact that still stands becomes a `PointInPlane` and an
 `Axis` constraint between two parts, begun at the poses that the seen goals leave them with; parts that no operation
@@ -9,8 +9,8 @@ operation that moved a part last, as its main part, gets a new goal; all others 
 anything hold the directions that the contacts leave free: CadQuery begins some degrees away from what it is given, and
 ends degrees and sometimes decimetres away from it, even where every contact held already.
 
-Needs the extra `cadquery`. CasADi and GTSAM hung now and then in one process, so this refuses to start where GTSAM is
-loaded.
+Needs `pip install cadquery`, which excludes the extra `cad`. CasADi and GTSAM hung now and then in one process, so this
+refuses to start where GTSAM is loaded.
 """
 
 from __future__ import annotations
@@ -69,23 +69,22 @@ def _check_flat(assembly: Assembly) -> None:
     odd += [f"the part '{name}'" for name, solid in assembly.solids.items() if not all_boxes(solid.pieces)]
     if odd:
         raise InputError(
-            f"the corrector 'cadquery' knows flat contacts of parts made of boxes, and {odd[0]} is neither; "
-            "use another corrector."
+            f"CadQuery knows flat contacts of parts made of boxes, and {odd[0]} is neither; use another corrector."
         )
 
 
 def _module() -> Any:
     if "gtsam" in sys.modules:
         raise InputError(
-            "the corrector 'cadquery' was asked for where GTSAM is loaded, and the two can hang in one process; "
-            "run 'gtsam' and 'cadquery' in processes of their own."
+            "CadQuery was asked for where GTSAM is loaded, and the two can hang in one process; "
+            "run them in processes of their own."
         )
     try:
         import cadquery as module
     except ImportError as error:
         raise InputError(
-            f"the corrector 'cadquery' needs CadQuery, which cannot be imported ({error}); "
-            "pip install 'apo_bench[cadquery]', or use another corrector."
+            f"CadQuery was asked for, which cannot be imported ({error}); "
+            "pip install cadquery, or use another corrector."
         ) from error
     return module
 
