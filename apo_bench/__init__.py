@@ -23,7 +23,7 @@ gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APO
 
 _EXPORTS = MappingProxyType(
     {
-        "Arm": "apo_bench.simulation.scene.arm",
+        "Arm": "apo_bench.simulation.arms.arm",
         "Assembly": "apo_bench.assembly.topology",
         "ContactCorrector": "apo_bench.correction.contact",
         "Corrected": "apo_bench.envs.corrected",

@@ -23,10 +23,10 @@ from apo_bench.records.thresholds import Criteria as Criteria
 from apo_bench.scenario.file import load_scenario as load_scenario
 from apo_bench.scenario.layout import draw_layout as draw_layout
 from apo_bench.scenario.scenario import Scenario as Scenario
+from apo_bench.simulation.arms.arm import Arm as Arm
 from apo_bench.simulation.arms.building import read_arm as read_arm
 from apo_bench.simulation.execution.controller import replay as replay
 from apo_bench.simulation.human.demonstration import demonstrate as demonstrate
-from apo_bench.simulation.scene.arm import Arm as Arm
 from apo_bench.simulation.scene.render import Film as Film
 from apo_bench.simulation.scene.render import camera_view as camera_view
 from apo_bench.simulation.scene.render import picture as picture

@@ -22,8 +22,8 @@ import mujoco
 
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.scene.arm import Kinematics
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_recording, record_demonstration

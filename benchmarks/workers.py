@@ -24,7 +24,7 @@ from pathlib import Path
 from threading import Thread
 
 from apo_bench.records.row import Row
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock, environment_lock, names_of
 from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
 from apo_bench.sweeps.local.pool import spread
@@ -35,7 +35,7 @@ WAYS = ("one", "two", "threads")
 RESULT = Path(__file__).parent / "results" / "workers.json"
 _REPLAY = ("-m", "apo_bench.cli.app", "replay", "stick_in_tower", "--json")
 _WORKER = """
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.environment_lock import environment_lock, names_of
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local import pool

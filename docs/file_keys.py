@@ -31,7 +31,7 @@ from apo_bench.parts.stated import SCHEMA, read_stated
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import SETTINGS
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.sweeps.grid import AXES, SHARED
 from apo_bench.sweeps.sweep_file import read_sweep
 
@@ -368,7 +368,7 @@ def arm_lines() -> list[str]:
         "[A file](../guide/arm.md#a-file-that-describes-an-arm) describes any arm. An arm is data also in",
     ]
     lines[-1] += " Python: `--arm mymodule:my_arm`, where `my_arm` is an"
-    lines[-1] += " `apo_bench.simulation.scene.arm.Arm` or a function that returns one. The site `tip` lies between the"
+    lines[-1] += " `apo_bench.Arm` or a function that returns one. The site `tip` lies between the"
     lines[-1] += " fingertips: z points ahead, x along the closing direction. `assets/arms/six_axis.xml` is an example."
     lines += ["", "| field | meaning |", "|---|---|"]
     said = OBVIOUS | sentences(Arm)

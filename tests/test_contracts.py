@@ -25,6 +25,14 @@ BREACHES = {
         ("apo_bench.geometry.pose", "apo_bench.assembly.goals"),
         ("apo_bench.sweeps.sweep", "apo_bench.report.report"),
     ],
+    "simulation": [
+        ("apo_bench.simulation.arms.home", "apo_bench.simulation.scene.world"),
+        ("apo_bench.simulation.scene.scene", "apo_bench.simulation.robot.gripper"),
+        ("apo_bench.simulation.robot.robot_error", "apo_bench.simulation.execution.transfer"),
+        ("apo_bench.simulation.human.hands", "apo_bench.simulation.execution.fingers"),
+        ("apo_bench.simulation.execution.controller", "apo_bench.simulation.film.track"),
+        ("apo_bench.simulation.execution.prepare", "apo_bench.simulation.arm_checks.plan_check"),
+    ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),

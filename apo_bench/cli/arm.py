@@ -32,7 +32,7 @@ def _group() -> None:
 def list_arms() -> None:
     """List the arms that come with the benchmark, and how others are named."""
     from apo_bench.show.arm_text import list_line
-    from apo_bench.simulation.scene.arm import arm_names, find_arm
+    from apo_bench.simulation.arms.finding import arm_names, find_arm
 
     for name in arm_names():
         typer.echo(list_line(name, find_arm(name)))
@@ -54,8 +54,8 @@ def check(
     """Say what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.arm_text import check_lines
-    from apo_bench.simulation.arms.checking import check_arm
-    from apo_bench.simulation.scene.arm import find_arm
+    from apo_bench.simulation.arm_checks.arm_check import check_arm
+    from apo_bench.simulation.arms.finding import find_arm
 
     if out is not None:
         check_writable(out, "--out", (".png",))

@@ -28,7 +28,7 @@ from apo_bench.records.row import Predicted
 from apo_bench.records.settings import RANGE, USUAL, TrialSettings, check, level_pair, refuse_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.stages import (

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from apo_bench.simulation.arms.checking import ArmCheck
-from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.arm_checks.arm_check import ArmCheck
+from apo_bench.simulation.arms.arm import Arm
 
 
 def list_line(name: str, arm: Arm) -> str:

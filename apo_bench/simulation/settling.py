@@ -24,8 +24,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import Solid
 from apo_bench.records.outcomes import sentence
+from apo_bench.simulation.physics import Physics, physics
 from apo_bench.simulation.scene.geoms import MESH_INERTIA, geom_attributes, inertial_attributes, mesh_pieces
-from apo_bench.simulation.scene.physics import Physics, physics
 from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
 
 LIFT_M = 0.0

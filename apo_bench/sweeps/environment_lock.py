@@ -20,7 +20,7 @@ from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.settings import level_pair
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
 from apo_bench.trial.methods import with_simulated

@@ -22,9 +22,9 @@ from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import ReplayTrack
-from apo_bench.simulation.scene.arm import find_arm
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.worker import lost, trial_row

@@ -17,8 +17,9 @@ from apo_bench.records.salt import salt_of_sweep
 from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.scene.arm import Arm, find_arm
-from apo_bench.simulation.scene.physics import physics
+from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.simulation.physics import physics
 from apo_bench.sweeps.dispatch import Executor, check_limit
 from apo_bench.sweeps.environment_lock import EnvironmentLock, Names, environment_lock, names_of
 from apo_bench.sweeps.grid import SweepSettings, Unit, check_grids, described, load_all, units

@@ -9,7 +9,7 @@ from apo_bench.assembly.goals import Plan
 from apo_bench.prediction.failure import predict
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.arms.foretelling import arm_moves
+from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.scene.scene import build_scene
 
 

@@ -27,7 +27,7 @@ from apo_bench.records.row import Predicted
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.arms.foretelling import arm_moves
+from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate

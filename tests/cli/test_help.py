@@ -17,7 +17,7 @@ from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records.method import checked_method
 from apo_bench.records.relations import checked_relations
 from apo_bench.scenario.file import scenario_names
-from apo_bench.simulation.scene.arm import arm_names
+from apo_bench.simulation.arms.finding import arm_names
 
 
 def commands(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

@@ -17,13 +17,15 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.arm_text import check_lines
+from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.building import read_arm
-from apo_bench.simulation.arms.checking import check_arm, unsaid
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.home import find_home
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, within_speed
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.trial import run_trial
 

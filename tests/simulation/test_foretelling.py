@@ -10,7 +10,7 @@ from apo_bench.geometry import pose
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.arms.foretelling import arm_moves
+from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.scene.scene import build_scene
 
 

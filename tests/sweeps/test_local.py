@@ -28,7 +28,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.report.report import report
 from apo_bench.report.run_facts import limits_of
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
 from apo_bench.sweeps.local import pool

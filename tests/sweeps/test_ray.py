@@ -26,7 +26,7 @@ from apo_bench.errors import InputError
 from apo_bench.records.key import row_key
 from apo_bench.records.row import Row
 from apo_bench.resources import folder
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import dispatch
 from apo_bench.sweeps.dispatch import Dispatch
 from apo_bench.sweeps.environment_lock import EnvironmentLock, environment_lock, names_of

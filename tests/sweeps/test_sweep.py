@@ -27,7 +27,7 @@ from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.settings import ROW
 from apo_bench.records.short_names import CORRECTORS
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps import worker
 from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units

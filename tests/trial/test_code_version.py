@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.arm import find_arm
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import code_version, fingerprint
 from apo_bench.trial.code_version import LEFT_OUT, code_files, counts, sources
 from apo_bench.trial.fingerprint import content_hash, own_content, spec_hash

@@ -11,8 +11,8 @@ from contextlib import suppress
 from typing import Any
 
 from apo_bench.errors import InputError
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.description import ArmDescription
-from apo_bench.simulation.scene.arm import Arm
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms.apart import serve; serve()"
 _LIMIT_S, _WALL_S, _LIMIT_BYTES = 60, 180, 4_000_000_000

@@ -16,6 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
+from apo_bench.simulation.arms.arm import Arm, Limits
 from apo_bench.simulation.arms.description import ArmDescription, read_description
 from apo_bench.simulation.arms.home import find_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
@@ -23,7 +24,6 @@ from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
 from apo_bench.simulation.arms.strength import with_force
-from apo_bench.simulation.scene.arm import Arm, Limits
 
 _TIP = "tip"
 _GRIPPER = "gripper/"

@@ -9,10 +9,10 @@ from pathlib import Path
 from types import MappingProxyType
 
 from apo_bench.errors import InputError, unknown
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.building import read_described
 from apo_bench.simulation.arms.description import USUAL_BASE, ArmDescription, GripperDescription
 from apo_bench.simulation.arms.tree import read_model_tree
-from apo_bench.simulation.scene.arm import Arm
 
 MENAGERIE, ROBOSUITE = "APO_BENCH_MENAGERIE", "APO_BENCH_ROBOSUITE"
 """Variables that name their folders."""

@@ -6,7 +6,8 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.scene.arm import Arm, Kinematics
+from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.kinematics import Kinematics
 
 _AT = (-0.05, 0.0, 0.30)
 _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]

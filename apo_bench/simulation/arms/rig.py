@@ -11,10 +11,9 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.simulation.arms.description import GripperDescription
-from apo_bench.simulation.scene.physics import physics
-from apo_bench.simulation.scene.world import Ints
+from apo_bench.simulation.physics import physics
 
 STEP_S = 0.001
 _LONGEST_S, _STILL, _QUIET = 1.5, 2e-3, 20

@@ -88,7 +88,8 @@ def replay(
 def _todo(plan: Plan, scene: Scene, searches: bool, error: RobotError | None) -> tuple[Move, ...]:
     if error is None:
         return moves(plan, scene, searches)
-    return tuple(Move(step, error.transfer(transfer)) for step, transfer in moves(error.plan(plan), scene, searches))
+    planned = moves(error.plan(plan), scene, searches)
+    return tuple(Move(step, transfer.with_tip_at(error.tool)) for step, transfer in planned)
 
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:

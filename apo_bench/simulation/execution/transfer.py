@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
 import numpy as np
@@ -29,6 +29,10 @@ class Grip(NamedTuple):
     T_part_tip: Array
     half_width: float
     """Half the part's width between the fingers, [m]."""
+
+    def with_tip_at(self, T: Array) -> Grip:
+        """The grip of a tip that comes to be at T, (4, 4), in the frame of where the robot believes it."""
+        return Grip(self.T_part_tip @ T, self.half_width)
 
 
 @final
@@ -126,6 +130,13 @@ class Transfer:
     def floats(self) -> float:
         """How far up a part must be to be free all round: seen at rest it lay on the floor of its slot, [m]."""
         return 0.5 * self.clearance
+
+    def with_tip_at(self, T: Array) -> Transfer:
+        """The transfer with a tip that comes to be at T, (4, 4), in the frame of where the robot believes it."""
+        if np.array_equal(T, np.eye(4)):
+            return self
+        grips = tuple(grip.with_tip_at(T) for grip in self.grips)
+        return replace(self, grips=grips, centring=tuple(grip.with_tip_at(T) for grip in self.centring))
 
 
 def first_contact_pose(t: Transfer) -> Array:

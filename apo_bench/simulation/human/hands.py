@@ -12,13 +12,13 @@ import numpy as np
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.geometry.convex import all_boxes
 from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import HANDS, Scene
-from apo_bench.simulation.scene.world import Ints, initial_state, part_pose, sleeping
+from apo_bench.simulation.scene.world import initial_state, part_pose, sleeping
 
 _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 
 from apo_bench.geometry.solid import Box
-from apo_bench.simulation.scene.arm import Arm, Kinematics
+from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.kinematics import Kinematics
 
 UPRIGHT_M = 0.001
 """Room above and below: supports are where they are known to be."""

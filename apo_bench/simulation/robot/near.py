@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
 from apo_bench.geometry.solid import Piece
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import Ints, World, part_pose
+from apo_bench.simulation.scene.world import World, part_pose
 
 NEAR_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.hand import Hand
-from apo_bench.simulation.scene.arm import Arm
 
 _LONGEST_S = 0.2
 """How long fingers of a stiff drive may take to rest behind their command."""

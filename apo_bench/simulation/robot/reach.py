@@ -8,8 +8,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene.arm import Kinematics
 
 _KNOT_M, _KNOT_RAD = 0.03, 0.15
 """Inverse kinematics is solved at least this densely along a line."""

@@ -12,7 +12,6 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.execution.transfer import Grip, Transfer
 
 
 @final
@@ -37,15 +36,6 @@ class RobotError:
         start = {part: E @ T for part, T in plan.start.items()}
         return replace(plan, start=start, goals=E @ plan.goals, targets=E @ plan.targets)
 
-    def transfer(self, t: Transfer) -> Transfer:
-        """The transfer with a tip that is not where the robot believes it."""
-        if np.array_equal(self.tool, np.eye(4)):
-            return t
-        return replace(t, grips=tuple(map(self._grip, t.grips)), centring=tuple(map(self._grip, t.centring)))
-
     def slips(self, operation: int) -> bool:
         """Whether the part of an operation moves in the hand."""
         return not np.array_equal(self.in_hand[operation], np.eye(4))
-
-    def _grip(self, grip: Grip) -> Grip:
-        return Grip(grip.T_part_tip @ self.tool, grip.half_width)

@@ -10,7 +10,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.holds import held_span
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.scene.arm import Arm
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.geoms import SMOOTH_PRIORITY
 from apo_bench.simulation.scene.world import World
 

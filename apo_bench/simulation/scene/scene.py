@@ -21,11 +21,13 @@ from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_clearance
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.scene.arm import Arm, Kinematics, find_arm
+from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.simulation.arms.kinematics import Kinematics
+from apo_bench.simulation.physics import Physics, physics
 from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.graphics import import_mjcf
 from apo_bench.simulation.scene.holdable import check_holdable
-from apo_bench.simulation.scene.physics import Physics, physics
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, world
 

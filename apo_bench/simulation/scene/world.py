@@ -10,13 +10,11 @@ from typing import Any, final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.reached import Snapshot
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, Ints
 
-Ints = NDArray[np.int64]
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 

@@ -12,36 +12,23 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.simulation.arm_checks.tip_error import HIGH_M, SPEEDS, STAND_S, WAY_M, TipError, error_on
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
 from apo_bench.simulation.execution.prepare import key_angles, moves
-from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady, turn_from
+from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from
 from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.scene.arm import Arm, Kinematics
 from apo_bench.simulation.scene.scene import Scene, build_scene
 
-SPEEDS = (0.01, 0.06, 0.5)
-"""[m/s], at which the robot touches, inserts, and carries."""
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
 _TABLE_M, _TURNS = 0.03, (-1.2, 0.0, 1.2)
 """Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
-_HIGH_M, _WAY_M, _PUSH_N, _STAND_S = 0.35, 0.15, 5.0, 0.3
-"""Errors are looked at on a way of this length at this height, stiffness by this push, after so long a stand."""
+_PUSH_N = 5.0
+"""Stiffness is looked at by this push."""
 _LAYOUTS, _MOST_GIVING_M = 20, 0.002
 _LEAST_MARGIN_DEG, _MOST_TURN_DEG = 5.0, 5.0
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class TipError:
-    """How far the tip is off where it should be at a speed."""
-
-    speed: float
-    """[m/s]"""
-    across_mm: float
-    """At most, beside the line."""
-    along_mm: float
-    turn_deg: float
 
 
 @final
@@ -91,7 +78,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     margins = np.min([each for each in found if np.isfinite(each).all()] or found, axis=0)
     across = max((each.across_mm for each in errors if each.speed < SPEEDS[-1]), default=0.0)
     if not errors:
-        missing.append(f"the tip does not reach {_HIGH_M * 1e3:g} mm above its home; move 'base' or state 'home_deg'.")
+        missing.append(f"the tip does not reach {HIGH_M * 1e3:g} mm above its home; move 'base' or state 'home_deg'.")
     if across > scene.clearance_mm:
         missing.append(
             f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; make "
@@ -164,51 +151,23 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
     """Errors along a line and at rest, [mm], and how far a newton pushes the tip, [mm/N], in free air."""
     robot = Robot(scene, scene.scenario.start)
     up = np.array(robot.T)
-    up[2, 3] = _HIGH_M
+    up[2, 3] = HIGH_M
     errors = []
     try:
         robot.trace(smooth(robot.T, up, 0.3))
-        robot.wait(_STAND_S)
+        robot.wait(STAND_S)
         for i, speed in enumerate(SPEEDS):
-            way = _WAY_M if speed > SPEEDS[0] else _WAY_M / 10
+            way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
             end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
             line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
-            errors.append(_error(line, robot.trace(line), speed))
-            robot.wait(_STAND_S)
+            errors.append(error_on(line, robot.trace(line), speed))
+            robot.wait(STAND_S)
         rest = float(np.linalg.norm(robot.pushed(np.zeros(3)) - robot.T[:3, 3]))
         before = robot.pushed(np.zeros(3))
         x, y, z = (1e3 * abs(float((robot.pushed(_PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
     except Halt:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)
-
-
-def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
-    """The error of the tip of an empty hand in free air at one speed, [m/s]; None where it has no way there."""
-    robot = Robot(scene, scene.scenario.start)
-    up = np.array(robot.T)
-    up[2, 3] = _HIGH_M
-    try:
-        robot.trace(smooth(robot.T, up, SPEEDS[-1]))
-        robot.wait(_STAND_S)
-        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), _WAY_M), speed)
-        return _error(line, robot.trace(line), speed)
-    except Halt:
-        return None
-
-
-def _error(line: Trajectory, found: Array, speed: float) -> TipError:
-    """Beside the line, along it behind the command, and turned."""
-    way = line.end[:3, 3] - line.start[:3, 3]
-    way = way / np.linalg.norm(way)
-    n = len(found)
-    asked = line.poses(line.progress(np.arange(1, n + 1) / n))
-    off = found[:, :3, 3] - asked[:, :3, 3]
-    along = off @ way
-    beside = np.linalg.norm(off - along[:, None] * way, axis=1)
-    turned = np.einsum("nij,nij->n", found[:, :3, :3], asked[:, :3, :3])
-    angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))
-    return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()))
 
 
 def _force(arm: Arm, scene: Scene) -> float:

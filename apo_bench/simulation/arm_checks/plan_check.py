@@ -15,7 +15,7 @@ from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.solid import Solid
 from apo_bench.prediction.arm import ArmMove
-from apo_bench.simulation.arms.checking import TipError, motion_error
+from apo_bench.simulation.arm_checks.tip_error import TipError, motion_error
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.transfer import Grip

@@ -1,0 +1,59 @@
+"""How far the tip of an arm is off its line at a speed, found by trying."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady
+from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.scene.scene import Scene
+
+SPEEDS = (0.01, 0.06, 0.5)
+"""[m/s], at which the robot touches, inserts, and carries."""
+HIGH_M, WAY_M, STAND_S = 0.35, 0.15, 0.3
+"""Errors are looked at on a way of this length at this height, after so long a stand."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TipError:
+    """How far the tip is off where it should be at a speed."""
+
+    speed: float
+    """[m/s]"""
+    across_mm: float
+    """At most, beside the line."""
+    along_mm: float
+    turn_deg: float
+
+
+def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
+    """The error of the tip of an empty hand in free air at one speed, [m/s]; None where it has no way there."""
+    robot = Robot(scene, scene.scenario.start)
+    up = np.array(robot.T)
+    up[2, 3] = HIGH_M
+    try:
+        robot.trace(smooth(robot.T, up, SPEEDS[-1]))
+        robot.wait(STAND_S)
+        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), WAY_M), speed)
+        return error_on(line, robot.trace(line), speed)
+    except Halt:
+        return None
+
+
+def error_on(line: Trajectory, found: Array, speed: float) -> TipError:
+    """Beside the line, along it behind the command, and turned."""
+    way = line.end[:3, 3] - line.start[:3, 3]
+    way = way / np.linalg.norm(way)
+    n = len(found)
+    asked = line.poses(line.progress(np.arange(1, n + 1) / n))
+    off = found[:, :3, 3] - asked[:, :3, 3]
+    along = off @ way
+    beside = np.linalg.norm(off - along[:, None] * way, axis=1)
+    turned = np.einsum("nij,nij->n", found[:, :3, :3], asked[:, :3, :3])
+    angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))
+    return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()))

@@ -1,0 +1,134 @@
+"""Forward and inverse kinematics of an arm by mink, on a model of the arm alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mink
+import mujoco
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.arm import Arm
+
+
+class Kinematics:
+    """Forward and inverse kinematics of the arm alone."""
+
+    POSITION_M = 1e-6
+    ANGLE_RAD = 1e-5
+    DAMPING = 1e-9
+    GAIN = 0.95
+    """A step takes at most this part of the way to a joint's limit."""
+
+    POSTURE = 2e-4
+    """How much an arm with more than six joints prefers its home, as a cost: the tip is off by some 1e-8 m for it."""
+
+    def __init__(self, arm: Arm, posture: bool = True) -> None:
+        self.model = _alone(arm)
+        self.configuration = mink.Configuration(self.model)
+        self.adr = np.array([int(self.model.jnt_qposadr[self.model.joint(j).id]) for j in arm.joints])
+        self.tip = arm.tip
+        self._mount = arm.mount
+        self.site = self.model.site(arm.tip).id
+        self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=0.3)
+        self._limits = [mink.ConfigurationLimit(self.model)]
+        self._full = self.model.qpos0.copy()
+        limited = self.model.jnt_limited.astype(np.bool_)
+        self._range: Array = np.where(limited[:, None], self.model.jnt_range, (-np.inf, np.inf)).T
+        self.ids = [int(self.model.joint(j).id) for j in arm.joints]
+        self._posture: Any = None
+        if posture:
+            self.keep_near(arm.home)
+
+    def keep_near(self, home: Array) -> None:
+        """Of arms with more than six joints: which joint angles they prefer from now on, [rad]."""
+        if len(self.adr) > 6:
+            self._posture = _posture_task(self, home)
+
+    @property
+    def first_link(self) -> str:
+        """The first body of the arm that moves: everything that moves hangs on it."""
+        tree = self.model.body_treeid[self.model.body(self._mount).id]
+        return str(self.model.body(int(self.model.tree_bodyadr[tree])).name)
+
+    @property
+    def range_of_joints(self) -> Array:
+        """(2, joints): the lowest and the highest angle of each, [rad]."""
+        return self._range[:, self.ids]
+
+    def forward(self, q: Array) -> Array:
+        """The pose of the tip, (4, 4), world."""
+        self._full[self.adr] = q
+        self.configuration.update(self._full)
+        data = self.configuration.data
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = data.site_xmat[self.site].reshape(3, 3), data.site_xpos[self.site]
+        return T
+
+    def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
+        """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there."""
+        q = np.zeros(4)
+        mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
+        self._task.set_target(mink.SE3(np.concatenate([q, T[:3, 3]])))
+        self._full[self.adr] = near
+        self.configuration.update(self._full)
+        for _ in range(turns):
+            error: Any = self._task.compute_error(self.configuration)
+            off = error.tolist()
+            if all(abs(x) < self.POSITION_M for x in off[:3]) and all(abs(x) < self.ANGLE_RAD for x in off[3:]):
+                found = self.configuration.q[self.adr]
+                return np.array(found)
+            step = self._step()
+            if step is None:
+                return None
+            longest = float(np.abs(step).max())
+            self.configuration.integrate_inplace(step * min(1.0, 0.5 / max(longest, 1e-12)), 1.0)
+        return None
+
+    def _step(self) -> Array | None:
+        """The step of all joints that mink's quadratic programme finds; None if it finds none.
+
+        Without limits the programme is a linear system. Where its solution keeps them, it is that of the programme too.
+        """
+        H, c = self._task.compute_qp_objective(self.configuration)
+        if self._posture is not None:
+            more = self._posture.compute_qp_objective(self.configuration)
+            H, c = H + more[0], c + more[1]
+        np.einsum("ii->i", H)[:] += self.DAMPING
+        step: Array = np.linalg.solve(H, -c)
+        low, high = self.GAIN * (self._range - self.configuration.q)
+        if (step >= low).all() and (step <= high).all():
+            return step
+        try:
+            tasks = [self._task] if self._posture is None else [self._task, self._posture]
+            found = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", damping=self.DAMPING, limits=self._limits)
+        except mink.exceptions.MinkError:
+            return None
+        return np.asarray(found)
+
+
+def _alone(arm: Arm) -> Any:
+    """The model of the arm where it stands, and nothing else."""
+    if arm.model is None:
+        spec = mujoco.MjSpec.from_file(str(arm.mjcf))
+        spec.worldbody.first_body().pos = arm.base
+        return spec.compile()
+    spec = mujoco.MjSpec.from_string(arm.model)
+    stand = pose.unpack(np.array([*arm.base, *arm.turn]))
+    for body in spec.worldbody.bodies:
+        T = pose.pack(stand @ pose.unpack(np.array([*body.pos, *body.quat])))
+        body.pos, body.quat = T[:3], T[3:]
+    return spec.compile()
+
+
+def _posture_task(kinematics: Kinematics, home: Array) -> Any:
+    """What keeps the elbow where it is at home, (mink's `PostureTask`)."""
+    cost = np.zeros(kinematics.model.nv)
+    cost[kinematics.model.jnt_dofadr[kinematics.ids]] = Kinematics.POSTURE
+    task = mink.PostureTask(kinematics.model, cost=cost)
+    q = kinematics.model.qpos0.copy()
+    q[kinematics.adr] = home
+    task.set_target(q)
+    return task
