@@ -1,4 +1,4 @@
-"""How `--help` lists commands: in groups, each with its whole first sentence."""
+"""How `--help` lists commands and the options of long ones: in groups, each with its whole first sentence."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -18,6 +18,21 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 """Heading -> commands of `apo-bench`, in this order."""
+OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "Task and robot": ("--careless", "--clearance", "--arm", "--grasp", "--robot-error"),
+        "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
+        "What a method makes of it": ("--method", "--methods", "--relations", "--looks", "--corrector-limit"),
+        "Which trials": ("--trials", "--seed", "--salt-file"),
+        "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),
+        "Where they run": ("--workers", "--backend", "--address"),
+        "Files": ("--out", "--save-observation", "--video", "--cache"),
+        "What is shown": ("--view", "--port", "--json"),
+    }
+)
+"""Heading -> options of `apo-bench replay` and `sweep`, in this order."""
+OTHERS = "Other options"
+"""The heading of options that stand under none."""
 _WHOLE = 10_000
 """Letters of a sentence that are shown: all."""
 
@@ -33,3 +48,23 @@ class Grouped(TyperGroup):
         for heading, names in groups.items():
             with formatter.section(heading):
                 formatter.write_dl([(f"{name:{widest}}", sentences[name]) for name in names])
+
+
+class GroupedOptions(TyperCommand):
+    """A command with its options under the headings of `OPTIONS`; arguments come first, other options last."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write a list for each heading that has an option here."""
+        arguments = []
+        options = {}
+        for parameter in self.get_params(ctx):
+            said = parameter.get_help_record(ctx)
+            if said is not None and parameter.param_type_name == "argument":
+                arguments.append(said)
+            elif said is not None:
+                options[parameter.opts[0]] = said
+        lists = {heading: [options.pop(name) for name in names if name in options] for heading, names in OPTIONS.items()}
+        for heading, listed in ({"Arguments": arguments} | lists | {OTHERS: list(options.values())}).items():
+            if listed:
+                with formatter.section(heading):
+                    formatter.write_dl(listed)

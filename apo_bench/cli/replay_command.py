@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import NO_RESULT, check_writable
+from apo_bench.cli.help_groups import GroupedOptions
 from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, ScenarioArgument, takes, trial_options
 from apo_bench.cli.sweep_command import interrupted
 from apo_bench.cli.view import Port
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    app.command()(replay)
+    app.command(cls=GroupedOptions)(replay)
 
 
 @takes(trial_options())
@@ -34,7 +35,7 @@ def replay(
     save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
     video: Annotated[Path | None, typer.Option(help="Write a film of the replay: .mp4 or .gif.")] = None,
     trial_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Run it in a process of its own, as sweeps do: ended then.")
+        float | None, typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in a process of its own.")
     ] = None,
     corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     cache: CacheFolder = None,

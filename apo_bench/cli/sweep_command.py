@@ -14,6 +14,7 @@ import typer
 from apo_bench.cli.arguments import cores, path_given
 from apo_bench.cli.completion import beginning
 from apo_bench.cli.completion import scenarios as completed_scenarios
+from apo_bench.cli.help_groups import GroupedOptions
 from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, axis_option, read_axis, sweep_options, takes
 from apo_bench.errors import InputError
 from apo_bench.records.asked import in_python
@@ -43,7 +44,7 @@ def interrupted(error: KeyboardInterrupt, more: str = "") -> Interrupted:
 
 def register(app: typer.Typer) -> None:
     """Add the command to the command line."""
-    app.command()(sweep)
+    app.command(cls=GroupedOptions)(sweep)
 
 
 @takes(sweep_options())
@@ -51,7 +52,6 @@ def sweep(
     scenarios: Annotated[
         list[str],
         typer.Argument(
-            metavar="SCENARIO... | FILE.toml",
             help="Names, scenario files, or one sweep file.",
             autocompletion=beginning(completed_scenarios),
         ),
@@ -63,7 +63,7 @@ def sweep(
         ),
     ],
     *,
-    trials: Annotated[int | None, typer.Option(help="Per cell, the same seeds in every cell; default: 100.")] = None,
+    trials: Annotated[int | None, typer.Option(help="Trials of each combination, all with the same seeds; default: 100.")] = None,
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
     salt_file: Annotated[
         Path | None,

@@ -97,7 +97,7 @@ class TrialSettings:
     clearance_mm: ClearanceMm = field(
         default=0.25,
         metadata=about(
-            "mm per side of parts that fit",
+            "Room between parts that fit, in mm per side",
             called="clearance",
             meaning="in mm per side",
             option="clearance",

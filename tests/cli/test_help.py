@@ -12,7 +12,7 @@ import typer
 
 from apo_bench.cli import completion
 from apo_bench.cli.app import app, main
-from apo_bench.cli.help_groups import GROUPS
+from apo_bench.cli.help_groups import GROUPS, OPTIONS, OTHERS
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records.method import checked_method
 from apo_bench.records.relations import checked_relations
@@ -46,6 +46,21 @@ def complete(shell: str, typed: str) -> list[str]:
 def test_every_command_stands_under_one_heading() -> None:
     grouped = [name for names in GROUPS.values() for name in names]
     assert sorted(grouped) == sorted(name for words in EVERY if len(words) == 1 for name in words)
+
+
+@pytest.mark.parametrize("command", ["replay", "sweep"])
+def test_every_option_stands_under_one_heading_and_whole(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main([command, "--help"])
+    said = capsys.readouterr().out
+    headings = [line[:-1] for line in said.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    assert headings == ["Arguments", *(heading for heading in OPTIONS if heading in headings), OTHERS]
+    named = [name for names in OPTIONS.values() for name in names]
+    assert len(named) == len(set(named))
+    written = "".join(said.split())
+    for one in EVERY[command,].params:
+        assert one.opts[0] in (*named, "scenario", "scenarios")
+        assert "".join(one.help.split()) in written
+    assert said.split(f"{OTHERS}:")[1].split()[0] == "--help"
 
 
 @pytest.mark.parametrize("words", [w for w, one in EVERY.items() if hasattr(one, "commands")], ids=" ".join)
