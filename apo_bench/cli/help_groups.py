@@ -63,7 +63,9 @@ class GroupedOptions(TyperCommand):
                 arguments.append(said)
             elif said is not None:
                 options[parameter.opts[0]] = said
-        lists = {heading: [options.pop(name) for name in names if name in options] for heading, names in OPTIONS.items()}
+        lists = {
+            heading: [options.pop(name) for name in names if name in options] for heading, names in OPTIONS.items()
+        }
         for heading, listed in ({"Arguments": arguments} | lists | {OTHERS: list(options.values())}).items():
             if listed:
                 with formatter.section(heading):

@@ -35,7 +35,8 @@ def replay(
     save_observation: Annotated[Path | None, typer.Option(help="Write what was seen to this JSON file.")] = None,
     video: Annotated[Path | None, typer.Option(help="Write a film of the replay: .mp4 or .gif.")] = None,
     trial_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in a process of its own.")
+        float | None,
+        typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in a process of its own."),
     ] = None,
     corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     cache: CacheFolder = None,

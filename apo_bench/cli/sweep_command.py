@@ -63,7 +63,9 @@ def sweep(
         ),
     ],
     *,
-    trials: Annotated[int | None, typer.Option(help="Trials of each combination, all with the same seeds; default: 100.")] = None,
+    trials: Annotated[
+        int | None, typer.Option(help="Trials of each combination, all with the same seeds; default: 100.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="First seed; default: 0.")] = None,
     salt_file: Annotated[
         Path | None,
