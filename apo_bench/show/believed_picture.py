@@ -18,6 +18,7 @@ from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, world_bounds
+from apo_bench.io.default_looks import default_looks
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.save import save_figure
@@ -81,6 +82,7 @@ def belief_lines(beliefs: Sequence[BeliefPanel]) -> list[str]:
     ]
 
 
+@default_looks()
 def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], out: str | Path) -> None:
     """Write the panels beside each other, from one point of view, as PNG.
 

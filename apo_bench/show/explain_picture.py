@@ -12,6 +12,7 @@ from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, extent, world_bounds
+from apo_bench.io.default_looks import default_looks
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
@@ -39,6 +40,7 @@ class _Drawn(NamedTuple):
     operation: OperationExplanation
 
 
+@default_looks()
 def draw_explanation(scenario: Scenario, observation: Observation, found: Explanation, out: str | Path) -> None:
     """Write a PNG picture.
 

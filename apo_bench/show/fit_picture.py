@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.default_looks import default_looks
 from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import Residuals
 
@@ -17,6 +18,7 @@ _BINS, _SHOWN = 40, 0.995
 """Bins of a histogram, and up to which quantile it is drawn."""
 
 
+@default_looks()
 def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     """Write the picture as PNG: across the ray, along it, turns; above, histograms; below, quantiles."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

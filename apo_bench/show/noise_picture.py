@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.default_looks import default_looks
 from apo_bench.show.noise_card import PANEL_UNITS, PANELS, Drawn
 
 _SIZE_INCH, _BINS = (9.0, 2.3), 49
@@ -16,6 +17,7 @@ _REACH = 6.0
 _COLOR = "#4477aa"
 
 
+@default_looks()
 def draw_histogram(drawn: Drawn, path: Path) -> None:
     """Write the four panels as PNG: error across and along the ray, tilt, turn about the ray; densities are log."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -9,6 +9,7 @@ import numpy as np
 
 from apo_bench.cad.raw import RawSolid, Region
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.default_looks import default_looks
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""
@@ -16,6 +17,7 @@ _FLAT, _ROUND, _PLAIN, _REFUSED = "#8fb3d9", "#e0b070", "#cfcfcf", "#d98f8f"
 _MOST_DRAWN = 30_000
 
 
+@default_looks()
 def draw_part(raw: RawSolid, refused: frozenset[str], title: str, path: Path) -> None:
     """Write it as PNG: flat faces blue, round ones orange, red what can make no contact though it has a name."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -12,6 +12,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
+from apo_bench.io.default_looks import default_looks
 from apo_bench.recording.log import Track
 from apo_bench.recording.stays import Stays
 from apo_bench.show.save import save_figure
@@ -52,6 +53,7 @@ class Drawing:
     straight: Sequence[Straight] = ()
 
 
+@default_looks()
 def draw_recording(drawing: Drawing, out: Path) -> None:
     """Write the picture as PNG: all frames, the parts from near, and when each part rested."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

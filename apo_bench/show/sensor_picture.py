@@ -14,6 +14,7 @@ from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.default_looks import default_looks
 from apo_bench.show.save import save_figure
 from apo_bench.show.sensor_run import SensorRun
 from apo_bench.simulation.sensor.watch import DemonstrationImages
@@ -25,6 +26,7 @@ _AROUND = 20
 _LARGEST_MM, _RESIDUAL_MM = 60.0, 5.0
 
 
+@default_looks()
 def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     """Draw every operation that was noticed, in one view of the range finder."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -46,12 +46,12 @@ def test_flat_faces_and_rims() -> None:
         assert all(np.linalg.norm(line.end - line.begin) > 0.02 for line in found)
 
 
-def test_arcs_with_an_axis_are_dash_dot(tmp_path: Path) -> None:
+def test_arcs_with_an_axis_are_dash_dot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import matplotlib
 
     for scene, said in ((rounds.through(), True), (scenes.stick_in_tower(), False)):
         graph = relation_graph(scene.assembly)
         assert {arc.name for arc in graph.arcs if arc.axial} == ({"R3", "R4"} if said else set())
-        with matplotlib.rc_context({"svg.fonttype": "none"}):
-            draw_graph(graph, tmp_path / "a.svg", title="graph")
+        monkeypatch.setitem(matplotlib.rcParamsDefault, "svg.fonttype", "none")
+        draw_graph(graph, tmp_path / "a.svg", title="graph")
         assert ("dash-dot: about an axis" in (tmp_path / "a.svg").read_text(encoding="utf-8")) is said

@@ -96,12 +96,12 @@ def test_a_picture_is_written(suffix: str, head: bytes, tmp_path: Path) -> None:
     assert one != other
 
 
-def test_words_are_in_the_picture(tmp_path: Path) -> None:
+def test_words_are_in_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import matplotlib
 
     graph = graph_of("pockets", 6)
-    with matplotlib.rc_context({"svg.fonttype": "none"}):
-        draw_graph(graph, tmp_path / "a.svg", title="Fig. 7", residuals=[None, *([2e-3] * 8)], gap_m=1e-4)
+    monkeypatch.setitem(matplotlib.rcParamsDefault, "svg.fonttype", "none")
+    draw_graph(graph, tmp_path / "a.svg", title="Fig. 7", residuals=[None, *([2e-3] * 8)], gap_m=1e-4)
     text = (tmp_path / "a.svg").read_text(encoding="utf-8")
     for words in ("Fig. 7", "cube3", "R9", "2.00 mm", "not seen", "dashed: disappeared; red: above 0.1 mm"):
         assert words in text

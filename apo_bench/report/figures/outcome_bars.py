@@ -6,8 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from matplotlib.collections import PolyCollection
-
 from apo_bench.records.method import knows_truth
 from apo_bench.records.outcomes import STAGES
 from apo_bench.report.figures.sheet import SAMPLE, WIDTH, Entry, Figure, Panel, Tips
@@ -52,6 +50,8 @@ def canvas(axis: Any, height: float) -> None:
 
 def boxes(axis: Any, found: Sequence[_Box], colors: Sequence[Any]) -> Any:
     """Filled boxes (x, y, width, height)."""
+    from matplotlib.collections import PolyCollection
+
     corners = [[(x, y), (x + w, y), (x + w, y + h), (x, y + h)] for x, y, w, h in found]
     return axis.add_collection(PolyCollection(corners, facecolors=colors, linewidths=0, clip_on=False), autolim=False)
 

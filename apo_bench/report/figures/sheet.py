@@ -17,12 +17,9 @@ from html import escape
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-import matplotlib
 from markupsafe import Markup
-from matplotlib import figure as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 
+from apo_bench.io.default_looks import default_looks
 from apo_bench.io.writing import to_write
 from apo_bench.report.figures.styles import INK, themed
 
@@ -106,6 +103,8 @@ class Drawing:
         with to_write(path) as file:
             if path.suffix == ".png":
                 with _looks(self.title):
+                    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
                     FigureCanvasAgg(self.canvas)
                     self.canvas.savefig(file, format="png", dpi=PNG_DPI)
             else:
@@ -131,6 +130,9 @@ def draw(figure: Figure) -> Drawing:
         tips.append(said)
 
     with _looks(figure.title):
+        from matplotlib import figure as mpl
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+
         canvas = mpl.Figure(figsize=(width / DPI, top / DPI), dpi=DPI)
         sheet = _Sheet(canvas, width, top)
         sheet.text(GAP, 26, figure.title, fontsize=15)
@@ -181,9 +183,7 @@ class _Sheet(NamedTuple):
 @contextmanager
 def _looks(salt: str) -> Iterator[None]:
     """Matplotlib's own settings but for ours; a letter that a font lacks is nothing to warn of."""
-    with matplotlib.rc_context(), warnings.catch_warnings():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(LOOKS | {"svg.hashsalt": salt})
+    with default_looks(LOOKS | {"svg.hashsalt": salt}), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 

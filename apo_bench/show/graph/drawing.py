@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
+from apo_bench.io.default_looks import default_looks
 from apo_bench.show.graph.layout import GraphLayout, arrange
 
 _INK, _GONE, _ALARM = "#222222", "#8A8A8A", "#C8102E"
@@ -20,6 +21,7 @@ _DASHES, _DASH_DOTS = (0, (4, 2.5)), (0, (9, 2, 1.5, 2))
 _Colors = Mapping[str, tuple[float, float, float]]
 
 
+@default_looks({"svg.hashsalt": "apo-bench"})
 def draw_graph(
     graph: Graph,
     path: Path,
@@ -35,7 +37,6 @@ def draw_graph(
         residuals: Written on the arcs, in red if above `gap_m`.
         colors: Of parts, RGB in 0..1.
     """
-    import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -54,8 +55,7 @@ def draw_graph(
         _arrow(axes, layout, i, arc, texts[i], residual is not None and residual > gap_m)
     for node in layout.boxes:
         _node(axes, layout, node, graph.stands(node), (colors or {}).get(node.part))
-    with matplotlib.rc_context({"svg.hashsalt": "apo-bench"}):
-        figure.savefig(path, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
+    figure.savefig(path, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
 
 
 def _canvas(figure: Any, layout: GraphLayout, width: float, height: float, words: bool) -> Any:

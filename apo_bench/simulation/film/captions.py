@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from apo_bench.io.default_looks import load_matplotlib
+
 _Picture = NDArray[np.uint8]
 ABOVE_PX, BELOW_PX = 32, 56
 _EDGE_PX, _LINE_PX, _TEXT_PX = 10, 22, 15
@@ -69,6 +71,5 @@ def _write(draw: Any, width: int, at: float, left: str, right: str, color: tuple
 @cache
 def _font() -> Any:
     """The letters that come with matplotlib."""
-    import matplotlib
-
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), _TEXT_PX)
+    fonts = Path(load_matplotlib().get_data_path()) / "fonts" / "ttf"
+    return ImageFont.truetype(str(fonts / "DejaVuSans.ttf"), _TEXT_PX)

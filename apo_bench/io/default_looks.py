@@ -1,0 +1,43 @@
+"""Matplotlib as it comes, whatever a `matplotlibrc` in the current folder or at home says.
+
+Matplotlib reads that of the current folder when it is first imported: its settings change every picture, a file that is
+no text is an exception, and a pipe is waited for.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+_READ = "matplotlibrc"
+
+
+@contextmanager
+def default_looks(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
+    """Matplotlib with its own settings, and with these, while something is drawn; those of before come back.
+
+    A function that draws has it as a decorator or around its body, and imports what it needs of matplotlib inside.
+    """
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(settings or {})
+        yield matplotlib
+
+
+def load_matplotlib() -> Any:
+    """Import matplotlib, from the root folder where the current one has a file of settings."""
+    if "matplotlib" not in sys.modules and os.path.lexists(_READ):
+        here = Path.cwd()
+        os.chdir(here.anchor)
+        try:
+            import matplotlib
+        finally:
+            os.chdir(here)
+    import matplotlib
+
+    return matplotlib
