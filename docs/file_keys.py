@@ -137,7 +137,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     },
     "Noise files": {
         "": {
-            "schema": "`apo-bench/noise/2`; `apo-bench/noise/1` is still read",
+            "schema": "`apo-bench/noise/2`",
             "source": "whose errors these are",
             "missed_rate": "share of parts that were not found, 0 to 1",
             "outlier_rate": "share of outliers among those that were found, 0 to 1",

@@ -1,1 +1,1 @@
-"""The file forms of demonstrations, observations and plans."""
+"""The file forms of observations and plans."""

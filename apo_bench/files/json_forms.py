@@ -1,4 +1,4 @@
-"""The JSON forms of a demonstration, an observation and a plan: one each, versioned, in mm and degrees.
+"""The JSON forms of an observation and a plan: one each, versioned, in mm and degrees.
 
 A file names its scenario, which carries the topology; the file itself carries numbers only. A pose is
 `position_mm` [x, y, z] and `quaternion_wxyz` [w, x, y, z] in the world frame. Operations are numbered from 1.
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
+from apo_bench.assembly.goals import Observation, Plan, Poses, Step
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
@@ -23,10 +23,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-DEMONSTRATION = "apo-bench/demonstration/1"
 OBSERVATION = "apo-bench/observation/2"
-OBSERVATION_BEFORE = "apo-bench/observation/1"
-"""Without errors that operations share."""
 PLAN = "apo-bench/plan/2"
 
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -37,17 +34,6 @@ OUTLIER_KEYS = MappingProxyType(
 """Key of a form -> field of `OutlierModel`."""
 Form = dict[str, Any]
 """What `json` can write."""
-
-
-def demonstration_form(demonstration: Demonstration, scenario: str) -> Form:
-    """The JSON form of a demonstration; `scenario` is a name or a path that `load_scenario` knows."""
-    careless = [{"careless_mm_deg": _covariance_form(C)} for C in demonstration.careless]
-    return {
-        **_head(DEMONSTRATION, scenario, demonstration.start),
-        "operations": _operations_form(demonstration.assembly, demonstration.goals, careless),
-        "final": _poses_form(demonstration.final),
-        "code": demonstration.code,
-    }
 
 
 def observation_form(observation: Observation, scenario: str) -> Form:

@@ -1,4 +1,4 @@
-"""Demonstrations, observations and plans from their JSON forms, which `json_forms` describes."""
+"""Observations and plans from their JSON forms, which `json_forms` describes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation, Plan, Poses, Step
+from apo_bench.assembly.goals import Observation, Plan, Poses, Step
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.schedule import REMEDY, schedule_fault
 from apo_bench.assembly.shared_error import SharedError
@@ -15,7 +15,7 @@ from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
-from apo_bench.files.json_forms import DEMONSTRATION, OBSERVATION, OBSERVATION_BEFORE, OUTLIER_KEYS, PLAN
+from apo_bench.files.json_forms import OBSERVATION, OUTLIER_KEYS, PLAN
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode, read_json
@@ -26,23 +26,6 @@ _LEAST_FREEDOM = 0.4
 _DEVIATIONS = ("deviation_mm", "deviation_deg")
 _POSE = ("position_mm", "quaternion_wxyz")
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
-
-
-def read_demonstration(path: str | Path, scenario: Scenario | None = None) -> Demonstration:
-    """A demonstration from its file; see `read_json_observation` for `scenario` and errors."""
-    root = _root(path, DEMONSTRATION, ("start", "operations", "final", "code"), ())
-    found = _scenario(root["scenario"], scenario, Path(path).parent)
-    entries = _operations(root["operations"], found.assembly, ("careless_mm_deg",), ())
-    return Demonstration(
-        assembly=found.assembly,
-        start=_poses(root["start"], found),
-        goals=np.array([_pose(entry) for entry in entries]),
-        final=_poses(root["final"], found),
-        careless=np.array([_covariance(entry["careless_mm_deg"], definite=False) for entry in entries]),
-        code=root["code"].text(),
-        gap_m=found.gap_mm * 1e-3,
-        play_m=found.clearance_mm * 1e-3,
-    )
 
 
 def read_json_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
@@ -71,7 +54,7 @@ def read_json_observed(
         assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.
     """
     optional = ("start", "gap_mm", "play_mm", "outliers", "shared", "tails")
-    root = _root(path, OBSERVATION, ("operations",), optional, OBSERVATION_BEFORE)
+    root = read_json(path).fields_of(OBSERVATION, ("scenario", "operations"), optional)
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], found.assembly, (), stated)
@@ -94,7 +77,7 @@ def read_json_observed(
 
 def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
     """A plan from its file; see `read_json_observation` for `scenario` and errors."""
-    root = _root(path, PLAN, ("start", "operations", "schedule"), ())
+    root = read_json(path).fields_of(PLAN, ("scenario", "start", "operations", "schedule"))
     found = _scenario(root["scenario"], scenario, Path(path).parent)
     goals = np.array([_pose(entry) for entry in _operations(root["operations"], found.assembly, (), ())])
     steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]
@@ -162,17 +145,6 @@ def _tails(node: JsonNode, n: int) -> Tails:
         limits=found["limits_mm_deg"] / units[[0, 2]],
         joined=given["joined"].flag(),
     )
-
-
-def _root(
-    path: str | Path, schema: str, required: tuple[str, ...], optional: tuple[str, ...], before: str = ""
-) -> Mapping[str, JsonNode]:
-    """The fields of a file; `before` is the schema of an older form that is still read."""
-    document = read_json(path)
-    stated = document.value.get("schema", schema) if isinstance(document.value, dict) else schema
-    if stated != schema and stated != (before or schema):
-        document.child(document.value["schema"], "schema").fail(f'"{schema}" is needed')
-    return document.fields(("schema", "scenario", *required), optional)
 
 
 def _scenario(node: JsonNode, given: Scenario | None, folder: Path) -> Scenario:

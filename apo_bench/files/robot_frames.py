@@ -33,9 +33,7 @@ def read_robot_frames(path: str | Path) -> RobotFrames:
     Raises:
         InputError: Anything that is not as described, naming file and key.
     """
-    top = read_toml(path, "robot file").fields(("schema",), ("base", "flange_to_tip", "quaternion"))
-    if top["schema"].text() != _SCHEMA:
-        top["schema"].fail(f'"{_SCHEMA}" is needed')
+    top = read_toml(path, "robot file").fields_of(_SCHEMA, (), ("base", "flange_to_tip", "quaternion"))
     order = top["quaternion"].text() if "quaternion" in top else "xyzw"
     if order not in ("xyzw", "wxyz"):
         top["quaternion"].fail("xyzw or wxyz is needed")

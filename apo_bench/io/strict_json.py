@@ -61,6 +61,12 @@ class JsonNode:
                 raise InputError(f"{place}: the key '{key}' is missing; needed are {', '.join(required)}.")
         return {key: self.child(value, key) for key, value in self.value.items()}
 
+    def fields_of(self, schema: str, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
+        """The members of an object whose key `schema` names its format; another format is refused before its keys."""
+        if isinstance(self.value, dict) and self.value.get("schema", schema) != schema:
+            self.child(self.value["schema"], "schema").fail(f'"{schema}" is needed')
+        return self.fields(("schema", *required), optional)
+
     def items(self, name: str, count: int | None = None) -> Sequence[JsonNode]:
         """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given."""
         if not isinstance(self.value, list):

@@ -21,7 +21,6 @@ from apo_bench.records.short_names import RESIDUALS
 from apo_bench.scenario.keys import read_pose
 
 _SCHEMA = "apo-bench/noise/2"
-_BEFORE = "apo-bench/noise/1"
 """Without errors of the whole view."""
 _FARTHEST_MM = 1e5
 _LARGEST_VIEW_MM, _LARGEST_VIEW_DEG = 200.0, 45.0
@@ -46,11 +45,8 @@ def noise_of_file(name: str, level: Level) -> Fitted | Empirical | None:
 
 def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     """What a noise file states, and the camera it names, else the default one."""
-    root = read_toml(path, "noise file")
-    if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) not in (_SCHEMA, _BEFORE):
-        root.child(root.value["schema"], "schema").fail(f'"{_SCHEMA}" is needed')
-    required = ("schema", "source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
-    top = root.fields(required, ("camera", "view", "constant"))
+    required = ("source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
+    top = read_toml(path, "noise file").fields_of(_SCHEMA, required, ("camera", "view", "constant"))
     shift, turn = _split(top["shift"], "mm", 1000.0), _split(top["turn"], "deg", 180.0)
     measured = MeasuredNoise(
         source=top["source"].text(),

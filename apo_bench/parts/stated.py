@@ -56,11 +56,8 @@ def read_stated(path: Path) -> StatedPart:
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.
     """
-    root = read_toml(path, "file that states the faces of a part")
-    if isinstance(root.value, dict) and root.value.get("schema", SCHEMA) != SCHEMA:
-        root.child(root.value["schema"], "schema").fail(f'"{SCHEMA}" is needed')
-    top = root.fields(
-        ("schema", "faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
+    top = read_toml(path, "file that states the faces of a part").fields_of(
+        SCHEMA, ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
     )
     found = [_face(name, node) for name, node in _named(top["faces"])]
     return StatedPart(

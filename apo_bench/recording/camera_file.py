@@ -66,9 +66,7 @@ def read_camera(path: str | Path) -> CameraFile:
     Raises:
         InputError: Anything that is not as described, naming file and key.
     """
-    top = read_toml(path, "camera file").fields(("schema",), ("log", "pose", "known", "noise"))
-    if top["schema"].text() != _SCHEMA:
-        top["schema"].fail(f'"{_SCHEMA}" is needed')
+    top = read_toml(path, "camera file").fields_of(_SCHEMA, (), ("log", "pose", "known", "noise"))
     if "pose" in top and "known" in top:
         refuse(top["known"], "the pose of the camera is stated too; state one of the two")
     return CameraFile(

@@ -51,9 +51,7 @@ def read_objects(path: str | Path) -> ObjectsFile:
     Raises:
         InputError: Anything that is not as described, naming file and key.
     """
-    top = read_toml(path, "objects file").fields(("schema", "objects"), ("ignore",))
-    if top["schema"].text() != _SCHEMA:
-        top["schema"].fail(f'"{_SCHEMA}" is needed')
+    top = read_toml(path, "objects file").fields_of(_SCHEMA, ("objects",), ("ignore",))
     if not isinstance(top["objects"].value, dict) or not top["objects"].value:
         top["objects"].fail('parts with ids are needed, such as castle1 = { id = "7" }')
     parts: dict[str, TrackedPart] = {}

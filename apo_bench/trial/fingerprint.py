@@ -26,7 +26,7 @@ from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.code_version import code_files
 
-_SCHEMAS = (ROW, files.DEMONSTRATION, files.OBSERVATION, files.PLAN)
+_SCHEMAS = (ROW, files.OBSERVATION, files.PLAN)
 
 
 def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:

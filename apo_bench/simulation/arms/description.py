@@ -72,11 +72,8 @@ def read_description(path: Path) -> ArmDescription:
     Raises:
         InputError: Anything that is not as described, naming file and key.
     """
-    root = read_toml(path, "arm file")
-    if isinstance(root.value, dict) and root.value.get("schema", _SCHEMA) != _SCHEMA:
-        root.child(root.value["schema"], "schema").fail(f'"{_SCHEMA}" is needed')
     optional = ("flange", "joints", "home_deg", "base", "gripper", "payload_kg", "speed_deg_s", "torque_nm")
-    top = root.fields(("schema", "mjcf"), optional)
+    top = read_toml(path, "arm file").fields_of(_SCHEMA, ("mjcf",), optional)
     joints = _names(top["joints"]) if "joints" in top else None
     speed = _each(top, "speed_deg_s", _MOST_DEG_S)
     return ArmDescription(
