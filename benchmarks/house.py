@@ -1,6 +1,6 @@
 """The plan of the package in numbers, of the working tree and of commits: `python benchmarks/house.py [COMMIT ...]`.
 
-Prints the table of CONTRIBUTING.md. A room is a folder or a loose file directly in `apo_bench`; an arrow leads from a
+Prints a table. A room is a folder or a loose file directly in `apo_bench`; an arrow leads from a
 room to another one from which it imports anything; floors are the rooms on the longest chain of arrows. A name is
 public if it is defined at the top of a module without an underscore; it has several meanings if several modules define
 it. What a thing touches are the files of the package that name it: the setting `fidelity`, the noise model

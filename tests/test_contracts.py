@@ -33,6 +33,11 @@ BREACHES = {
         ("apo_bench.simulation.execution.controller", "apo_bench.simulation.film.track"),
         ("apo_bench.simulation.execution.prepare", "apo_bench.simulation.arm_checks.plan_check"),
     ],
+    "workshop": [
+        ("apo_bench.trial.trial", "apo_bench.recording.importing"),
+        ("apo_bench.show.card", "apo_bench.drafting.draft"),
+        ("apo_bench.scenario.file", "apo_bench.cad.importing"),
+    ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
@@ -106,5 +111,7 @@ def test_the_lists_of_rooms_are_complete() -> None:
     }
     layers = {f"apo_bench.{room.strip()}" for line in CONTRACTS["layers"]["layers"] for room in line.split("|")}
     assert layers == rooms
+    workshop = {"apo_bench.__main__", "apo_bench.cli", *CONTRACTS["workshop"]["forbidden_modules"]}
+    assert {*CONTRACTS["workshop"]["source_modules"], *workshop} == rooms
     assert {*CONTRACTS["simulators"]["source_modules"], "apo_bench.simulation"} == rooms
     assert {*CONTRACTS["gymnasium"]["source_modules"], "apo_bench.envs"} == rooms

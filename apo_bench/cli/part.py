@@ -46,8 +46,8 @@ def import_file(
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
     from apo_bench.cad.importing import raw_solids, with_new_names
     from apo_bench.cad.places import named_places, write_places
-    from apo_bench.show.part_form import report_form
-    from apo_bench.show.part_text import unit_line
+    from apo_bench.cad.show.part_form import report_form
+    from apo_bench.cad.show.part_text import unit_line
 
     names = _pairs(name or [])
     if not 1.0 <= density <= 25_000.0:
@@ -81,8 +81,8 @@ def _written(
     """Parts with their pictures; and why others of the file became none."""
     from apo_bench.cad.importing import import_part
     from apo_bench.cad.naming import free_name, part_name
-    from apo_bench.show.part_picture import draw_part
-    from apo_bench.show.part_text import import_lines
+    from apo_bench.cad.show.part_picture import draw_part
+    from apo_bench.cad.show.part_text import import_lines
 
     done: list[Imported] = []
     left_out: list[str] = []

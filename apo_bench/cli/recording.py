@@ -48,7 +48,7 @@ def import_log(
     from apo_bench.recording.camera_file import read_camera
     from apo_bench.recording.formats import read_log
     from apo_bench.recording.objects_file import part_tracks, read_objects
-    from apo_bench.show.recording_text import reading_lines
+    from apo_bench.recording.show.text import reading_lines
 
     for path, option, endings in (
         (out, "--out", (".json", ".csv")),
@@ -80,10 +80,9 @@ def _import(
     from apo_bench.io.csv_file import write_csv
     from apo_bench.recording.bare import deviations
     from apo_bench.recording.importing import import_recording
-    from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.recording_drawn import drawing_of, unfit_drawing
-    from apo_bench.show.recording_picture import draw_recording
-    from apo_bench.show.recording_text import (
+    from apo_bench.recording.show.drawing import draw_recording
+    from apo_bench.recording.show.drawn import drawing_of, unfit_drawing
+    from apo_bench.recording.show.text import (
         PATH_HEAD,
         camera_lines,
         imported_lines,
@@ -91,6 +90,7 @@ def _import(
         path_rows,
         rest_lines,
     )
+    from apo_bench.scenario.file import load_scenario
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
@@ -127,9 +127,9 @@ def _import(
 
 def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
     from apo_bench.recording.bare import bare_recording, deviations, goals_of
-    from apo_bench.show.recording_drawn import bare_drawing
-    from apo_bench.show.recording_picture import draw_recording
-    from apo_bench.show.recording_text import camera_lines, observation_table, put_lines, rest_lines
+    from apo_bench.recording.show.drawing import draw_recording
+    from apo_bench.recording.show.drawn import bare_drawing
+    from apo_bench.recording.show.text import camera_lines, observation_table, put_lines, rest_lines
 
     found = bare_recording(tracks, camera, log.file)
     parts, rests = [put.part for put in found.puts], [put.rest for put in found.puts]

@@ -85,9 +85,9 @@ def new(
     from apo_bench.drafting.assembly_file import import_assembly
     from apo_bench.drafting.draft import draft
     from apo_bench.drafting.posed import UPS, on_the_table, read_posed
+    from apo_bench.drafting.text import draft_lines
     from apo_bench.drafting.writing import scenario_text
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.draft_text import draft_lines
 
     check_writable(out, "--out", (".toml",))
     if out.exists() and not overwrite:
@@ -120,8 +120,8 @@ def check(
 ) -> None:
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
     from apo_bench.drafting.checking import Finding, check_file
+    from apo_bench.drafting.text import finding_line
     from apo_bench.records.settings import check as check_setting
-    from apo_bench.show.draft_text import finding_line
 
     if not 0 <= seeds <= 1000:
         raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")

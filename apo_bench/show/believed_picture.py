@@ -19,10 +19,10 @@ from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, world_bounds
 from apo_bench.io.default_looks import default_looks
+from apo_bench.io.figure_file import save_figure
+from apo_bench.io.words import listed_words
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
-from apo_bench.show.save import save_figure
-from apo_bench.show.words import listed_words
 
 _WIDTH, _HEIGHT, _LINE_PX = 620, 480, 20
 _NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0

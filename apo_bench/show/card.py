@@ -15,11 +15,11 @@ from apo_bench.assembly.placement import placements
 from apo_bench.assembly.touching import touched_contacts
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.states import classify
+from apo_bench.io.words import listed_words
 from apo_bench.judging.finished import fixtures
 from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario, Turn
 from apo_bench.show.axes import holds_axis
-from apo_bench.show.words import listed_words
 
 NOTHING: Mapping[str, str] = MappingProxyType({})
 _LEVEL = 0.01

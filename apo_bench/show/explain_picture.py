@@ -13,11 +13,11 @@ from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, extent, world_bounds
 from apo_bench.io.default_looks import default_looks
+from apo_bench.io.figure_file import save_figure
+from apo_bench.io.words import listed_words, with_article
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
-from apo_bench.show.save import save_figure
-from apo_bench.show.words import listed_words, with_article
 
 _WIDTH, _HEIGHT = 900, 540
 _LINE_PX = 21

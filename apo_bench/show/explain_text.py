@@ -15,7 +15,7 @@ from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import RoundFace
-from apo_bench.show.words import listed_words, with_article
+from apo_bench.io.words import listed_words, with_article
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)

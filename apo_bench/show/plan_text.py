@@ -19,9 +19,9 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
 from apo_bench.insertion.operations import OperationMacros
+from apo_bench.io.words import columns, direction
 from apo_bench.scenario.nominal import nominal_operations, nominal_start
 from apo_bench.scenario.scenario import Grasp, Scenario
-from apo_bench.show.words import columns
 
 _MACROS = "apo-bench/macros/1"
 _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")
@@ -131,14 +131,6 @@ def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequen
             }
         )
     return {"schema": _MACROS, "scenario": scenario.name, "steps": forms, "notes": list(notes)}
-
-
-def direction(v: Array) -> str:
-    """`-z`, or three numbers."""
-    for i, axis in enumerate("xyz"):
-        if abs(v[i]) > 1.0 - 1e-9:
-            return f"{'+' if v[i] > 0 else '-'}{axis}"
-    return f"({', '.join(f'{x + 0.0:.3g}' for x in np.round(v, 3))})"
 
 
 def _cells(line: PlanLine) -> tuple[str, ...]:

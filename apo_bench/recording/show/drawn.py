@@ -15,9 +15,9 @@ from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.importing import Imported, planned_starts
 from apo_bench.recording.log import Log, Track
 from apo_bench.recording.rests import rests_of
+from apo_bench.recording.show.drawing import Drawing, Straight
 from apo_bench.recording.stays import Stays, stays_of
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.show.recording_picture import Drawing, Straight
 
 
 def drawing_of(found: Imported, log: Log, tracks: Mapping[str, Track], camera: CameraFile) -> Drawing:

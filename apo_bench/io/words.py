@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
+
 
 def with_article(part: str) -> str:
     """`the stick`, but `castle2` and `A`."""
@@ -20,3 +24,11 @@ def columns(table: Sequence[Sequence[str]]) -> list[str]:
     """Rows of equal length as lines, their entries below each other."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in table]
+
+
+def direction(v: Array) -> str:
+    """`-z`, or three numbers."""
+    for i, axis in enumerate("xyz"):
+        if abs(v[i]) > 1.0 - 1e-9:
+            return f"{'+' if v[i] > 0 else '-'}{axis}"
+    return f"({', '.join(f'{x + 0.0:.3g}' for x in np.round(v, 3))})"

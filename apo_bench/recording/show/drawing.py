@@ -13,9 +13,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.io.default_looks import default_looks
+from apo_bench.io.figure_file import save_figure
 from apo_bench.recording.log import Track
 from apo_bench.recording.stays import Stays
-from apo_bench.show.save import save_figure
 
 _AXES = ("#c0392b", "#2e8b57", "#2456a6")
 _PARTS = ("#cc5c45", "#4588c7", "#b8a02a", "#6b8e23", "#8e5ea2", "#3cba9f", "#777777")

@@ -10,6 +10,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.words import columns, direction
 from apo_bench.recording.approach import approaches
 from apo_bench.recording.bare import Bare
 from apo_bench.recording.camera_pose import CameraPose
@@ -17,8 +18,6 @@ from apo_bench.recording.importing import Imported
 from apo_bench.recording.log import Log
 from apo_bench.recording.objects_file import ObjectsFile
 from apo_bench.recording.rests import Rest
-from apo_bench.show.plan_text import direction
-from apo_bench.show.words import columns
 
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "a frame is off by")
 _MOST_TIMES = 5

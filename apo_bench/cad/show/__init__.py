@@ -1,0 +1,1 @@
+"""What an import of a CAD file did: in lines, as a form, as a picture."""
