@@ -16,7 +16,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.show.believed_picture import belief_panel, draw_beliefs
 from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.sweeps.one import Request, run_one
+from apo_bench.trial.request import Request
+from apo_bench.trial.run_request import run_request
 from apo_bench.trial.stages import observe_recording, record_demonstration
 from apo_bench.trial.story import Story
 
@@ -59,7 +60,7 @@ def draw_film(method: str, path: Path) -> None:
         ]
         imageio.imwrite(path, ended if method == "none" else pictures[0])
 
-    run_one(Request("stick_in_tower", {"level": 1.0, "seed": SEED, "method": method}), keep)
+    run_request(Request("stick_in_tower", {"level": 1.0, "seed": SEED, "method": method}), keep)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,21 @@ BREACHES = {
         ("apo_bench.show.card", "apo_bench.drafting.draft"),
         ("apo_bench.scenario.file", "apo_bench.cad.importing"),
     ],
+    "report": [
+        ("apo_bench.report.compare_text", "apo_bench.report.page.trials"),
+        ("apo_bench.report.tables.cells", "apo_bench.report.run_facts"),
+        ("apo_bench.report.figures.levels", "apo_bench.report.page.document"),
+    ],
+    "statistics": [
+        ("apo_bench.statistics.rates", "apo_bench.statistics.levels.bounded"),
+        ("apo_bench.statistics.levels.area", "apo_bench.statistics.over_seeds"),
+        ("apo_bench.statistics.paired", "apo_bench.statistics.power"),
+    ],
+    "sweeps": [
+        ("apo_bench.sweeps.worker", "apo_bench.sweeps.local.process"),
+        ("apo_bench.sweeps.local.pool", "apo_bench.sweeps.ray.task"),
+        ("apo_bench.sweeps.environment_lock", "apo_bench.sweeps.dispatch"),
+    ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),

@@ -37,8 +37,8 @@ def recognise(
     from apo_bench.records.relations import RECOGNISED
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
-    from apo_bench.sweeps.one import looked_at
     from apo_bench.trial.recognised_contacts import recognise_by
+    from apo_bench.trial.request import looked_at
 
     if relations not in RECOGNISED:
         raise InputError(unknown("way of recognising", relations, RECOGNISED))

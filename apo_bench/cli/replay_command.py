@@ -47,7 +47,8 @@ def replay(
 ) -> None:
     """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
     from apo_bench.cli.terminal import print_row
-    from apo_bench.sweeps.one import Request, run_one
+    from apo_bench.trial.request import Request
+    from apo_bench.trial.run_request import run_request
 
     for path, option, endings in (
         (video, "--video", (".mp4", ".gif")),
@@ -61,20 +62,26 @@ def replay(
         place = choose_place(port)
     elif port is not None:
         raise InputError(f"--port {port}, which is for --view, was given without it; leave it out.")
+    if view and trial_limit is not None:
+        raise InputError("--view was given together with --trial-limit; leave one of them out.")
     request = Request(
         scenario=scenario,
         asked=asked,
         observation=observation,
         save_observation=save_observation,
         video=video,
-        limit_s=trial_limit,
         corrector_limit_s=corrector_limit,
         cache=cache,
     )
     stories: list[Story] = []
     try:
         with redirect_output(as_json):
-            row = run_one(request, stories.append if view else None)
+            if trial_limit is None:
+                row = run_request(request, stories.append if view else None)
+            else:
+                from apo_bench.sweeps.local.alone import run_request_alone
+
+                row = run_request_alone(request, trial_limit)
     except KeyboardInterrupt as error:
         raise interrupted(error) from error
     if as_json:

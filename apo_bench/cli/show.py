@@ -41,7 +41,7 @@ def show(
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.believed_picture import belief_lines, belief_panel, draw_beliefs
-    from apo_bench.sweeps.one import looked_at
+    from apo_bench.trial.request import looked_at
 
     check_writable(out, "--out", (".png",))
     loaded = load_scenario(scenario)

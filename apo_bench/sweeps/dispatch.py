@@ -16,7 +16,8 @@ from apo_bench.sweeps.environment_lock import EnvironmentLock
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message, checked
 from apo_bench.sweeps.stopping import Check
-from apo_bench.sweeps.worker import Emit, lost, timing
+from apo_bench.sweeps.worker import Emit, timing
+from apo_bench.trial.failed_row import lost
 
 STARTING_S = 300.0
 """What a worker gets to be ready, and to compile a scene."""

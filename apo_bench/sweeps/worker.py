@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -12,24 +11,22 @@ from typing import TYPE_CHECKING, Any, final
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.correctors import CorrectorMisbehaved
-from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
+from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.records.key import KEY, row_key
 from apo_bench.records.method import parsed
 from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import Row
-from apo_bench.records.run.checked import unwritable
 from apo_bench.records.settings import TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.messages import Message
-from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.failed_row import trial_row
+from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
-from apo_bench.trial.row import head, result
+from apo_bench.trial.row import result
 from apo_bench.trial.scene import scene_key, scene_of
 from apo_bench.trial.stages import Recording, record_demonstration
-from apo_bench.trial.trial import run_trial
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.environment_lock import EnvironmentLock
@@ -39,7 +36,6 @@ Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
 Emit = Callable[[Row, Timing], None]
 """Takes the row of a trial that has ended; every trial of a sweep yields exactly one."""
-_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
 
 
 @final
@@ -117,41 +113,6 @@ class Worker:
         return self._scenes[key]
 
 
-def trial_row(spec: TrialSettings, scene: Scene, recording: Recording, content: str, **more: Any) -> Row:
-    """The row of a trial, also of one whose corrector misbehaved.
-
-    What code of somebody's own returned may be what no row can hold; that is its failure too.
-
-    Args:
-        more: Further arguments of `run_trial`.
-
-    Raises:
-        InputError: The request cannot be honoured.
-    """
-    try:
-        row = run_trial(spec, scene, recording=recording, content=content, **more)
-        wrong = unwritable(row) if ":" in spec.method else ""
-        said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
-    except CorrectorLost as error:
-        return lost(spec, content, error.code, "corrector")
-    except CorrectorMisbehaved as error:
-        wrong = said = str(error)
-    return misbehaved(spec, content, recording.demonstration.code, said) if wrong else row
-
-
-def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:
-    """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
-
-    Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
-
-    Args:
-        content: From the lock of the sweep: `lock.content[spec.scenario]`.
-        code: `worker_died` or `time_limit`.
-        what: Whose process died or whose limit it was: `trial` or `corrector`.
-    """
-    return _failed(spec, content, None, Outcome("worker", code, None, sentence(code, what=what)))
-
-
 def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
     """The row, or the failed row of a trial that took longer than the limit and ended before anyone looked."""
     took_s = (timing["demonstrate_s"] or 0.0) + (timing["trial_s"] or 0.0)
@@ -159,16 +120,6 @@ def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
         return row
     late = Outcome("worker", "time_limit", None, sentence("time_limit"))
     return row | {"demonstration": None} | result(late, success=False)
-
-
-def misbehaved(spec: TrialSettings, content: str, demonstration: str, said: str) -> Row:
-    """The failed row of a trial whose corrector raised an error or returned what it must not.
-
-    Args:
-        said: What it did; addresses of objects, which differ from run to run, are left out.
-    """
-    said = _ADDRESS.sub("0x...", said.encode(errors="replace").decode())
-    return _failed(spec, content, demonstration, Outcome("correct", "raised", None, said))
 
 
 def timing(
@@ -191,8 +142,3 @@ def timing(
 
 def _raise(error: Exception, observation: Observation) -> None:
     raise error
-
-
-def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Outcome) -> Row:
-    first = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
-    return first | {"demonstration": demonstration} | result(end, success=False)

@@ -243,14 +243,14 @@ def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], t
 def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dataclasses import replace
 
-    from apo_bench.sweeps import one
+    from apo_bench.trial import run_request
 
     def fails(*arguments: Any) -> Any:
         recording = record(*arguments)
         return replace(recording, demonstration=replace(recording.demonstration, code="demonstration_failed"))
 
-    record = one.record_demonstration
-    monkeypatch.setattr(one, "record_demonstration", fails)
+    record = run_request.record_demonstration
+    monkeypatch.setattr(run_request, "record_demonstration", fails)
     code, out, _ = run(capsys, *TRIAL, "--json")
     assert code == 1
     assert json.loads(out)["success"] is None

@@ -35,7 +35,8 @@ from apo_bench.sweeps.local import pool
 from apo_bench.sweeps.local.pool import FALSE_STARTS, spread
 from apo_bench.sweeps.stopping import Stopped, listening
 from apo_bench.sweeps.sweep import run_sweep
-from apo_bench.sweeps.worker import Worker, lost, misbehaved
+from apo_bench.sweeps.worker import Worker
+from apo_bench.trial.failed_row import lost, misbehaved
 from apo_bench.trial.fingerprint import content_hash
 from tests import pages
 

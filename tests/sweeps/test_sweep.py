@@ -31,6 +31,7 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps import worker
 from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
+from apo_bench.trial import failed_row
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.row import result
 
@@ -66,10 +67,10 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         return {"schema": ROW, "spec_hash": hashed, **dict(zip(KEY, key, strict=True)), **ended}
 
     monkeypatch.setattr("apo_bench.sweeps.grid.load_scenario", LOAD)
-    monkeypatch.setattr(worker, "load_scenario", LOAD)
+    monkeypatch.setattr(failed_row, "load_scenario", LOAD)
     monkeypatch.setattr(worker, "scene_of", compiled)
     monkeypatch.setattr(worker, "record_demonstration", record)
-    monkeypatch.setattr(worker, "run_trial", run_trial)
+    monkeypatch.setattr(failed_row, "run_trial", run_trial)
     return did
 
 
@@ -184,19 +185,19 @@ def test_an_interrupted_sweep_goes_on_where_it_was_left(
     counted: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = runner.run_sweep(SPEC, tmp_path / "whole")
-    quick = worker.run_trial
+    quick = failed_row.run_trial
 
     def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
         if (spec.seed, spec.method, spec.level_mm) == (11, "paper", 0.0):
             raise KeyboardInterrupt
         return quick(spec, scene, **more)
 
-    monkeypatch.setattr(worker, "run_trial", interrupted)
+    monkeypatch.setattr(failed_row, "run_trial", interrupted)
     with pytest.raises(KeyboardInterrupt):
         runner.run_sweep(SPEC, tmp_path / "part")
     left = read_rows(tmp_path / "part")
     assert 0 < len(left) < ROWS
-    monkeypatch.setattr(worker, "run_trial", quick)
+    monkeypatch.setattr(failed_row, "run_trial", quick)
     counted.clear()
     assert runner.run_sweep(SPEC, tmp_path / "part") == whole
     assert counted["trial"] == ROWS - len(left)

@@ -17,10 +17,11 @@ from apo_bench.report.failures import FailurePicture
 from apo_bench.report.figures.sheet import Drawing
 from apo_bench.report.page.document import page
 from apo_bench.report.page.matrix import matrices
-from apo_bench.report.page.trials import packed_json, trials, why
+from apo_bench.report.page.trials import packed_json, trials
 from apo_bench.report.run_facts import limits_of, run_facts
 from apo_bench.report.tables import calibration, confusion, effort, gaps, half_levels, pairs, recognition
 from apo_bench.report.tables.table import Table
+from apo_bench.report.trial_words import why
 from apo_bench.statistics.rates import Cell, place_of
 from apo_bench.statistics.settings import Setting, cell_place, setting_of
 from apo_bench.statistics.summary import Summary

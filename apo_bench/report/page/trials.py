@@ -15,11 +15,10 @@ from apo_bench.records.row import Row, look_up
 from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.report_rows import NUMBERS
 from apo_bench.records.settings import SETTINGS
+from apo_bench.report.trial_words import verdict, why
 from apo_bench.statistics.rates import Cell, by_place
 from apo_bench.statistics.settings import cell_place
 
-FAILED, RIGHT, LOOSE, EXCLUDED = "failed", "right", "loosely right", "excluded"
-OTHERWISE = "right, not as demonstrated"
 DECIMALS = {"extra_operations": 0, "least_overlap": 2, "peak_force_n": 1, "sim_seconds": 1}
 """Of numbers; of those in mm and degrees, and of others, three."""
 ASKED = tuple(info.column for name, info in SETTINGS.items() if name not in ("seed", "salt"))
@@ -78,23 +77,6 @@ def packed_json(values: Mapping[str, Any]) -> Markup:
     """Values as base64 of gzip of JSON: letters that mean nothing in HTML; equal bytes for equal values."""
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
     return Markup(base64.b64encode(gzip.compress(text, compresslevel=6, mtime=0)).decode())
-
-
-def verdict(row: Row) -> str:
-    """How a trial ended, in a word or two."""
-    if row["success"] is None:
-        return EXCLUDED
-    if row["success"]:
-        return RIGHT if row["as_demonstrated"] else OTHERWISE
-    return LOOSE if row["loose_success"] else FAILED
-
-
-def why(row: Row) -> str:
-    """`attach: force_stop, operation 3`; nothing where nothing failed."""
-    if row["failure_stage"] is None:
-        return ""
-    where = "" if row.get("failure_operation") is None else f", operation {row['failure_operation']}"
-    return f"{row['failure_stage']}: {row['failure_code']}{where}"
 
 
 def predicted(said: Mapping[str, Any] | None) -> str:

@@ -14,8 +14,12 @@ from apo_bench.simulation.scene.scene import Scene
 
 SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""
-HIGH_M, WAY_M, STAND_S = 0.35, 0.15, 0.3
-"""Errors are looked at on a way of this length at this height, after so long a stand."""
+HIGH_M = 0.35
+"""Height at which errors are looked at."""
+WAY_M = 0.15
+"""Length of the way along which they are looked at."""
+STAND_S = 0.3
+"""How long the arm stands before it."""
 
 
 @final

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from apo_bench.records.row import Row
@@ -11,10 +12,22 @@ from apo_bench.sweeps.dispatch import STARTING_S, check_limit
 from apo_bench.sweeps.local.pool import GOING_S
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.stopping import Check, listening
+from apo_bench.trial.request import Request
+from apo_bench.trial.run_request import Say, checked_request, lost_request, work_on
 
-Say = Callable[..., None]
-"""Takes "began" when the time of the trial begins to count, and "row" with the row when it ends."""
 _Work = Callable[[Say], Any]
+
+
+def run_request_alone(request: Request, limit_s: float) -> Row:
+    """What `run_request` does, in a process of its own that may take so much wall time.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
+        RuntimeError: The trial could not be run.
+        KeyboardInterrupt: A signal asked for an end.
+    """
+    scenario, settings = checked_request(request)
+    return run_alone(partial(work_on, request, settings), limit_s, partial(lost_request, request, settings, scenario))
 
 
 def run_alone(work: _Work, limit_s: float, lost: Callable[[str], Row]) -> Row:

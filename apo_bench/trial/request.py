@@ -1,0 +1,146 @@
+"""What is asked for of one trial, its settings, and what is seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, final
+
+from apo_bench.assembly.goals import Observation
+from apo_bench.errors import InputError
+from apo_bench.records.asked import in_python
+from apo_bench.records.limits import CORRECTOR_LIMIT_S
+from apo_bench.records.relations import RECOGNISED
+from apo_bench.records.salt import read_salt
+from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.trial.scene import scene_of
+from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
+from apo_bench.trial.trial import noise_of
+
+DRAWN = (
+    LEVEL.name,
+    "level_mm",
+    "level_deg",
+    "careless",
+    "noise",
+    "relations",
+    "eye",
+    "looks",
+    "robot_error",
+    "seed",
+    "salt_file",
+)
+"""What has no meaning for an observation that comes from a file, though its contacts may be recognised."""
+
+
+@final
+@dataclass(frozen=True)
+class Request:
+    """One replay."""
+
+    scenario: str
+    asked: Mapping[str, Any] = field(default_factory=dict)
+    """Option as an argument (`level`, `clearance`, `salt_file`, ...) -> value; what is not there or None is as usual.
+    """
+    observation: Path | None = None
+    save_observation: Path | None = None
+    video: Path | None = None
+    corrector_limit_s: float = CORRECTOR_LIMIT_S
+    """Wall time that a corrector named as `module:name` may take."""
+    cache: Path | None = None
+    """A folder where demonstrations are kept; the row is the same with and without it."""
+
+
+def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
+    """The settings that a request means.
+
+    Args:
+        clearance_mm: Of the scenario, where the request does not say.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
+    """
+    asked = {name: value for name, value in request.asked.items() if value is not None}
+    if request.observation:
+        _refuse_contradictions(request, asked)
+    for name in ("noise", "level_deg"):
+        if asked.get("eye") == RANGE and name in asked:
+            raise InputError(
+                f"{_option(name)} was given together with --eye range, which draws no pose noise; "
+                "--level is the noise of its rays in mm."
+            )
+    usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
+    if "level" in asked:
+        usual |= dict.fromkeys(("level_mm", "level_deg"), asked.pop("level"))
+    if "salt_file" in asked:
+        asked["salt_file"] = read_salt(asked["salt_file"])
+    return TrialSettings(**(usual | in_python(asked)))
+
+
+def looked_at(
+    scenario: str,
+    observation: Path | None,
+    asked: Mapping[str, Any],
+    deviations: Mapping[str, float | None],
+) -> tuple[Observation, bool]:
+    """What is seen of a trial, or stands in a file, and whether standard deviations had to be assumed.
+
+    Args:
+        asked: What only a trial knows: level, seed, noise and so on, as in `Request`.
+        deviations: What only a file may need: `deviation_mm` and `deviation_deg`.
+
+    Raises:
+        InputError: One of the two was given with the other, or something is not allowed.
+    """
+    refused, reason = (deviations, "is for files") if observation is None else (asked, "draws a trial")
+    for name, value in refused.items():
+        if value is not None:
+            where = "without" if observation is None else "together with"
+            raise InputError(
+                f"{_option(name)}, which {reason}, was given {where} --observation; leave one of them out."
+            )
+    if observation is None:
+        return watched(Request(scenario, asked)), False
+    from apo_bench.files.observation import read_observation_file
+
+    stated = {name: value for name, value in deviations.items() if value is not None}
+    seen, _, assumed = read_observation_file(observation, scenario, **stated)
+    return seen, assumed
+
+
+def watched(request: Request) -> Observation:
+    """What is seen of the trial that was asked for; nothing is replayed.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
+        RuntimeError: The demonstration itself failed.
+    """
+    scenario = load_scenario(request.scenario)
+    spec = requested_settings(request, scenario.clearance_mm)
+    scene = scene_of(spec, scenario)
+    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    if recording.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(recording.demonstration).sentence}; try another seed")
+    return look(spec, scene, recording)
+
+
+def look(spec: TrialSettings, scene: Scene, recording: Recording) -> Observation:
+    """The demonstration of a trial through its eye."""
+    return observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
+
+
+def _refuse_contradictions(request: Request, asked: Mapping[str, Any]) -> None:
+    may_be = asked.get("relations") in ("given", *RECOGNISED)
+    given = [name for name in DRAWN if name in asked and not (name == "relations" and may_be)]
+    more = [name for name in ("save_observation", "cache") if getattr(request, name) is not None]
+    for name in (*given, *more):
+        raise InputError(
+            f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
+        )
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
