@@ -18,7 +18,7 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
-from apo_bench.simulation.film.track import ReplayTrack
+from apo_bench.simulation.film.track import Track
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.failed_row import lost, trial_row
@@ -78,7 +78,8 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
 
 def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
     scene, recording = scene_of(spec), None
-    track = ReplayTrack() if request.video or show else None
+    track = Track() if request.video or show else None
+    watch = None if track is None else track.hooks
     if request.video:
         renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run
     say("began")
@@ -87,10 +88,10 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: 
         from apo_bench.files.observation import read_stated
 
         seen = read_stated(request.observation, scene.scenario)
-        row = _measured(request.observation, seen, spec, scene, method, track)
+        row = _measured(request.observation, seen, spec, scene, method, watch)
     else:
         recording = _recording(request, spec, scene)
-        row = _drawn(request, spec, scene, recording, method, track)
+        row = _drawn(request, spec, scene, recording, method, watch)
         if track is not None and row["sim_seconds"] is not None:
             seen = look(spec, scene, recording)
     say("row", row)

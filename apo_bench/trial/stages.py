@@ -192,7 +192,7 @@ def replay_and_judge(
 
     Args:
         reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
-        watch: Called with the `MjData` about every 20 ms of simulated time.
+        watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time that the replay may take.
         error: What is wrong with the robot; the judge does not care whose error it was.

@@ -15,7 +15,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import stages
-from apo_bench.simulation.film.track import Chapter, HandTrack, ReplayTrack
+from apo_bench.simulation.film.track import Chapter, Track
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import Recording, watch_again
 
@@ -46,7 +46,7 @@ def told(
     spec: TrialSettings,
     scene: Scene,
     seen: Observation,
-    track: ReplayTrack,
+    track: Track,
     row: Row,
     recording: Recording | None = None,
 ) -> Story:
@@ -88,8 +88,8 @@ def ending(row: Row) -> str:
 
 
 def _demonstration(spec: TrialSettings, scene: Scene, recording: Recording) -> Chapter:
-    track = HandTrack()
-    watch_again(scene, recording, spec.careless, spec.seed, spec.salt, track)
+    track = Track()
+    watch_again(scene, recording, spec.careless, spec.seed, spec.salt, track.hooks)
     how = f"seen with errors of {spec.level_mm:g} mm and {spec.level_deg:g} deg"
     return Chapter(
         title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",

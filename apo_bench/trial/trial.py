@@ -67,7 +67,7 @@ def run_trial(
         recording: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
         method: What `OwnCorrectors.find` makes of the method of `settings`, if it is at hand.
-        watch: Called with the `MjData` of the replay about every 20 ms of simulated time.
+        watch: Called with the `MjData` of the replay about every 20 ms of simulated time; or several `Hooks`.
         cache: What replays of this scene and seed have in common; changes nothing but the time it takes.
 
     Raises:

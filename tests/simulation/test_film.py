@@ -10,9 +10,9 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.film.captions import ABOVE_PX, BELOW_PX, Caption, captioned
 from apo_bench.simulation.film.film import frames, operation_words, sampled
-from apo_bench.simulation.film.track import BY_HAND, Chapter, HandTrack, Moment, ReplayTrack
+from apo_bench.simulation.film.track import Chapter, Moment, Track
+from apo_bench.simulation.hooks import BY_HAND, Doing
 from apo_bench.simulation.human.demonstration import demonstrate
-from apo_bench.simulation.robot.doing import Doing
 from apo_bench.simulation.scene.scene import build_scene
 
 
@@ -31,9 +31,9 @@ def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
 def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     scene = build_scene(load_scenario("block_on_block"))
     layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
-    assembly, track, hands = scene.scenario.assembly, ReplayTrack(), HandTrack()
+    assembly, track, hands = scene.scenario.assembly, Track(), Track()
     plan = Plan(assembly, layout.start, layout.goals)
-    assert replay(plan, scene, track, fidelity="contact").outcome.code == "ok"
+    assert replay(plan, scene, track.hooks, fidelity="contact").outcome.code == "ok"
     assert track.plan is plan
     order = list(dict.fromkeys((m.doing.operation, m.doing.macro) for m in track.moments if m.doing.operation == 1))
     assert order == [(1, stage) for stage in ("pick", "lift", "carry", "move-to-contact", "release", "depart")]
@@ -41,7 +41,7 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     assert max(doing.force_n for doing in landed) > 1.0
     assert operation_words(assembly, track.moments[-1]).startswith("operation 2 of 2")
 
-    demonstrate(scene, layout, 0.0, np.random.default_rng(1), hands)
+    demonstrate(scene, layout, 0.0, np.random.default_rng(1), hands.hooks)
     assert {m.doing for m in hands.moments} == {Doing(k, BY_HAND, 0.0) for k in (None, 0, 1)}
     end = np.array(hands.moments[-1].qpos)
     chapter = Chapter("shown", scene.shown, layout.start, (hands.moments[0], hands.moments[-1]), "done", None)

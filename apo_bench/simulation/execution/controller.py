@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +16,9 @@ from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, moves, unreachable
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
-from apo_bench.simulation.robot.doing import Inspector
+from apo_bench.simulation.hooks import Hooks, hooks_of
 from apo_bench.simulation.robot.hold_watch import HoldWatch
-from apo_bench.simulation.robot.robot import Halt, Robot, Watch
+from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import sleeping, snapshot
@@ -36,7 +38,7 @@ steps quarters end 17, halves 10, and all of these in turn every one."""
 def replay(
     plan: Plan,
     scene: Scene,
-    watch: Watch | None = None,
+    watch: Hooks | Callable[[Any], None] | None = None,
     parts_at: Poses | None = None,
     fidelity: str = "full",
     cache: ReplayCache | None = None,
@@ -47,7 +49,7 @@ def replay(
     """Carry out a plan.
 
     Args:
-        watch: Called with the `MjData` about every 20 ms of simulated time.
+        watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
         fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out, and what rests
             untouched is not stepped.
@@ -65,9 +67,11 @@ def replay(
     ended = None if refused or not way or most_s < math.inf else cache.ended(way[-1])
     if ended is not None:
         return ended
-    if isinstance(watch, Inspector):
-        watch.begin(plan)
-    robot, after = Robot(scene, start, watch, fidelity, error), list[Snapshot | None]([None] * len(plan.assembly))
+    hooks = hooks_of(watch)
+    if hooks.before_replay is not None:
+        hooks.before_replay(plan)
+    robot = Robot(scene, start, hooks, fidelity, error)
+    after = list[Snapshot | None]([None] * len(plan.assembly))
     timeline = list[tuple[Step, float]]()
     with sleeping(scene.work, scene.grasp == "friction"):
         outcome = refused or _carry_out(plan, robot, todo, after, timeline, cache, way, most_s)
@@ -127,6 +131,8 @@ def _carry_out(
         if robot.data.time > most_s:
             return _late(plan, "pick", step)
         robot.step = step
+        if robot.hooks.before_step is not None:
+            robot.hooks.before_step(step)
         try:
             if kept is None or done <= 2 * i:
                 grip = take(robot, t)
@@ -146,6 +152,8 @@ def _carry_out(
         after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
         timeline.append((step, float(robot.data.time)))
         cache.keep(way[2 * i + 1], robot, 0, after, timeline)
+        if robot.hooks.after_step is not None:
+            robot.hooks.after_step(step)
     return Outcome("done", "ok", None, sentence("ok"))
 
 

@@ -16,7 +16,8 @@ from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import world_bounds
 from apo_bench.simulation.film.captions import Caption, captioned, ending_lines, one_line
-from apo_bench.simulation.film.track import BY_HAND, Chapter, Moment
+from apo_bench.simulation.film.track import Chapter, Moment
+from apo_bench.simulation.hooks import BY_HAND
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.render import camera_view, save_film
 from apo_bench.simulation.scene.world import World, initial_state

@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Face
 from apo_bench.simulation.film.track import NO_HANDS, Chapter, Moment
-from apo_bench.simulation.robot.doing import Doing
+from apo_bench.simulation.hooks import Doing
 from apo_bench.simulation.scene.render import arm_home
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state, place

@@ -9,11 +9,9 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.simulation.robot.doing import Doing
-from apo_bench.simulation.robot.robot import TICK_S
+from apo_bench.simulation.hooks import Doing, Hooks
 from apo_bench.simulation.scene.world import World
 
-BY_HAND = "by hand"
 NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
 
 
@@ -45,34 +43,19 @@ class Chapter:
 
 @final
 @dataclass(eq=False)
-class ReplayTrack:
-    """Keeps a replay: pass it as `watch`."""
+class Track:
+    """Keeps a demonstration or a replay: pass its `hooks` as `watch`."""
 
     plan: Plan | None = None
+    """What is replayed; None of a demonstration."""
     moments: list[Moment] = field(default_factory=list)
 
-    def begin(self, plan: Plan) -> None:
+    @property
+    def hooks(self) -> Hooks:
+        return Hooks(before_replay=self._begin, after_tick=self._keep)
+
+    def _begin(self, plan: Plan) -> None:
         self.plan = plan
 
-    def inspect(self, data: Any, doing: Doing) -> None:
-        self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, NO_HANDS))
-
-    def __call__(self, data: Any) -> None:
-        self.inspect(data, Doing(None, "", 0.0))
-
-
-@final
-@dataclass(eq=False)
-class HandTrack:
-    """Keeps a demonstration: pass it as `watch`."""
-
-    period_s: float = TICK_S
-    moments: list[Moment] = field(default_factory=list)
-    _operation: int | None = None
-
-    def begin(self, operation: int) -> None:
-        self._operation = operation
-
-    def __call__(self, data: Any) -> None:
-        doing = Doing(self._operation, BY_HAND, 0.0)
+    def _keep(self, data: Any, doing: Doing) -> None:
         self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from apo_bench.assembly.goals import Demonstration, Layout
@@ -13,15 +16,20 @@ from apo_bench.judging.verdict import judge
 from apo_bench.records.outcomes import sentence
 from apo_bench.scenario.human_error import careless_covariance, spread_error
 from apo_bench.scenario.scenario import Carelessness
+from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.acts import act
-from apo_bench.simulation.human.hands import Hands, Watcher
+from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.human.perform import REST_S, perform
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, sleeping, snapshot
 
 
 def demonstrate(
-    scene: Scene, layout: Layout, human_error: float, rng: np.random.Generator, watch: Watcher | None = None
+    scene: Scene,
+    layout: Layout,
+    human_error: float,
+    rng: np.random.Generator,
+    watch: Hooks | Callable[[Any], None] | None = None,
 ) -> Demonstration:
     """Assemble by hand, with an error of `human_error` times the scenario's carelessness.
 
@@ -32,7 +40,8 @@ def demonstrate(
     Args:
         human_error: 0 is a careful human, 1 the scenario's, any other number a multiple of it.
         rng: Drawn from in the same way whatever `human_error` is, so that hands of one seed differ in size only.
-        watch: Looks on; the demonstration is the same with and without it.
+        watch: Called with the `MjData` at the start and every `period_s` of simulated time, an attribute of it, by
+            default 20 ms; or several `Hooks`. The demonstration is the same with and without it.
     """
     scenario = scene.scenario
     error = spread_error(scenario, layout, _draw(scenario.careless, human_error, rng))
@@ -48,6 +57,7 @@ def demonstrate(
             perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
             after.append(snapshot(scene.shown, hands.data, layout.start))
             goals.append(after[-1].poses[operation.main])
+            hands.end(k)
         hands.wait(REST_S)
     final = snapshot(scene.shown, hands.data, layout.start)
     why = "the simulation became unstable" if has_failed(hands.data) else _wrong(scene, layout, after, final)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import partial
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.goals import Poses, Step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.geometry.convex import all_boxes
+from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
@@ -31,40 +32,32 @@ _LOOK_STEPS = 10
 """While it waits it looks so often whether everything sleeps."""
 
 
-class Watcher(Protocol):
-    """Looks on: called with the `MjData` at the start and every `period_s` of simulated time, it changes nothing."""
-
-    period_s: float
-
-    def __call__(self, data: Any) -> None: ...
-
-
-@runtime_checkable
-class Audience(Watcher, Protocol):
-    """A watcher that is told which operation begins, counted from 0."""
-
-    def begin(self, operation: int) -> None: ...
-
-
 class Hands:
     """Two hands and the parts before them; one demonstration long."""
 
-    def __init__(self, scene: Scene, start: Poses, watch: Watcher | None = None) -> None:
+    def __init__(self, scene: Scene, start: Poses, watch: Hooks | Callable[[Any], None] | None = None) -> None:
         self.scene, self.world = scene, scene.shown
         self.data: Any = initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
-        self._watch, self._steps = watch, 0
-        self._every = max(1, round(watch.period_s / self._step_s)) if watch else 0
-        if watch:
-            watch(self.data)
+        self._hooks = hooks_of(watch)
+        self._operation: int | None = None
+        self._steps = 0
+        self._every = max(1, round(self._hooks.tick_s / self._step_s))
+        self._tick(self.data)
         self._mocap = [int(self.world.model.body(hand).mocapid[0]) for hand in HANDS]
         self._at = [np.eye(4) for _ in HANDS]
         self._held: list[dict[str, Array]] = [{} for _ in HANDS]
 
     def begin(self, operation: int) -> None:
         """Say which operation begins, counted from 0, to who wants to know."""
-        if isinstance(self._watch, Audience):
-            self._watch.begin(operation)
+        self._operation = operation
+        if self._hooks.before_step is not None:
+            self._hooks.before_step(Step(operation))
+
+    def end(self, operation: int) -> None:
+        """Say which operation has ended, counted from 0, to who wants to know."""
+        if self._hooks.after_step is not None:
+            self._hooks.after_step(Step(operation))
 
     def pose(self, part: str) -> Array:
         """Where a movable part is, (4, 4)."""
@@ -148,9 +141,9 @@ class Hands:
 
     def _step(self, n: int) -> None:
         """Step, and let who watches look whenever it is time."""
-        while self._watch and n >= (left := self._every - self._steps):
+        while self._hooks.after_tick is not None and n >= (left := self._every - self._steps):
             mujoco.mj_step(self.world.model, self.data, left)
-            self._watch(self.data)
+            self._tick(self.data)
             n, self._steps = n - left, 0
         if n:
             mujoco.mj_step(self.world.model, self.data, n)
@@ -162,14 +155,19 @@ class Hands:
         Args:
             put: Makes of the present state what it will be so many steps later; who watches is shown that in a copy.
         """
-        if self._watch:
+        if self._hooks.after_tick is not None:
             for i in range(self._every - self._steps, steps + 1, self._every):
                 picture = copy(self.data)
                 self._after(picture, i, put)
                 mujoco.mj_kinematics(self.world.model, picture)
-                self._watch(picture)
+                self._tick(picture)
             self._steps = (self._steps + steps) % self._every
         self._after(self.data, steps, put)
+
+    def _tick(self, data: Any) -> None:
+        """Let who watches look."""
+        if self._hooks.after_tick is not None:
+            self._hooks.after_tick(data, Doing(self._operation, BY_HAND, 0.0))
 
     def _after(self, data: Any, steps: int, put: Callable[[Any, int], None]) -> None:
         put(data, steps)

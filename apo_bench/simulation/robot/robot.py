@@ -16,7 +16,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses, Step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.robot.doing import Doing, Inspector
+from apo_bench.simulation.hooks import TICK_S, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.fast_forward import fast_forward, take_along
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.hold_watch import HoldWatch
@@ -30,16 +30,12 @@ from apo_bench.simulation.robot.steadying import Carried, steadied
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
 
-TICK_S = 0.02
-"""How often the arm looks for trouble and a film takes a picture."""
 _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
 _REST_RAD_S, _REST_M_S = 2e-3, 3e-3
 """Joints and fingers that move slower than this rest."""
 _SHIFT_M = 0.001
 """How far the tip is shifted in thought to see how the joints turn."""
-
-Watch = Callable[[Any], None]
 
 
 class Halt(Exception):
@@ -66,18 +62,19 @@ class Robot:
         self,
         scene: Scene,
         start: Poses,
-        watch: Watch | None = None,
+        watch: Hooks | Callable[[Any], None] | None = None,
         fidelity: str = "full",
         error: RobotError | None = None,
     ) -> None:
-        self.scene, self.watch, self._error = scene, watch, error
+        self.scene = scene
+        self.hooks = hooks_of(watch)
+        self._error = error
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
         # What is near is looked for where the tip is believed, so with joints that are off nothing is left out.
         self.fidelity = "full" if self._off.any() else fidelity
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
         self.model, self.arm = scene.work.model, scene.arm
-        self._inspect = watch.inspect if isinstance(watch, Inspector) else None
         self.stage, self.macro = "plan", ""
         self.step: Step | None = None
         self._held: tuple[str, ...] = ()
@@ -383,7 +380,7 @@ class Robot:
                 self._look()
 
     def _look(self) -> None:
-        """Once a tick: stability, contact force on the held part, blows to other parts; the film's picture."""
+        """Once a tick: stability, contact force on the held part, blows to other parts; then the hook."""
         if has_failed(self.data):
             raise Halt(self.stage, "unstable_simulation")
         if self._carried is not None:
@@ -393,12 +390,10 @@ class Robot:
             struck, force = self._hardest_blow()
             if force > _COLLISION_N:
                 raise Halt(self.stage, "collision", struck)
-        if self._inspect is not None:
+        if self.hooks.after_tick is not None:
             said = self.macro if self.stage == "attach" else self.stage
             k, undoes = self.step or (None, False)
-            self._inspect(self.data, Doing(k, said, math.hypot(*self._wrist.force), undoes))
-        elif self.watch is not None:
-            self.watch(self.data)
+            self.hooks.after_tick(self.data, Doing(k, said, math.hypot(*self._wrist.force), undoes))
 
     def _feel(self, step_s: float) -> list[float]:
         """The net force in the last step, (3,) world, [N]; the largest that the sensor shows is remembered."""

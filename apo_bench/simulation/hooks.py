@@ -1,0 +1,58 @@
+"""One list of hooks: what is called while hands demonstrate or a robot replays. Whoever is called changes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+from apo_bench.assembly.goals import Plan, Step
+
+TICK_S = 0.02
+"""How often the arm looks for trouble and a film takes a picture."""
+BY_HAND = "by hand"
+
+
+class Doing(NamedTuple):
+    """What is done at one moment."""
+
+    operation: int | None
+    """From 0; None before the first begins."""
+    macro: str
+    """The macros of the motion, or the stage where it is none: `pick`, `carry`, `insert-into, move-to-bottom`; of a
+    demonstration `by hand`."""
+    force_n: float
+    """On what is in the hand, [N], as the sensor at the wrist shows it; 0 with an empty hand, and of a human."""
+    undoes: bool = False
+    """Whether the operation is undone, to be done again later."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Hooks:
+    """Functions that are called while something is done; None: nothing is called then."""
+
+    before_replay: Callable[[Plan], None] | None = None
+    """With the plan, also with one that is refused before anything moves; no human has one."""
+    before_step: Callable[[Step], None] | None = None
+    """Before an operation is done or undone."""
+    after_step: Callable[[Step], None] | None = None
+    """After it, when everything rests; not of one that fails."""
+    after_tick: Callable[[Any, Doing], None] | None = None
+    """With the `MjData`, every tick of simulated time; of a demonstration also at its start."""
+    tick_s: float = TICK_S
+    """How long a tick of a demonstration is; a robot's is `TICK_S`."""
+
+
+def hooks_of(watch: Hooks | Callable[[Any], None] | None) -> Hooks:
+    """What is passed as `watch` as hooks: a function of the `MjData` is called after every tick.
+
+    Args:
+        watch: A function may say by an attribute `period_s` how long a tick of a demonstration is.
+    """
+    if isinstance(watch, Hooks):
+        return watch
+    if watch is None:
+        return Hooks()
+    look = watch
+    return Hooks(after_tick=lambda data, doing: look(data), tick_s=getattr(watch, "period_s", TICK_S))

@@ -1,0 +1,106 @@
+"""What is called while hands demonstrate or a robot replays, and in which order."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench.assembly.goals import Layout, Plan, Step
+from apo_bench.geometry import pose
+from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.layout import draw_layout
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
+from apo_bench.simulation.human.demonstration import demonstrate
+from apo_bench.simulation.scene.scene import Scene, build_scene
+
+
+class Calls:
+    """Writes down what is called, one after the other."""
+
+    def __init__(self) -> None:
+        self.made: list[tuple[str, Any]] = []
+        self.macros: set[str] = set()
+
+    @property
+    def hooks(self) -> Hooks:
+        return Hooks(
+            before_replay=lambda plan: self.made.append(("replay", plan)),
+            before_step=lambda step: self.made.append(("before", step)),
+            after_step=lambda step: self.made.append(("after", step)),
+            after_tick=self._tick,
+        )
+
+    @property
+    def order(self) -> list[tuple[str, Any]]:
+        """What was called; ticks of one operation count once."""
+        return [call for call, _ in groupby(self.made)]
+
+    def _tick(self, data: Any, doing: Doing) -> None:
+        self.made.append(("tick", doing.operation))
+        self.macros.add(doing.macro)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario("block_on_block"))
+
+
+@pytest.fixture(scope="module")
+def layout(scene: Scene) -> Layout:
+    return draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
+
+
+BOTH_STEPS = [
+    ("tick", None),
+    *[("before", Step(0)), ("tick", 0), ("after", Step(0))],
+    *[("before", Step(1)), ("tick", 1), ("after", Step(1))],
+    ("tick", 1),
+]
+
+
+def test_a_replay_calls_its_hooks_before_and_after_each_step_and_each_tick(scene: Scene, layout: Layout) -> None:
+    calls, plan = Calls(), Plan(scene.scenario.assembly, layout.start, layout.goals)
+    assert replay(plan, scene, calls.hooks, fidelity="contact").outcome.code == "ok"
+    assert calls.order == [("replay", plan), *BOTH_STEPS]
+
+
+def test_a_demonstration_calls_the_same_hooks_but_for_that_of_the_plan(scene: Scene, layout: Layout) -> None:
+    calls = Calls()
+    demonstrate(scene, layout, 0.0, np.random.default_rng(1), calls.hooks)
+    assert calls.order == BOTH_STEPS
+    assert calls.macros == {BY_HAND}
+
+
+def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
+    """The first part stands 40 mm beside where the plan has it, and the fingers close on nothing."""
+    calls, plan = Calls(), Plan(scene.scenario.assembly, layout.start, layout.goals)
+    first = scene.scenario.assembly.operations[0].main
+    aside = {**layout.start, first: pose.at((0.0, 0.04, 0.0)) @ layout.start[first]}
+    assert replay(plan, scene, calls.hooks, parts_at=aside, fidelity="contact").outcome.code != "ok"
+    assert calls.order == [("replay", plan), ("tick", None), ("before", Step(0)), ("tick", 0)]
+
+
+def test_of_a_plan_that_is_refused_the_plan_is_said_and_no_step(scene: Scene, layout: Layout) -> None:
+    calls = Calls()
+    far = np.array([pose.at((3.0, 0.0, 0.0)) @ T for T in layout.goals])
+    plan = Plan(scene.scenario.assembly, layout.start, far)
+    assert replay(plan, scene, calls.hooks, fidelity="contact").outcome.stage == "plan"
+    assert calls.order == [("replay", plan), ("tick", None)]
+
+
+def test_a_function_of_the_state_is_a_hook_too() -> None:
+    seen = []
+
+    def look(data: Any) -> None:
+        seen.append(data)
+
+    hooks = hooks_of(look)
+    assert hooks.after_tick is not None
+    hooks.after_tick("state", Doing(0, "pick", 1.0))
+    assert seen == ["state"]
+    assert hooks_of(hooks) is hooks
+    assert hooks_of(None).after_tick is None
