@@ -34,6 +34,7 @@ LOADED = re.compile(
     r"<(?:(?:script|img|iframe|source|video)\b[^>]*\bsrc|link\b[^>]*\bhref)=[\"']?(?:https?:)?//[^>]*>", re.IGNORECASE
 )
 
+SHORT = re.compile(r"<code>([^<\s]{1,20})</code>")
 FORMULA = re.compile(r"<(?P<tag>span|div) class=\"arithmatex\">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>", re.DOTALL)
 
 
@@ -55,14 +56,17 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_content(content: str, page: Any, config: Any, files: Files) -> str:
-    """The page with its formulas as MathML: those in lines as they come, those alone as blocks that scroll."""
+    """The page with its formulas as MathML: those in lines as they come, those alone as blocks that scroll.
+
+    Short names in code are marked, so that none is broken at a hyphen in a table.
+    """
 
     def typeset(formula: re.Match[str]) -> str:
         block = formula["tag"] == "div"
         mathml = convert(html.unescape(formula["latex"]).strip(), display="block" if block else "inline")
         return f'<div class="formula">{mathml}</div>' if block else mathml
 
-    return FORMULA.sub(typeset, content)
+    return SHORT.sub(r'<code class="whole">\1</code>', FORMULA.sub(typeset, content))
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:

@@ -1,4 +1,4 @@
-"""Write the audit of the judge into docs/how/judge.md, below the rules, and draw its doubtful states (a minute)."""
+"""Write the audit of the judge into docs/results/audit.md, below its head, and draw its doubtful states (a minute)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.end_states import reached, verdict
 from tests.judging import test_verdict as first
 
 HERE = Path(__file__).parent
-PAGE, BEGIN = HERE / "how" / "judge.md", "<!-- written by docs/verdict.py -->"
+PAGE, BEGIN = HERE / "results" / "audit.md", "<!-- written by docs/verdict.py -->"
 WIDTH, HEIGHT, QUALITY = 480, 320, 80
 NEAREST_M, AZIMUTH_DEG, ELEVATION_DEG = 0.28, -75.0, -28.0
 DOUBTFUL = {
@@ -121,8 +121,8 @@ def main() -> None:
     for title, group in GROUPS.items():
         lines += [f"### {title}", "", *table(group), ""]
     lines += ["### The states of before", "", *table(cases)]
-    rules = PAGE.read_text(encoding="utf-8").split(BEGIN)[0]
-    PAGE.write_text(rules + "\n".join(lines) + "\n", encoding="utf-8")
+    head = PAGE.read_text(encoding="utf-8").split(BEGIN)[0]
+    PAGE.write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
 
 
 def table(states: Iterable[audited.Seen | first.Case]) -> list[str]:

@@ -14,11 +14,13 @@ from tests.browser import browser, opened, overflow
 ROOT = Path(__file__).parents[2]
 PAGES = (
     *("index", "guide/environment", "guide/from-cad", "how/judge", "how/contact", "how/paper"),
-    *("results/headline", "results/arms", "reference/files"),
+    *("results/headline", "results/arms", "results/audit", "reference/files", "reference/settings"),
 )
 CUT = """() => [...document.querySelectorAll('pre > code, .md-typeset__scrollwrap, .formula')]
     .filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0).map(e => e.innerText.slice(0, 80))"""
 """The beginnings of what is wider than its room."""
+BROKEN = "() => [...document.querySelectorAll('td code.whole')].filter(e => e.getClientRects().length > 1).length"
+"""How many short names in tables go over two lines."""
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +58,12 @@ def test_formulas_become_mathml_in_lines_and_alone(hooks: Any) -> None:
     assert 'display="block"' in alone
 
 
+def test_short_names_are_marked_as_whole(hooks: Any) -> None:
+    text = "<td><code>--robot-error</code> <code>two words</code></td>"
+    marked = hooks.on_page_content(text, None, None, None)
+    assert marked == text.replace("<code>--", '<code class="whole">--')
+
+
 def test_what_is_no_formula_stays(hooks: Any) -> None:
     text = "<pre><code>echo $HOME costs $5</code></pre>"
     assert hooks.on_page_content(text, None, None, None) == text
@@ -68,6 +76,7 @@ def test_nothing_is_cut_in_a_usual_window_and_no_page_is_wider_than_a_phone(
 ) -> None:
     with opened(chromium, site / f"{page}.html", 1280) as shown:
         assert shown.page.evaluate(CUT) == []
+        assert shown.page.evaluate(BROKEN) == 0
         assert overflow(shown.page) <= 0
         assert "\\(" not in shown.page.inner_text("article")
     with opened(chromium, site / f"{page}.html", 390) as shown:

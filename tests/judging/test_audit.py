@@ -47,7 +47,7 @@ def test_a_person_says_nearly(seen: Loose) -> None:
 
 def test_the_page_says_what_was_audited_and_why_the_rule_says_otherwise() -> None:
     """It is written by `python docs/verdict.py`."""
-    page = (Path(__file__).parents[2] / "docs" / "how" / "judge.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "results" / "audit.md").read_text(encoding="utf-8")
     for seen in STATES:
         assert f"| {seen.what} | {'right' if seen.right else 'wrong'} |" in page
     for what, reason in (DIFFERS | FLIPPED | REVISED).items():
