@@ -54,11 +54,11 @@ def page(look: Look, pairs: Sequence[Paired], ran: Mapping[str, Any], agreement:
         "",
         "## All rates",
         "",
-        "Success in percent: the finished assembly is right ([the judge](../how/judge.md)); in brackets: also built as it "
-        "was demonstrated, where that is less. Columns are levels: L is a standard deviation of L mm and L degrees per "
-        "axis. [Methods](../reference/methods.md): `none` replays what was seen, `search` also feels for the holes, "
-        "`paper` corrects as the paper does, `contact` as [this project](../how/contact.md) does; all with the same seeds. "
-        f"{widths(least)} `benchmarks/results/headline/table.csv` has the intervals of all cells.",
+        "Success in percent: the finished assembly is right ([the judge](../how/judge.md)); in brackets: also built as "
+        "it was demonstrated, where that is less. Columns are levels: L is a standard deviation of L mm and L degrees "
+        "per axis. [Methods](../reference/methods.md): `none` replays what was seen, `search` also feels for the "
+        "holes, `paper` corrects as the paper does, `contact` as [this project](../how/contact.md) does; all with the "
+        f"same seeds. {widths(least)} `benchmarks/results/headline/table.csv` has the intervals of all cells.",
         "",
         "### Careful humans",
         "",
@@ -68,8 +68,8 @@ def page(look: Look, pairs: Sequence[Paired], ran: Mapping[str, Any], agreement:
         "",
         "### Careless humans",
         "",
-        f"They put parts wrong and adjust them later, as in the paper. {BY_CONSTRUCTION} What stands wrong to each other before anything "
-        "is inserted cannot be searched away.",
+        f"They put parts wrong and adjust them later, as in the paper. {BY_CONSTRUCTION} What stands wrong to each "
+        "other before anything is inserted cannot be searched away.",
         "",
         *rates([c for c in held if c.careless == 1.0], ("scenario", "method"), named, lambda c: c.level),
         "",

@@ -23,7 +23,7 @@ from msgspec.inspect import (
     type_info,
 )
 
-from apo_bench.cli.setting_options import axis_option
+from apo_bench.cli.setting_options import axis_flag
 from apo_bench.records.key import KEY
 from apo_bench.records.outcomes import CODES, STAGES
 from apo_bench.records.row import LARGEST, REQUIRED, ROW_FIELDS, Row
@@ -54,7 +54,7 @@ def settings_page() -> str:
     for name, info in SETTINGS.items():
         option = f"`--{info.option}`" if info.help else "argument"
         default = "" if info.default is MISSING else info.usual or f"`{info.default}`"
-        axis = [f"`{info.axis}`"] * bool(info.axis) + [f"`--{axis_option(info)}`"] * bool(info.axis and info.help)
+        axis = [f"`{info.axis}`"] * bool(info.axis) + [f"`{axis_flag(info)}`"] * bool(info.axis and info.help)
         lines.append(f"| `{name}` | {said[name]} | {value_of(info)} | {default} | {option} | {', '.join(axis)} |")
     return "\n".join(lines) + "\n"
 

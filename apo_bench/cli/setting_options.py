@@ -67,10 +67,15 @@ def axis_option(info: SettingInfo) -> str:
     return (info.axis_option or info.option).replace("-", "_")
 
 
+def axis_flag(info: SettingInfo) -> str:
+    """The option of an axis as it is typed: `--robot-error`."""
+    return f"--{axis_option(info).replace('_', '-')}"
+
+
 def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
     """What was given for an axis: `0,0.5,1` or `none,contact`."""
     read = words if info.is_text else whole_numbers if info.is_whole else numbers
-    return read(text, f"--{axis_option(info)}")
+    return read(text, axis_flag(info))
 
 
 def shown_default(info: SettingInfo) -> str:

@@ -15,7 +15,15 @@ from apo_bench.cli.arguments import cores, path_given
 from apo_bench.cli.completion import beginning
 from apo_bench.cli.completion import scenarios as completed_scenarios
 from apo_bench.cli.help_groups import GroupedOptions
-from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, axis_option, read_axis, sweep_options, takes
+from apo_bench.cli.setting_options import (
+    CacheFolder,
+    CorrectorLimit,
+    axis_flag,
+    axis_option,
+    read_axis,
+    sweep_options,
+    takes,
+)
 from apo_bench.errors import InputError
 from apo_bench.records.asked import in_python
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -134,6 +142,6 @@ def _grids(scenarios: list[str], said: Mapping[str, Any]) -> tuple[SweepSettings
         )
     for info in given:
         raise InputError(
-            f"--{axis_option(info)} was given together with the sweep file {files[0]}; write {info.axis} into the file."
+            f"{axis_flag(info)} was given together with the sweep file {files[0]}; write {info.axis} into the file."
         )
     return read_sweep(files[0], others)

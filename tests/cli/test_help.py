@@ -13,9 +13,11 @@ import typer
 from apo_bench.cli import completion
 from apo_bench.cli.app import app, main
 from apo_bench.cli.help_groups import GROUPS, OPTIONS, OTHERS
+from apo_bench.cli.setting_options import axis_flag
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records.method import checked_method
 from apo_bench.records.relations import checked_relations
+from apo_bench.records.settings import LEVEL, SETTINGS
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names
 
@@ -71,6 +73,11 @@ def test_help_cuts_no_sentence(words: tuple[str, ...], capsys: pytest.CaptureFix
     for name in EVERY[words].commands:
         first = " ".join(EVERY[(*words, name)].help.split("\n\n")[0].split())
         assert first.split(". ")[0].rstrip(".") in said
+
+
+def test_the_option_of_an_axis_is_named_as_it_is_typed() -> None:
+    typed = {option.opts[0] for option in EVERY["sweep",].params}
+    assert {axis_flag(info) for info in (LEVEL, *SETTINGS.values()) if info.axis and info.help} <= typed
 
 
 def test_the_arms_of_other_collections_are_named(capsys: pytest.CaptureFixture[str]) -> None:
