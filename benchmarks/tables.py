@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import gzip
-import tempfile
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.run.verdicts import by_verdict, verdict_of
+from apo_bench.records.row import ROW_FIELDS
+from apo_bench.records.run.checked import as_usual
 from apo_bench.report.tables.calibration import CALIBRATION_NOTE, calibration_table
 from apo_bench.report.tables.confusion import CONFUSION_NOTE, confusion_table
 from apo_bench.statistics.calibration import calibrations
@@ -128,11 +128,13 @@ def main() -> None:
 
 
 def unpacked(packed: Path) -> list[dict[str, Any]]:
-    """The rows, older ones with what they do not hold as null, and with the verdict that they have."""
-    with tempfile.TemporaryDirectory() as folder, gzip.open(packed) as source:
-        (Path(folder) / "trials.jsonl").write_bytes(source.read())
-        rows = read_rows(folder)
-    return list(by_verdict(rows, verdict_of(rows, packed)))
+    """The rows, with what they do not hold as null or as usual; the one verdict of then is both verdicts of today."""
+    rows = []
+    with gzip.open(packed) as source:
+        for line in source:
+            row = dict.fromkeys(ROW_FIELDS) | json.loads(line)
+            rows.append(dict(as_usual(row | {"as_demonstrated": row["success"]})))
+    return rows
 
 
 def crossed(

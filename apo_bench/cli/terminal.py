@@ -11,7 +11,6 @@ from rich.table import Table
 
 from apo_bench.io.plain_text import clean
 from apo_bench.records.row import FreedSet, MovedInHand, Predicted, Row
-from apo_bench.records.run import verdicts
 from apo_bench.records.settings import RANGE
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.confusion import prediction_summary
@@ -75,8 +74,6 @@ def print_report(made: Report) -> None:
     def say(text: str) -> None:
         console.print(clean(text))
 
-    if made.verdict != verdicts.SUCCESS:
-        say(verdicts.verdict_warning(made.verdict))
     say(prediction_summary(made.confusions[-1]))
     if made.no_pictures:
         drawn = "1 failure was" if made.pictures == 1 else f"{made.pictures} failures were"

@@ -13,9 +13,8 @@ from apo_bench.records.key import Key, row_key
 from apo_bench.records.row import Row
 from apo_bench.records.run.report_rows import NUMBERS, report_rows
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.verdicts import AS_DEMONSTRATED, by_verdict, verdict_of
 from apo_bench.records.salt import one_salt, with_salt
-from apo_bench.records.settings import ROW, SETTINGS
+from apo_bench.records.settings import SETTINGS
 from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
@@ -33,8 +32,6 @@ class Side(NamedTuple):
     folder: Path
     run: Mapping[str, Any]
     rows: Sequence[Row]
-    verdict: str
-    """What its rows have as success: that, or `as_demonstrated`, of older rows."""
 
 
 class Difference(NamedTuple):
@@ -141,8 +138,8 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     grasp, robot error and method; fidelity, arm and time step are not, so that they can be compared.
 
     Raises:
-        InputError: A folder is no sweep, holds a trial twice, both have no trial in common (of other salts a seed is
-            another trial), or one is of older rows with another verdict.
+        InputError: A folder is no sweep, holds a trial twice, or both have no trial in common (of other salts a seed is
+            another trial).
     """
     sides = [_side(Path(folder)) for folder in (first, second)]
     for side in sides:
@@ -153,13 +150,6 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         raise InputError(
             f"'{first}' was drawn {with_salt(salts[0])} and '{second}' {with_salt(salts[1])}, so that they have no "
             "trial in common, whatever their seeds; compare sweeps of one salt."
-        )
-    if sides[0].verdict != sides[1].verdict:
-        old, new = sides if sides[0].verdict == AS_DEMONSTRATED else sides[::-1]
-        raise InputError(
-            f"the rows in '{old.folder}' are older than '{ROW}' and say only whether all was as demonstrated, those in "
-            f"'{new.folder}' say success, which is another verdict, so the two are not paired; run the older sweep "
-            "again with this version."
         )
     ours, theirs = (_by_key(side) for side in sides)
     both = [key for key in ours if key in theirs]
@@ -220,9 +210,7 @@ def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
 
 
 def _side(folder: Path) -> Side:
-    rows = report_rows(folder)
-    verdict = verdict_of(rows, folder)
-    return Side(folder, read_run(folder), by_verdict(rows, verdict), verdict)
+    return Side(folder, read_run(folder), report_rows(folder))
 
 
 def _by_key(side: Side) -> dict[Key, Row]:

@@ -14,7 +14,6 @@ from apo_bench.records.row import Row
 from apo_bench.records.run.report_rows import COLUMNS as KEPT
 from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.verdicts import by_verdict, verdict_of
 from apo_bench.records.salt import check_one, one_salt, read_salt
 from apo_bench.report.answer import answer
 from apo_bench.report.failures import Draw, Failures
@@ -68,8 +67,6 @@ class Report(NamedTuple):
     """Failures that were drawn."""
     no_pictures: tuple[str, ...]
     """Why others were not."""
-    verdict: str
-    """What is counted as success: that, or `as_demonstrated` of older rows."""
 
 
 def report(
@@ -99,9 +96,7 @@ def report(
     salt = None if salt_file is None else read_salt(salt_file)
     if salt is not None:
         check_one(f"'{folder}'", salt.hash, one_salt(rows))
-    verdict = verdict_of(rows, folder)
-    counted = by_verdict(rows, verdict)
-    found = summary(counted)
+    found = summary(rows)
     if not found.cells:
         raise InputError(
             f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
@@ -113,12 +108,12 @@ def report(
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
         _write_rows(rows, folder / TABLES / ROWS)
-        return _written(folder, counted, verdict, found, Failures(pictures if draw else 0, draw, salt, trust_code))
+        return _written(folder, rows, found, Failures(pictures if draw else 0, draw, salt, trust_code))
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(folder: Path, rows: Sequence[Row], verdict: str, found: Summary, failed: Failures) -> Report:
+def _written(folder: Path, rows: Sequence[Row], found: Summary, failed: Failures) -> Report:
     run, timing = read_run(folder), read_timing(folder)
     files, took, known = scenario_files(run), times(timing), work(timing)
     recognised, confused, gap = recognitions(rows), confusions(rows), gaps(rows)
@@ -149,7 +144,6 @@ def _written(folder: Path, rows: Sequence[Row], verdict: str, found: Summary, fa
     page = Found(
         name=folder.resolve().name,
         answer=said,
-        verdict=verdict,
         rows=rows,
         summary=found,
         grouped=grouped,
@@ -165,7 +159,7 @@ def _written(folder: Path, rows: Sequence[Row], verdict: str, found: Summary, fa
     )
     with to_write(folder / PAGE, "w") as file:
         file.write(report_page(page))
-    return Report(folder / PAGE, said, kept, tuple(paths), found.cells, confused, len(taken), tuple(missed), verdict)
+    return Report(folder / PAGE, said, kept, tuple(paths), found.cells, confused, len(taken), tuple(missed))
 
 
 def _remove_older(folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,24 +14,24 @@ from apo_bench.errors import InputError
 from apo_bench.io.plain_text import clean
 from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.verdicts import AS_DEMONSTRATED, verdict_of
 from apo_bench.report import report as reports
 from apo_bench.report.compare import compare
 from apo_bench.report.compare_text import comparison_form
 from apo_bench.statistics.times import read_timing
 from tests.altered import FILES, altered
 
-KEPT = Path(__file__).parents[1] / "kept" / "row5"
-"""Written by the version before `apo-bench/row/6`: 2 scenarios, 2 levels, 3 methods, 2 seeds."""
+KEPT = Path(__file__).parents[1] / "kept" / "row7"
+"""2 scenarios, 2 levels, 3 methods, 2 seeds."""
 CASES, WHOLE = 300, 5
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
 
 
 def read(folder: Path) -> None:
     """All that `compare` does without writing, and the files that only `report` reads."""
-    rows, _, _ = report_rows(folder), read_run(folder), read_timing(folder)
-    if verdict_of(rows, folder) == AS_DEMONSTRATED:
-        json.dumps(comparison_form(compare(folder, KEPT)), allow_nan=False)
+    report_rows(folder)
+    read_run(folder)
+    read_timing(folder)
+    json.dumps(comparison_form(compare(folder, KEPT)), allow_nan=False)
 
 
 def test_altered_folders_are_read_or_refused_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,3 +154,19 @@ def test_a_key_that_nobody_knows_is_left_out(tmp_path: Path) -> None:
     (folder / "trials.jsonl").write_text(f"{noted}\n", encoding="utf-8")
     (row,) = report_rows(folder)
     assert "note" not in row
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"as_demonstrated": None}, "as_demonstrated and success are null together"),
+        ({"success": False, "failure_stage": "judge", "failure_code": "gap"}, "it is true, so success is needed"),
+    ],
+)
+def test_the_two_verdicts_go_together(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
+    (line, *_) = (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()
+    right = json.loads(line)
+    assert (right["success"], right["as_demonstrated"]) == (True, True)
+    (tmp_path / "trials.jsonl").write_text(f"{json.dumps(right | changed)}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=f"line 1, field as_demonstrated: {said}"):
+        report_rows(tmp_path)

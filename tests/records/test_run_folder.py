@@ -295,7 +295,7 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
         ("run.json", '{"schema": "apo-bench/run/3"}', "it had 0 grids, now 1"),
         (
             "trials.jsonl",
-            json.dumps(row(1) | {"schema": "apo-bench/row/4"}) + "\n",
+            json.dumps(row(1) | {"schema": "apo-bench/row/6"}) + "\n",
             "this version writes 'apo-bench/row/7'",
         ),
         (

@@ -27,8 +27,8 @@ from apo_bench.sweeps.sweep_file import KEYS
 from apo_bench.trial.trial import run_trial
 
 ROOT = Path(__file__).parents[2]
-KEPT = ROOT / "tests" / "kept" / "row6"
-"""As the version wrote it in which settings were stated many times: 1 scenario, 2 levels, 3 methods, 2 seeds."""
+KEPT = ROOT / "tests" / "kept" / "row7"
+"""2 scenarios, 2 levels, 3 methods, 2 seeds."""
 
 
 def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() -> None:
@@ -108,16 +108,16 @@ def test_a_trial_is_written_as_before() -> None:
             assert look_up(again, column) == before[column]
 
 
-def test_a_folder_of_before_is_reported_and_compared(tmp_path: Path) -> None:
+def test_a_folder_that_was_kept_is_reported_and_compared(tmp_path: Path) -> None:
     rows = read_rows(KEPT)
-    assert (len(rows), {row["schema"] for row in rows}) == (12, {"apo-bench/row/6"})
+    assert (len(rows), {row["schema"] for row in rows}) == (24, {"apo-bench/row/7"})
     for row, line in zip(rows, (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines(), strict=True):
         before = json.loads(line)
         assert json.dumps({column: value for column, value in row.items() if column in before}) == line
     folder = shutil.copytree(KEPT, tmp_path / "kept")
     assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
     found = compare(KEPT, folder)
-    assert (found.shared, len(found.changed), found.identical) == (12, 0, 12)
+    assert (found.shared, len(found.changed), found.identical) == (24, 0, 24)
 
 
 def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,8 +17,7 @@ from apo_bench.io.plain_text import CONTROL, clean
 from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.run.fields import RUN_FIELDS, TIMING_FIELDS, Said
-from apo_bench.records.run.verdicts import MEANING, has_both_verdicts
-from apo_bench.records.settings import RANGE, SETTINGS, TrialSettings
+from apo_bench.records.settings import RANGE, ROW, SETTINGS, TrialSettings
 
 _USUAL: Mapping[str, Any] = MappingProxyType(
     {
@@ -28,11 +27,14 @@ _USUAL: Mapping[str, Any] = MappingProxyType(
     }
 )
 """What a row that does not say means."""
+_READABLE = ("apo-bench/row/6", ROW)
+"""Schemas of rows; those before today's say nothing of looks."""
 _NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye", "robot_error")
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
 _TOGETHER = (
     ("level", "level_deg", "careless"),
     ("success", "loose_success"),
+    ("as_demonstrated", "success"),
     ("contacts_right", "contacts_missed", "contacts_false"),
     ("planned_error_fixed_mm", "planned_error_free_mm"),
     ("pose_error_fixed_mm", "pose_error_free_mm"),
@@ -66,7 +68,7 @@ _KNOWN = _struct("Run", RUN_FIELDS, ())
 
 
 def row_of(line: bytes, where: str) -> Row:
-    """The row of a line in the words of today, with every field of the table, null where the line does not say.
+    """The row of a line, with every field of the table, null where the line does not say.
 
     Args:
         where: File and line, for the complaint.
@@ -75,15 +77,15 @@ def row_of(line: bytes, where: str) -> Row:
         InputError: A line that is no row.
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
-    if row["schema"] not in MEANING:
+    if row["schema"] not in _READABLE:
         raise InputError(
-            f"{where}: a row of schema '{_short(row['schema'])}' was given; {', '.join(MEANING)} can be read."
+            f"{where}: a row of schema '{_short(row['schema'])}' was given; {', '.join(_READABLE)} can be read."
         )
     wrong = _fault(row)
     if wrong is not None:
         raise _wrong(where, *wrong)
     row["sentence"] = row["sentence"] and clean(row["sentence"])
-    return MEANING[row["schema"]](as_usual(row))
+    return as_usual(row)
 
 
 def as_usual(row: Mapping[str, Any]) -> Row:
@@ -164,8 +166,6 @@ def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
     for names in _TOGETHER:
         if len({row.get(name) is None for name in names}) > 1:
             return names[0], f"{' and '.join(names)} are null together, or none of them is"
-    if has_both_verdicts(row["schema"]) and (row.get("as_demonstrated") is None) != (row["success"] is None):
-        return "as_demonstrated", "success and as_demonstrated are null together, or none of them is"
     if row.get("as_demonstrated") and not row["success"]:
         return "as_demonstrated", "it is true, so success is needed to be true as well"
     if row["success"] is False and None in (row["failure_stage"], row["failure_code"]):

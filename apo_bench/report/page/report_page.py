@@ -9,7 +9,6 @@ from typing import Any, final
 
 from apo_bench.records.method import knows_truth
 from apo_bench.records.row import Row, look_up
-from apo_bench.records.run import verdicts
 from apo_bench.records.run.replay_command import Files, replay_command
 from apo_bench.records.salt import one_salt
 from apo_bench.records.settings import RANGE
@@ -61,8 +60,6 @@ class Found:
     """Of the folder."""
     answer: str
     """The sentence at the top, with `code` marked."""
-    verdict: str
-    """What is counted as success."""
     rows: Sequence[Row]
     summary: Summary
     grouped: Mapping[Setting, Sequence[Cell]]
@@ -94,7 +91,6 @@ def report_page(found: Found) -> str:
         title=found.name if "sweep" in found.name.lower() else f"Sweep {found.name}",
         sections=_SECTIONS,
         answer=found.answer,
-        older=verdicts.verdict_warning(found.verdict),
         scope=_scope(found.rows),
         words={
             "success": f"{_level_meaning(found.rows)} {_SUCCESS}",
