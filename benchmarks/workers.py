@@ -41,7 +41,7 @@ from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local import pool
 grid = SweepSettings(("stick_in_tower",), (1.0,), (1.0,), ("contact",), trials=1)
 loaded = load_all([grid])
-lock = environment_lock(names_of([grid]), loaded, find_arm(grid.arm).mjcf)
+lock = environment_lock(names_of([grid]), loaded, find_arm(grid.arm).files)
 assert next(pool.Worker(0, lock).run(next(iter(units([grid], loaded))))) == ("began",)
 """
 
@@ -67,7 +67,7 @@ def main() -> None:
 def rows_per_second(way: str, trials: int) -> float:
     """Of trials at fidelity contact, from the second seed on."""
     grid = SweepSettings(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
-    loaded, arm = load_all([grid]), find_arm(grid.arm).mjcf
+    loaded, arm = load_all([grid]), find_arm(grid.arm).files
     lock = environment_lock(names_of([grid]), loaded, arm)
     ended: list[tuple[float, int]] = []
 

@@ -10,7 +10,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.arms.finding import six_axis
+from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.scene.scene import Scene, build_scene, scene_xml
 from apo_bench.simulation.scene.world import initial_state, place, snapshot
@@ -82,8 +82,8 @@ def test_what_cannot_be_built_is_refused_in_one_sentence(tower: Scene, how: dict
 
 
 def test_inverse_kinematics_inverts_the_forward() -> None:
-    kinematics, rng = Kinematics(six_axis()), np.random.default_rng(3)
-    home = six_axis().home
+    kinematics, rng = Kinematics(find_arm("six_axis")), np.random.default_rng(3)
+    home = find_arm("six_axis").home
     for _ in range(50):
         q = home + rng.uniform(-0.4, 0.4, 6)
         T = kinematics.forward(q)
@@ -93,7 +93,7 @@ def test_inverse_kinematics_inverts_the_forward() -> None:
 
 
 def test_what_is_out_of_reach_has_no_joint_angles() -> None:
-    kinematics = Kinematics(six_axis())
-    T = np.array(kinematics.forward(six_axis().home))
+    kinematics = Kinematics(find_arm("six_axis"))
+    T = np.array(kinematics.forward(find_arm("six_axis").home))
     T[0, 3] = 1.5
-    assert kinematics.inverse(T, six_axis().home) is None
+    assert kinematics.inverse(T, find_arm("six_axis").home) is None

@@ -359,7 +359,7 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
 ) -> None:
     """The first process is killed after its first row, and those after it before they begin."""
     asked = replace(grid("raises", trials=2), methods=tuple(m if m == "none" else f"unruly:{m}" for m in methods))
-    content = content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").mjcf)
+    content = content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").files)
     lock = EnvironmentLock({"block_on_block": content}, versions())
     asked_for: list[Any] = []
 

@@ -109,7 +109,7 @@ def wait_for(true: Callable[[], bool], seconds: float = 120.0) -> None:
 
 def lock_of(spec: SweepSettings) -> tuple[tuple[Unit, ...], EnvironmentLock]:
     loaded = load_all([spec])
-    return tuple(units([spec], loaded)), environment_lock(names_of([spec]), loaded, find_arm(spec.arm).mjcf)
+    return tuple(units([spec], loaded)), environment_lock(names_of([spec]), loaded, find_arm(spec.arm).files)
 
 
 def lines(out: Path) -> list[bytes]:

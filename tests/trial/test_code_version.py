@@ -87,7 +87,7 @@ def changed_code(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def hashed() -> str:
-    return content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").mjcf)
+    return content_hash(load_scenario("block_on_block"), "block_on_block", find_arm("six_axis").files)
 
 
 def test_changed_code_changes_the_hash_of_every_row(request: pytest.FixtureRequest) -> None:

@@ -218,7 +218,7 @@ def test_methods_share_layout_and_hand(rows: dict[str, dict[str, Any]]) -> None:
 
 
 def test_the_hash_names_what_may_be_counted_together(scene: Scene) -> None:
-    content = content_hash(scene.scenario, "stick_in_tower", scene.arm.mjcf)
+    content = content_hash(scene.scenario, "stick_in_tower", scene.arm.files)
     same = {spec_hash(replace(SPEC, method=m, seed=k), content) for m in ("none", "paper") for k in (0, 9)}
     assert len(same) == 1
     others = {"level_mm": 2.0, "level_deg": 2.0, "careless": 0.0, "clearance_mm": 0.5, "noise": "a:b"}
@@ -233,8 +233,8 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     scenario = scene.scenario
     path = tmp_path / "stick_in_tower.toml"
     path.write_bytes((folder("scenarios") / "stick_in_tower.toml").read_bytes())
-    first = content_hash(scenario, "stick_in_tower", scene.arm.mjcf)
-    assert content_hash(scenario, path, scene.arm.mjcf) == first
+    first = content_hash(scenario, "stick_in_tower", scene.arm.files)
+    assert content_hash(scenario, path, scene.arm.files) == first
     path.write_bytes(path.read_bytes() + b"# a word\n")
     arm = tmp_path / "arm.xml"
     arm.write_text("<mujoco/>")
@@ -244,12 +244,12 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     wider = replace(scenario, clearance_mm=0.5)
     hashes = {
         first,
-        content_hash(scenario, path, scene.arm.mjcf),
+        content_hash(scenario, path, scene.arm.files),
         content_hash(scenario, "stick_in_tower", arm),
         content_hash(replace(scenario, part_files={**scenario.part_files, "castle1": part}), "stick_in_tower", arm),
-        content_hash(stricter, "stick_in_tower", scene.arm.mjcf),
-        content_hash(scenario, scenario, scene.arm.mjcf),
-        content_hash(wider, wider, scene.arm.mjcf),
+        content_hash(stricter, "stick_in_tower", scene.arm.files),
+        content_hash(scenario, scenario, scene.arm.files),
+        content_hash(wider, wider, scene.arm.files),
     }
     assert len(hashes) == 7
 

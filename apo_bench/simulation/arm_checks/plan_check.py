@@ -57,7 +57,7 @@ def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
     code, path = key_angles(scene, t)
     if code:
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene))
-    if scene.arm.model is None:
+    if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
     T = t.T_world_goal @ pose.inverse(believed[t.part])
     held = plan.assembly.operations[step.operation].moves

@@ -36,8 +36,9 @@ class Arm:
     """An arm with a gripper of two sides, ready to be put into a scene.
 
     `read_arm(FILE.toml)` makes one of the description of any arm: it finds joints, drives and pads, and measures the
-    gripper. Whoever has an MJCF file that is as the fields say may make one directly, without `model` and `hand`. The
-    site `tip` lies between the fingertips: z points ahead, x along the closing direction.
+    gripper, unless its file states that. Whoever has an MJCF file that is as the fields say may make one directly,
+    without `model` and `hand`. The site `tip` lies between the fingertips: z points ahead, x along the closing
+    direction.
     """
 
     mjcf: Path
@@ -62,7 +63,7 @@ class Arm:
     turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     """How its base is turned, quaternion (w, x, y, z), world."""
     model: str | None = None
-    """The whole as MJCF text, where the arm was described by a file."""
+    """The whole as MJCF text, where the arm was described by a file; None: `mjcf` is that file."""
     hand: Hand | None = None
     """What the gripper does, where that was measured."""
     limits: Limits = Limits()

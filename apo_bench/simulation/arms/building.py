@@ -11,29 +11,30 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.arm import Arm, Limits
+from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, read_description
 from apo_bench.simulation.arms.home import find_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.arms.stated import stated_arm
 from apo_bench.simulation.arms.strength import with_force
 
 _TIP = "tip"
 _GRIPPER = "gripper/"
-_USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment")
 _FINGER_ARMATURE, _FINGER_DAMPING = 1e-4, 0.02
 """Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
 _USUAL_FINGERS_M_S = 0.05
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
 less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
-_MOST_JOINTS, _MOST_BUILT = 8, 8
+_MOST_BUILT = 8
 _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
 
@@ -69,11 +70,13 @@ def build_arm(said: ArmDescription) -> Arm:
     Raises:
         InputError: Its models do not fit the description, or cannot be used; what to do is said.
     """
+    if said.gripper.slides is not None:
+        return stated_arm(said, said.gripper.slides)
     spec = load_model(said.mjcf, "arm")
     model = compiled(spec, said.mjcf)
     check_surroundings(model, said.mjcf)
-    flange, T_flange = _flange(model, said)
-    joints = _joints(model, flange, said)
+    flange, T_flange = find_flange(model, said)
+    joints = find_joints(model, flange, said)
     if said.gripper.mjcf is not None:
         hand = load_model(said.gripper.mjcf, "gripper")
         hand.option = spec.option
@@ -130,84 +133,6 @@ def build_arm(said: ArmDescription) -> Arm:
         + (f", gripper drive {times:.3g} times as strong as in the model" if times != 1.0 else ""),
     )
     return arm if said.home is not None else replace(arm, home=find_home(arm))
-
-
-def _flange(model: Any, said: ArmDescription) -> tuple[int, Array]:
-    """The body at the end of the arm, and the frame of the flange in it."""
-    sites = {model.site(i).name: i for i in range(model.nsite)}
-    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
-    name = said.flange
-    if name is None:
-        name = next((each for each in _USUAL_FLANGES if each in sites or each in bodies), None)
-    if name is None:
-        if said.gripper.mjcf is not None:
-            raise InputError(
-                f"{said.file}: where the gripper is mounted is not known; state 'flange', a site or body of the arm "
-                f"({', '.join((*sites, *bodies))})."
-            )
-        return _last_link(model, said), np.eye(4)
-    if name in sites:
-        site, T = sites[name], np.eye(4)
-        R = np.zeros(9)
-        mujoco.mju_quat2Mat(R, model.site_quat[site])
-        T[:3, :3], T[:3, 3] = R.reshape(3, 3), model.site_pos[site]
-        return int(model.site_bodyid[site]), T
-    if name not in bodies:
-        raise InputError(f"{said.file}: {unknown('flange', name, (*sites, *bodies))}")
-    return bodies[name], np.eye(4)
-
-
-def _last_link(model: Any, said: ArmDescription) -> int:
-    """The body of the last joint that is named, or of the last hinge from which the model branches."""
-    if said.joints is not None:
-        known = [model.joint(j).name for j in range(model.njnt)]
-        if said.joints[-1] in known:
-            return int(model.jnt_bodyid[model.joint(said.joints[-1]).id])
-    body = 0
-    while True:
-        moving = [b for b in range(1, model.nbody) if int(model.body_parentid[b]) == body and _moves(model, b)]
-        if len(moving) != 1:
-            break
-        body = moving[0]
-    while body and not model.body_jntnum[body]:
-        body = int(model.body_parentid[body])
-    if not body:
-        raise InputError(f"{said.mjcf}: the arm has no joints; give the MJCF file of an arm.")
-    return body
-
-
-def _moves(model: Any, body: int) -> bool:
-    """Whether a joint is at a body or behind it."""
-    if model.body_jntnum[body]:
-        return True
-    return any(_moves(model, b) for b in range(body + 1, model.nbody) if int(model.body_parentid[b]) == body)
-
-
-def _joints(model: Any, flange: int, said: ArmDescription) -> list[str]:
-    """The hinges between the base and the flange, in this order."""
-    chain: list[int] = []
-    body = flange
-    while body:
-        at = int(model.body_jntadr[body])
-        chain = [*range(at, at + int(model.body_jntnum[body])), *chain]
-        body = int(model.body_parentid[body])
-    names = [model.joint(j).name for j in chain]
-    for j, name in zip(chain, names, strict=True):
-        if int(model.jnt_type[j]) != int(mujoco.mjtJoint.mjJNT_HINGE):
-            raise InputError(f"{said.mjcf}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.")
-    if said.joints is not None:
-        if sorted(said.joints) != sorted(names):
-            raise InputError(
-                f"{said.file}: 'joints' are {', '.join(said.joints)}; between base and flange lie "
-                f"{', '.join(names) or 'none'}."
-            )
-        names = [name for name in names if name in said.joints]
-    if not 6 <= len(names) <= _MOST_JOINTS:
-        raise InputError(
-            f"{said.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); 6 to "
-            f"{_MOST_JOINTS} are needed, so check 'flange'."
-        )
-    return names
 
 
 def _make_passive(spec: Any, joints: Sequence[str]) -> None:
@@ -280,12 +205,9 @@ def _text(spec: Any, found: Measured) -> str:
 
 
 def _limits(said: ArmDescription, joints: Sequence[str], drives: Any) -> Limits:
-    speed = said.speed_rad_s
-    if speed is not None and len(speed) not in (1, len(joints)):
-        raise InputError(f"{said.file}: 'speed_deg_s' has {len(speed)} numbers; the arm has {len(joints)} joints.")
     return Limits(
         payload_kg=said.payload_kg,
-        speed_rad_s=None if speed is None else np.array(np.broadcast_to(speed, len(joints))),
+        speed_rad_s=None if said.speed_rad_s is None else said.joint_speeds(len(joints)),
         torque_nm=np.array([drives[name].torque for name in joints]),
         fingers_m_s=said.gripper.speed_m_s or _USUAL_FINGERS_M_S,
     )

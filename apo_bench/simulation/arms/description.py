@@ -9,6 +9,7 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
@@ -17,9 +18,25 @@ from apo_bench.scenario.keys import read_pose
 _SCHEMA = "apo-bench/arm/1"
 _MOST_JOINTS, _MOST_PAYLOAD_KG, _MOST_NM, _MOST_DEG_S, _MOST_MM_S = 16, 1000.0, 1e5, 3600.0, 1000.0
 _MOST_FORCE_N = 60.0
+_MOST_OPENING_MM = 1000.0
+_STATED = ("tip", "slides", "opening_mm")
+"""Keys of a gripper that is not measured."""
 USUAL_BASE = np.array([[1.0, 0, 0, -0.45], [0, 1.0, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 1.0]])
 """Where a base stands that nothing is said of: behind the middle of the table, (4, 4), world, [m]."""
 USUAL_BASE.flags.writeable = False
+
+
+@final
+@dataclass(frozen=True)
+class SlideGripper:
+    """A gripper that is stated: a finger on each side that slides, both driven by one position actuator."""
+
+    tip: str
+    """The site between the fingertips: z points ahead, x along the closing direction."""
+    joints: tuple[str, ...]
+    """The slides, zero when closed."""
+    opening_m: float
+    """How far each finger opens."""
 
 
 @final
@@ -41,6 +58,8 @@ class GripperDescription:
     """The fastest each pad moves; None: 0.05, as a Franka Hand."""
     force_n: float | None = None
     """How hard each pad pushes on a part of half the opening; None: as in the model, if that holds a part."""
+    slides: SlideGripper | None = None
+    """None: what the gripper does is measured."""
 
 
 @final
@@ -64,6 +83,19 @@ class ArmDescription:
     """The fastest each joint may turn."""
     torque_nm: Array | None = None
     """The most each joint may push; None: as the model says."""
+
+    def joint_speeds(self, count: int) -> Array:
+        """The fastest that each of so many joints may turn, (count,), [rad/s], where that is stated.
+
+        Raises:
+            InputError: It is stated of another number of joints.
+        """
+        assert self.speed_rad_s is not None
+        if len(self.speed_rad_s) not in (1, count):
+            raise InputError(
+                f"{self.file}: 'speed_deg_s' has {len(self.speed_rad_s)} numbers; the arm has {count} joints."
+            )
+        return np.array(np.broadcast_to(self.speed_rad_s, count))
 
 
 def read_description(path: Path) -> ArmDescription:
@@ -91,12 +123,18 @@ def read_description(path: Path) -> ArmDescription:
 
 
 def _gripper(path: Path, node: JsonNode) -> GripperDescription:
-    keys = node.fields((), ("mjcf", "mount", "actuators", "open", "closed", "pads", "speed_mm_s", "force_n"))
+    measured = ("mjcf", "mount", "open", "closed", "pads", "force_n")
+    keys = node.fields((), (*measured, *_STATED, "actuators", "speed_mm_s"))
     if ("open" in keys) != ("closed" in keys):
         node.fail("'open' and 'closed' are given together, or neither")
     pads = _names(keys["pads"]) if "pads" in keys else None
     if pads is not None and (len(pads) != 2 or pads[0] == pads[1]):
         keys["pads"].fail("two names are needed, a body or geom of each side")
+    if any(key in keys for key in _STATED) and not all(key in keys for key in (*_STATED, "actuators")):
+        node.fail(f"{', '.join(map(repr, _STATED))} and 'actuators' are given together, or none of the first three")
+    for key in measured:
+        if key in keys and "slides" in keys:
+            keys[key].fail("a gripper whose 'slides' are stated is not measured; leave this key out")
     return GripperDescription(
         mjcf=_beside(path, keys["mjcf"]) if "mjcf" in keys else None,
         mount=read_pose(keys["mount"]) if "mount" in keys else np.eye(4),
@@ -106,7 +144,13 @@ def _gripper(path: Path, node: JsonNode) -> GripperDescription:
         pads=None if pads is None else (pads[0], pads[1]),
         speed_m_s=1e-3 * keys["speed_mm_s"].number(0.0, _MOST_MM_S, above=True) if "speed_mm_s" in keys else None,
         force_n=keys["force_n"].number(1.0, _MOST_FORCE_N) if "force_n" in keys else None,
+        slides=_slides(keys) if "slides" in keys else None,
     )
+
+
+def _slides(keys: Mapping[str, JsonNode]) -> SlideGripper:
+    opening_mm = keys["opening_mm"].number(0.0, _MOST_OPENING_MM, above=True)
+    return SlideGripper(keys["tip"].text(), _names(keys["slides"]), 1e-3 * opening_mm)
 
 
 def _beside(path: Path, node: JsonNode) -> Path:

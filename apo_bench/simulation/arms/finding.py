@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from apo_bench.errors import InputError, unknown
 from apo_bench.names import resolve
 from apo_bench.records.short_names import FOREIGN_ARMS
@@ -12,30 +10,13 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.building import read_arm
 from apo_bench.simulation.arms.foreign import find_foreign
 
-
-def six_axis() -> Arm:
-    """The arm that comes with the benchmark: six axes, spherical wrist, 94 mm gripper, 40 N."""
-    return Arm(
-        mjcf=folder("assets") / "arms" / "six_axis.xml",
-        base=(-0.42, 0.0, 0.0),
-        joints=("j1", "j2", "j3", "j4", "j5", "j6"),
-        tip="tip",
-        fingers=("left_finger", "right_finger"),
-        grip="grip",
-        mount="gripper",
-        home=np.array([0.0, 0.2, 0.9, 0.0, 0.47, 0.0]),
-        opening_m=0.046,
-    )
-
-
-_ARMS = {"six_axis": six_axis}
-DESCRIBED = ("ur5e_primitive", "panda_primitive")
-"""Arms that come with the benchmark as arm files."""
+NAMES = ("six_axis", "ur5e_primitive", "panda_primitive")
+"""Arms that come with the benchmark, as arm files."""
 
 
 def arm_names() -> tuple[str, ...]:
     """The short names of arms."""
-    return (*_ARMS, *DESCRIBED)
+    return NAMES
 
 
 def find_arm(given: str | Arm) -> Arm:
@@ -44,7 +25,7 @@ def find_arm(given: str | Arm) -> Arm:
         return given
     if given.endswith(".toml"):
         return read_arm(given)
-    if given in DESCRIBED:
+    if given in NAMES:
         return read_arm(folder("assets") / "arms" / f"{given}.toml")
     if given.startswith(FOREIGN_ARMS):
         return find_foreign(given)
@@ -59,9 +40,7 @@ def find_arm(given: str | Arm) -> Arm:
         if not isinstance(made, Arm):
             raise InputError(f"the arm '{given}' is a {type(made).__name__}; an `Arm`, or a function that returns one.")
         return made
-    if given not in _ARMS:
-        known = unknown("arm", given, arm_names())
-        raise InputError(
-            f"{known} Or give your own as FILE.toml, menagerie:NAME, robosuite:NAME, or 'package.module:name'."
-        )
-    return _ARMS[given]()
+    known = unknown("arm", given, NAMES)
+    raise InputError(
+        f"{known} Or give your own as FILE.toml, menagerie:NAME, robosuite:NAME, or 'package.module:name'."
+    )

@@ -111,11 +111,8 @@ class Kinematics:
 
 def _alone(arm: Arm) -> Any:
     """The model of the arm where it stands, and nothing else."""
-    if arm.model is None:
-        spec = mujoco.MjSpec.from_file(str(arm.mjcf))
-        spec.worldbody.first_body().pos = arm.base
-        return spec.compile()
-    spec = mujoco.MjSpec.from_string(arm.model)
+    own_text = arm.model is not None
+    spec = mujoco.MjSpec.from_string(arm.model) if own_text else mujoco.MjSpec.from_file(str(arm.mjcf))
     stand = pose.unpack(np.array([*arm.base, *arm.turn]))
     for body in spec.worldbody.bodies:
         T = pose.pack(stand @ pose.unpack(np.array([*body.pos, *body.quat])))

@@ -96,7 +96,7 @@ def key_angles(scene: Scene, transfer: Transfer) -> tuple[str, list[Array]]:
     for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
         for T in poses:
             found = scene.kinematics.inverse(T, q)
-            if found is None and scene.arm.model is not None:
+            if found is None and scene.arm.hand is not None:
                 found = _reached_on_the_way(scene, before, T, q)
             if found is None:
                 return code, reached
@@ -113,7 +113,7 @@ def _reached_on_the_way(scene: Scene, before: Array | None, T: Array, q: Array) 
 
 def _turned_to_reach(scene: Scene, transfer: Transfer) -> Transfer:
     """The transfer with its grips the other way round, where only that is in reach; the usual arm has room for one."""
-    if scene.arm.model is None or not unreachable(scene, transfer):
+    if scene.arm.hand is None or not unreachable(scene, transfer):
         return transfer
     half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
     other = tuple(Grip(grip.T_part_tip @ half_turn, grip.half_width) for grip in transfer.grips)

@@ -94,8 +94,8 @@ def build_scene(
     with_hands, with_arm = _compose(scenario, clearance, settings, found, grasp, kinematics.first_link)
     shown = _compiled(scenario, with_hands)
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
-    described = found.model is not None
-    work = _with_described_arm(scenario, with_arm, found, settings) if described else _compiled(scenario, with_arm)
+    measured = found.hand is not None
+    work = _with_measured_arm(scenario, with_arm, found, settings) if measured else _compiled(scenario, with_arm)
     if grasp == "friction":
         check_holdable(scenario, work, found)
     return Scene(
@@ -133,8 +133,8 @@ def _world(scenario: Scenario, model: Any, xml: str) -> World:
     return world(model, xml, _movable(scenario), _fixed(scenario))
 
 
-def _with_described_arm(scenario: Scenario, room: str, arm: Arm, settings: Physics) -> World:
-    """Put an arm that was described by a file into a finished room, which names it already."""
+def _with_measured_arm(scenario: Scenario, room: str, arm: Arm, settings: Physics) -> World:
+    """Put an arm whose gripper was measured into a finished room, which names it already."""
     spec, own = mujoco.MjSpec.from_string(room), mujoco.MjSpec.from_string(arm.model)
     for geom in own.geoms:
         geom.solref[:2], geom.solimp, geom.condim = settings.solref, settings.solimp, _PAD_CONDIM
@@ -176,10 +176,10 @@ def _compose(
     shown = room.to_xml_string()
     for element in reversed(hands):
         element.remove()
-    if arm.model is None:
+    if arm.hand is None:
         _add_arm(mjcf, room, arm, movable if grasp == "weld" else {}, settings)
     text = _with_force_sensors(room.to_xml_string(), scenario, f"arm/{first_link}")
-    return shown, text if arm.model is None or grasp != "weld" else _with_welds(text, arm, movable)
+    return shown, text if arm.hand is None or grasp != "weld" else _with_welds(text, arm, movable)
 
 
 def _set_physics(room: Any, s: Physics) -> None:
@@ -242,10 +242,12 @@ def _add_hands(room: Any, movable: Mapping[str, Any]) -> list[Any]:
 
 
 def _add_arm(mjcf: Any, room: Any, arm: Arm, welded: Mapping[str, Any], settings: Physics) -> None:
-    model = mjcf.from_path(str(arm.mjcf))
+    model = mjcf.from_path(str(arm.mjcf)) if arm.model is None else mjcf.from_xml_string(arm.model)
     model.model = "arm"
     _set_contact(model, settings)
-    room.attach(model).pos = arm.base
+    stand = room.attach(model)
+    stand.pos = arm.base
+    stand.quat = arm.turn
     mount = model.find("body", arm.mount)
     for part, body in welded.items():
         room.equality.add("weld", name=f"grasp_{part}", body1=mount, body2=body, active=False, **_ARM_WELD)
