@@ -1,7 +1,5 @@
 """The one error a person sees: what was given, what is allowed, what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any

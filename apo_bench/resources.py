@@ -1,7 +1,5 @@
 """Where assets and scenarios lie: inside the installed package, or beside it in a checkout."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -1,7 +1,5 @@
 """What a corrector returns: goals, how the solver ended, and what the test of the correction says."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple, final
 

@@ -1,7 +1,5 @@
 """Faces of two solids that look at each other: how far apart, how far from parallel, how much they cover each other."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache

@@ -5,8 +5,6 @@ first: how far off an axis is, across the other one or in front of a plane, then
 tilts. A turn about the axis changes none of them, so it does not matter how a part of revolution was seen turned.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product

@@ -4,8 +4,6 @@ A part that is moved again, also when it is carried, becomes a new node. An arc 
 have now; one that disappeared joins those they had when it was made, and keeps them in the graph.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

@@ -5,8 +5,6 @@ dovetail that lies on a receded floor has more room between its leaning walls. W
 it, so the largest gap is that of a linear program.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import cos, pi
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What kind of contact two faces make, and how much play their sizes leave."""
 
-from __future__ import annotations
-
 from typing import Literal, get_args
 
 from apo_bench.geometry.round_face import RoundFace

@@ -1,7 +1,5 @@
 """To see operations of a demonstration again: what a corrector may ask for."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Protocol, runtime_checkable
 

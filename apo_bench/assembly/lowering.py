@@ -17,8 +17,6 @@ of the face (`RoundFace.frame`), and the equations of the paper take these as we
 anything within it is allowed, there are `WALLS` planes in place of two.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

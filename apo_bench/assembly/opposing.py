@@ -5,8 +5,6 @@ the table satisfies them as well as one that stands on it. Nothing keeps a cone 
 to a right angle; planes through an axis have no sense.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

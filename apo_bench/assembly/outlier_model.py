@@ -1,7 +1,5 @@
 """How often observations are worse than their covariance says, and how much."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

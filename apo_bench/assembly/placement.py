@@ -1,7 +1,5 @@
 """Where every part stands after each operation, if the goals are reached exactly."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 from apo_bench.assembly.goals import Poses

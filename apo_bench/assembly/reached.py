@@ -1,7 +1,5 @@
 """What a replay reached: the states of the parts, which the judge looks at, and how the replay ended."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

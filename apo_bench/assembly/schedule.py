@@ -1,7 +1,5 @@
 """Schedules of do and undo steps: whether one makes sense, and what is in force before work is taken apart."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

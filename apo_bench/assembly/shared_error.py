@@ -8,8 +8,6 @@ of operation k it is A_k c, T_k = T_seen_k exp(A_k c), with
     A_k = 1                         in the frame of each part itself (no frame).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

@@ -4,8 +4,6 @@ A covariance alone says nothing of how often errors are several times as large a
 tails, tests and regions are taken from draws of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import final

@@ -5,8 +5,6 @@ may be shifted: of a shaft in a hole one every 90 degrees around the axis, of a 
 arc and between them. A cone counts as a shaft in a hole with a bottom: it leaves along the axis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Bands of tori, spheres and free surfaces, which look like cylinders and cones one by one."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Round holes: filled before a solid is cut, then cut out of its pieces as wedges that touch the wall, [mm]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any

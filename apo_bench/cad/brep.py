@@ -1,7 +1,5 @@
 """Solids of a STEP file as Open CASCADE reads them: surface and triangles of each face; in a process of its own."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import resource

@@ -1,7 +1,5 @@
 """Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a surface crosses itself: a tree of boxes finds triangles that may meet, their edges say which do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Solids cut into convex pieces: along the planes of reflex edges, then around round holes, [mm]."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

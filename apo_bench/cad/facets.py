@@ -1,7 +1,5 @@
 """Triangles that lie in one plane as flat pieces of the surface, and which of them meet at a small angle."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Planes, cylinders and cones fitted to flat pieces of a surface, and what of it lies on them."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

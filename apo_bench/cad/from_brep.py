@@ -1,7 +1,5 @@
 """Solids of a B-rep become closed meshes whose triangles belong to faces with the parameters of the file."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

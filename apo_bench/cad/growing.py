@@ -1,7 +1,5 @@
 """Cylinders and cones in a mesh: grown from smooth parts of its surface, or from single edges in them."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

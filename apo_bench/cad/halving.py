@@ -1,7 +1,5 @@
 """Solids cut along planes until the parts are convex: first along flat faces, then along sides of free shapes, [mm]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 

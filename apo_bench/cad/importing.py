@@ -1,7 +1,5 @@
 """A CAD file becomes part files: raw solids, names, pieces, faces that can make contacts, and what is said of it."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Volume, centroid and inertia of a solid whose round faces are as fitted, not as tessellated."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.cad.cutting import Cut

@@ -1,7 +1,5 @@
 """Names of faces: from what they are and where, so that one file gives the same ones each time."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A limit of time for what a file asks for."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A file of poses: where each copy of an imported part is in the file that it is from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 

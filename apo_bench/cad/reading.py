@@ -1,7 +1,5 @@
 """Files of triangles become meshes: STL and OBJ by trimesh, 3MF by the objects that its build names."""
 
-from __future__ import annotations
-
 import logging
 from io import BytesIO
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The faces of a mesh: flat pieces that meet smoothly are tried as cylinders and cones, and what is left as planes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is known of a face that was found: planes with their outward normals, walls with their ends, [mm]."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

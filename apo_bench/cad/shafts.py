@@ -1,7 +1,5 @@
 """Shafts: pieces with as many corners around the axis as the wall needs, or as true cylinders, [mm]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Meshes become closed solids that are the right way round: corners joined, shells told apart, copies found."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, NamedTuple
 

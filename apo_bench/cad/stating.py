@@ -1,7 +1,5 @@
 """Regions become the faces that a part file states, [m]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """STEP files become raw solids: read in a process of its own, as what a file makes of the reader is its own affair."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import re

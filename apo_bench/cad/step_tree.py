@@ -1,7 +1,5 @@
 """The tree of a STEP file: shapes with the names of product and instance, where they are, and their colours."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Walls between two circles, or a circle and a tip, as strips from end to end."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

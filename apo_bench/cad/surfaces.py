@@ -1,7 +1,5 @@
 """Surfaces of faces of a B-rep: as the file says, or fitted to points where it says a spline."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

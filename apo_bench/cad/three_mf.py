@@ -1,7 +1,5 @@
 """3MF: a zip of one model, whose build places objects; objects are meshes, or other objects at places."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple

@@ -5,8 +5,6 @@ request was wrong, with one sentence on stderr; 128 and the number of the signal
 degrees.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What the command line makes of the words it is given."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The commands `apo-bench arm list | check`: which arms there are, and what one can do at the table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

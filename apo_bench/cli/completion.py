@@ -3,8 +3,6 @@
 Where none begins like what was typed, the shell offers files, as scenarios, noises and arms may be.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 from apo_bench.records.relations import RECOGNISED

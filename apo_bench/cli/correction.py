@@ -1,7 +1,5 @@
 """Two commands that need no simulator: `apo-bench explain | correct`. Only the picture of `explain` draws with one."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated, Any, cast

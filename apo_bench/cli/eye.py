@@ -1,7 +1,5 @@
 """One command: `apo-bench eye`, what the range finder makes of one demonstration."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

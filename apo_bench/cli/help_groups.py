@@ -1,7 +1,5 @@
 """How `--help` lists commands and the options of long ones: in groups, each with its whole first sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any

@@ -1,7 +1,5 @@
 """The commands `apo-bench noise list | card | fit | learn | still`: noise models, cards, noise that is measured."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """One command: `apo-bench plan`, operations as macros with their motion parameters; only `--arm` needs a simulator."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The commands `apo-bench power rate | pairs | margin | shows`: how many trials it takes, and what so many show."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Annotated, Any

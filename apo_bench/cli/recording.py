@@ -1,7 +1,5 @@
 """The command `apo-bench recording import`: the log of a tracker becomes an observation file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

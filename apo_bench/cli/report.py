@@ -1,7 +1,5 @@
 """The commands `apo-bench report` and `apo-bench compare`: what a sweep says, and how two differ."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The commands `apo-bench scenario list | card | new | check`: what there is, what one asks for, one of your own."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The command `apo-bench view`: look at a scenario or at a trial of a sweep, and step through it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """One convex piece that is no box as the range finder meets it, in the frame of the middle of the box around it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

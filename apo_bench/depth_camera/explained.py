@@ -1,7 +1,5 @@
 """How much of what changed a model explains, and how much it should hide that is still seen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Follow a demonstration from range image to range image: what moved, which part it was, where it went."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """Recognise what appeared among the models, and locate it: fit every model, keep the one that explains most."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The range finder: where its views stand, and what its sensor makes of true distances."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple, final

@@ -1,7 +1,5 @@
 """The range finder as a sensor of poses: from the true range images of a demonstration to an observation of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

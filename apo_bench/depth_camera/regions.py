@@ -1,7 +1,5 @@
 """The difference of two range images: where something appeared, and where something vanished."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

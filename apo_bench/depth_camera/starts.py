@@ -1,7 +1,5 @@
 """Where a fit may begin: every way up, turned and shifted as the region of the points says."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.depth_camera.distance import Shape

@@ -1,7 +1,5 @@
 """A pinhole view: which ray every pixel looks along."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final

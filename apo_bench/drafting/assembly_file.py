@@ -1,7 +1,5 @@
 """A CAD file of several solids becomes part files and a file of poses beside them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

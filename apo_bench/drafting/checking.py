@@ -1,7 +1,5 @@
 """Whether human and robot can do a scenario, and which line of its file to change if not."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Posed parts become a draft of a scenario: contacts, an order, starts, grasps, and what is to be said of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """Where parts wait on the table, and where the assembly stands: in reach of the arm, with room for fingers between."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

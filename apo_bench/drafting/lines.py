@@ -1,7 +1,5 @@
 """In which line of a scenario file something stands that a sentence names."""
 
-from __future__ import annotations
-
 import re
 
 _OPERATION = re.compile(r"operation (\d+)(?:, (\w+))?")

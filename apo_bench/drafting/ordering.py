@@ -5,8 +5,6 @@ would rest on what is left. Where no part can go alone, parts that hold together
 beside the assembly first, on the table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations

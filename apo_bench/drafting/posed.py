@@ -1,7 +1,5 @@
 """Parts at their final poses, read from a file of poses: one table per copy of a part."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

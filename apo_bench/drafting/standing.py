@@ -1,7 +1,5 @@
 """Whether a part rests on a table, and where it would tip over."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

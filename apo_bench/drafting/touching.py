@@ -4,8 +4,6 @@ Poses are exact but for the digits of a file and of a fit, so a face touches whe
 0.05 mm. Then all parts but the fixed ones are moved, each as little as can be, until every contact is closed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """A draft as the text of a scenario file, with a comment for each choice."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The door for learners: `APOReplay-v0`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

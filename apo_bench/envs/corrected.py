@@ -1,7 +1,5 @@
 """The with-correction arm of an experiment: a wrapper that corrects what `APOReplay-v0` shows."""
 
-from __future__ import annotations
-
 from typing import Any, final
 
 import gymnasium

@@ -1,7 +1,5 @@
 """The settings of one episode: what `reset(options=...)` may say."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, final

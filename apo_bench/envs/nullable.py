@@ -4,8 +4,6 @@ A vector environment gathers the infos of its environments into arrays. If the f
 that holds nothing but ints, and a None of the next one raises; numbers of these types go into an array of objects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, final
 

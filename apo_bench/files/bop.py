@@ -3,8 +3,6 @@
 The first line is `scene_id,im_id,obj_id,score,R,t,time`; R is nine numbers row by row and t three, with spaces between.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Where parts truly were in images: a results file that holds the truth, or a `scene_gt.json` of the BOP format."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -8,8 +8,6 @@ about each axis of the part (then those that are assumed), and whether the opera
 column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,7 +1,5 @@
 """How small and how large a standard deviation may be, wherever one is stated."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

@@ -5,8 +5,6 @@ A file names its scenario, which carries the topology; the file itself carries n
 A covariance is that of the body twist (x, y, z, rx, ry, rz) in mm and degrees.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from types import MappingProxyType

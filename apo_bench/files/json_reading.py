@@ -1,7 +1,5 @@
 """Observations and plans from their JSON forms, which `json_forms` describes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

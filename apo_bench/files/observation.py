@@ -1,7 +1,5 @@
 """Observed poses from a file: the JSON form of `apo_bench.files.json_forms`, or a table of comma-separated values."""
 
-from __future__ import annotations
-
 from math import radians
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """ROBOT.toml: in which frames, and in which order of quaternions, a plan goes out to a robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, cast, final

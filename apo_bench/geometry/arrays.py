@@ -1,7 +1,5 @@
 """Arrays that stay as they were made."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """The physical part: fit faces recede by the clearance, nothing else moves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

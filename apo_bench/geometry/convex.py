@@ -1,7 +1,5 @@
 """Shadows of convex pieces, and the directions along which two of them may be apart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

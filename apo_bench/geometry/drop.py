@@ -1,7 +1,5 @@
 """How far a solid would fall before it meets another one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry.arrays import Array

@@ -5,8 +5,6 @@ them that do not lie on one line with the centre of volume say all of a turn, so
 be carried to gives one candidate; those that carry all faces onto faces alike, and pieces into pieces, are kept.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Rays go through a part along the direction in which the pads close, in rows and 
 begins and ends at the same places over some length, pads hold it: opposite flat faces, the wall of a shaft.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Convex pieces that are no boxes: their corners, the sides between them, and cylinders among them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, final

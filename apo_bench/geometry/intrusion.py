@@ -1,7 +1,5 @@
 """How deep two solids of convex pieces are in each other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 All that asks whether such a contact is closed asks this: the judge, the checks of a scenario, recognition, predictions.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final

@@ -1,7 +1,5 @@
 """Closed rings of points in a plane."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry.arrays import Array

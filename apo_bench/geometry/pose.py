@@ -5,8 +5,6 @@
 body's own frame, and acts from the right: `T @ exp(twist)`. Leading axes broadcast.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Convex pieces as they are made: their sides that lie on fit faces recede by the clearance."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

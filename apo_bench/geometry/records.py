@@ -1,7 +1,5 @@
 """Frozen records that can be copied and pickled."""
 
-from __future__ import annotations
-
 import copyreg
 from collections.abc import Mapping
 from dataclasses import fields

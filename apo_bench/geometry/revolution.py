@@ -1,7 +1,5 @@
 """Parts of revolution: the same after any turn about their axis, and some of them end for end."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 

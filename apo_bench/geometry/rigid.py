@@ -1,7 +1,5 @@
 """Whether a matrix is a pose at all."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

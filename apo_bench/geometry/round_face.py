@@ -1,7 +1,5 @@
 """Faces of revolution: the walls of holes, shafts, chamfers and tapers, and the rims of holes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, final

@@ -1,7 +1,5 @@
 """Solids and their named faces, in the frame of the solid, [m]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

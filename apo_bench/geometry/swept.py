@@ -4,8 +4,6 @@ Two convex pieces overlap where their shadows do along every separating axis; al
 interval, so each pair of pieces meets in one interval of the way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The turns after which a part looks the same."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from itertools import permutations, product
 

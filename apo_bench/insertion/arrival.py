@@ -1,7 +1,5 @@
 """How a part comes into its contacts: the macros, and the straight line on which it arrives."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import final

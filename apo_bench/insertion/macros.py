@@ -4,8 +4,6 @@ What is taken off last is made first (`apo_bench.insertion.peeling`). A contact 
 until it is felt; walls that enclose the part are made by an insertion to a place that must be known before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, final

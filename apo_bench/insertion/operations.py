@@ -4,8 +4,6 @@ States and macros are those of the nominal goals; a plan with other motion param
 directions of its parts, so that a minor change is made by replacing one part of the plan.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """Peeling: in which order the contacts of a part can be taken off, which read backwards is how they are made."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contact states with rotation: the same linear programme for screws, and what turning adds to translation."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

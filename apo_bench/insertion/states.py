@@ -5,8 +5,6 @@ in which all of them stay closed are *maintaining*, those that only open some *d
 for translations the three numbers add up to 3, which leaves ten states. Rows of six numbers (screws) work alike.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, final

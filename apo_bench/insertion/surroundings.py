@@ -1,7 +1,5 @@
 """What a part touches when it is moved: at its side, below it, later; what that asks of the motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.goals import Poses

@@ -1,7 +1,5 @@
 """Tables as CSV that a spreadsheet shows and does not obey: a text that it would take for a formula has ' in front."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path

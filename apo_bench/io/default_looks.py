@@ -4,8 +4,6 @@ Matplotlib reads that of the current folder when it is first imported: its setti
 no text is an exception, and a pipe is waited for.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator, Mapping

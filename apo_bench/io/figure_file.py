@@ -1,7 +1,5 @@
 """Pictures are written here."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A file that is only appended to, and is put back if somebody removes it meanwhile: its bytes are still at hand."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

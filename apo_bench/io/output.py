@@ -1,7 +1,5 @@
 """What is printed where: one JSON object on standard output, and nothing else."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

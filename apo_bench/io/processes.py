@@ -1,7 +1,5 @@
 """Processes below a process, how they are ended with all that they started, and what one has not written yet."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

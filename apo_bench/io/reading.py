@@ -1,7 +1,5 @@
 """Files that others wrote are opened here: ordinary files only, none larger than allowed, text in UTF-8."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator

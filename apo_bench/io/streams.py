@@ -1,7 +1,5 @@
 """The surroundings of a process: standard streams that may be closed or full, and a current folder that may be gone."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Comma-separated values read strictly: every complaint is one sentence that names the line and the column."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

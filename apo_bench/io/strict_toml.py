@@ -1,7 +1,5 @@
 """TOML read strictly: every complaint is one sentence that names the file and the line or the key."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

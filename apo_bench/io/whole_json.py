@@ -1,7 +1,5 @@
 """JSON of which nothing is lost when it is read: no key stands twice in an object, and no text has half a letter."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

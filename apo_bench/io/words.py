@@ -1,7 +1,5 @@
 """Words and columns that several texts are made of."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files are written here: ordinary ones only, and never through a link."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import stat

@@ -1,7 +1,5 @@
 """Whether the contacts of an assembly were made, measured on the nominal faces at the poses that were reached."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Literal, NamedTuple

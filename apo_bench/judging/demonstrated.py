@@ -1,7 +1,5 @@
 """Was the assembly made as it was demonstrated? Every contact is asked for when it is made, and at the end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np

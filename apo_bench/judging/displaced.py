@@ -1,7 +1,5 @@
 """How far parts moved after they were put: in the room, against each other, and where fixed parts say where to."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Is the finished assembly right? What a person says who sees it, whatever became of it on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from apo_bench.assembly.goals import Poses

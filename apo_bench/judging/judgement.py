@@ -1,7 +1,5 @@
 """What one rule of judging found: the faults, and every number they rest on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

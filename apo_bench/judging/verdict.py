@@ -1,7 +1,5 @@
 """Is the assembly right? A pure function of what was reached; it knows no plan, no corrector and no residual."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,7 +1,5 @@
 """Looks at a demonstration that has been observed once: fresh draws of the same noise, as many as are allowed."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 from typing import final

@@ -1,7 +1,5 @@
 """What a noise model is, and how to name one."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable, Iterable

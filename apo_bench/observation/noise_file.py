@@ -1,7 +1,5 @@
 """Noise files: what was measured of a pose estimator, as TOML."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Observe a demonstration through a noise model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

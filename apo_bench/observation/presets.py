@@ -1,7 +1,5 @@
 """The files behind the names of noise models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -7,8 +7,6 @@
 The truth, the human, the robot and the judge keep the right relations; only what a corrector is told is wrong.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

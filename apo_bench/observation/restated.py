@@ -1,7 +1,5 @@
 """An observation as a camera of known noise would have stated it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

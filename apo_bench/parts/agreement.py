@@ -1,7 +1,5 @@
 """Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path

@@ -1,7 +1,5 @@
 """All that a part file may say: which elements, with which attributes, with which values. MuJoCo is told no more."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A second opinion on a solid: the mesh that manifold3d makes of its pieces, measured by trimesh."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

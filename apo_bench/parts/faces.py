@@ -4,8 +4,6 @@ A mesh union computes in rounded numbers and leaves stray corners and fins where
 cell is full or empty, and a face is what lies between the two.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Any, NamedTuple

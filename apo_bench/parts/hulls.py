@@ -1,7 +1,5 @@
 """Meshes of part files as convex pieces: what is no convex piece with corners of its own is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

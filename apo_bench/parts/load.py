@@ -1,7 +1,5 @@
 """A part file becomes a solid with named faces."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

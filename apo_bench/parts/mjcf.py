@@ -1,7 +1,5 @@
 """A part file: MJCF with one body of named convex pieces; of boxes alone, sites name faces. No simulator needed."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Whether the pieces of a part hold together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

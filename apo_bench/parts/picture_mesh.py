@@ -1,7 +1,5 @@
 """The mesh that a part is shown as: a binary STL file in the folder of the part, which never collides."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element

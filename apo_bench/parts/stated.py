@@ -1,7 +1,5 @@
 """What stands beside a part file whose pieces are not boxes alone: its faces, its matter, where it comes from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """XML read strictly: what the table of a part file does not allow is refused by name, with its line, as it is met."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 from typing import NoReturn

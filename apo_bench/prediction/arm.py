@@ -1,7 +1,5 @@
 """What an arm makes of a plan, as plain numbers: whoever knows the arm works them out, the prediction weighs them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal, final
 

@@ -12,8 +12,6 @@ Where it is known what an arm makes of the plan (`prediction/arm.py`): whether i
 gripper has room, and whether contacts that would be near enough still are with the error of its tip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby

@@ -1,7 +1,5 @@
 """Parts that a plan puts into one another: at the goal, on the way in, and where that way begins."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a contact can push a part with: where, along which normals, and with how much friction."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Weight lays a part flat on what carries it. A part that is slid against another 
 touches and keeps its turn. Faces that fit into one another are left as they are planned, shafts in holes and cones too.
 """
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 import numpy as np

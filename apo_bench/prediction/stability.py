@@ -5,8 +5,6 @@ normals of its contacts (`prediction/pushes.py`), with friction where they carry
 a wall, a shaft by both sides of a groove, a plug by its seat.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.goals import Poses

@@ -8,8 +8,6 @@ and the likeliest set wins (joint compatibility: Neira and Tardos, "Data associa
 joint compatibility test", 2001).
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final

@@ -11,8 +11,6 @@ twice the logarithm of a Bayes factor (of Savage and Dickey, with a room so wide
 that others imply adds as much to one determinant as to the other, so it gains nothing, as it should.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import radians
 from typing import final

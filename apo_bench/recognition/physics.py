@@ -5,8 +5,6 @@ poses still are. Where parts are inside each other by 3 mm, give or take 5, that
 out of the question.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from math import exp, hypot, log, sqrt
 

@@ -1,7 +1,5 @@
 """Where one operation put things if some contacts hold: which faces may touch, how sure that is, what stands around."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property

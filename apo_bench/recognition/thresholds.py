@@ -1,7 +1,5 @@
 """How near is near enough: thresholds of gap and angle, from the stated noise or fixed as in the paper."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

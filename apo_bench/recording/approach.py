@@ -1,7 +1,5 @@
 """How a part came to its goal, beside how the plan brings it there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The camera's pose and the order of operations that rests give, and how well all of it fits the scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 

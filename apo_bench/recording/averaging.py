@@ -1,7 +1,5 @@
 """Poses of one rest become one pose: a mean on SE(3) without outliers, and the covariance that they show."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,7 +1,5 @@
 """A recording without a scenario: which part was put where, in order; nothing is known of contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple

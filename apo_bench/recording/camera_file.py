@@ -1,7 +1,5 @@
 """CAMERA.toml: how a log is written, where its camera stands, and what of its error stays while a part rests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

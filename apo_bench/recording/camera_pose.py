@@ -1,7 +1,5 @@
 """Where the camera stands: solved from parts that stand still on known places, with residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Columns of numbers become poses: positions, quaternions, rotation vectors, Euler angles, matrices."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 

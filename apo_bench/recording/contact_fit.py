@@ -1,7 +1,5 @@
 """How well the contacts of an operation are closed where parts were seen."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

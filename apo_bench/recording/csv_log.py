@@ -1,7 +1,5 @@
 """Logs as comma-separated values: one row per pose, columns known by their names; or as exported from ROS bags."""
 
-from __future__ import annotations
-
 import csv
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

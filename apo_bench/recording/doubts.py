@@ -1,7 +1,5 @@
 """What is wrong with a recording that does not fit: each usual mistake is tried, and the one that mends it is named."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The formats of logs, and the one that reads them all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """From the log of a tracker to an observation: frames, rests, the order of operations, and what stays unclear."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

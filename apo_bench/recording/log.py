@@ -1,7 +1,5 @@
 """What a tracker wrote: one track per id, poses of its model in the frame of the camera."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

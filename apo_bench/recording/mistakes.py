@@ -1,7 +1,5 @@
 """The usual mistakes in logs, undone: what a recording would be without each of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """OBJECTS.toml: which id of a tracker is which part, and where the part's frame lies in the tracker's model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

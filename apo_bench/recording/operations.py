@@ -1,7 +1,5 @@
 """What a log shows of one operation: where its part went, by which way, and what moved with it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final

@@ -4,8 +4,6 @@ The last operation that moves a part ends with its last stay. Before, a hand may
 choices in the order of the operations, the one is taken whose stays are long and whose contacts are nearly closed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The path of a part between two rests, and its last straight piece."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -5,8 +5,6 @@ a stretch of still frames is a rest. Small shifts that no such window shows, suc
 two millimetres, split a rest in two where its two sides differ by more than chance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,7 +1,5 @@
 """Logs exported from ROS bags: PoseStamped and TransformStamped, as CSV or as JSON; metres, quaternions x, y, z, w."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Where parts stand before the first operation: on known places, as the scenario's do where they were seen, or else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

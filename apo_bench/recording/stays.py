@@ -1,7 +1,5 @@
 """Where a part stays: rests between which it is only adjusted are one stay, and what it does between two is a move."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final

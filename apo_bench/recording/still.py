@@ -1,7 +1,5 @@
 """The noise of a camera from parts that rest: what its frames scatter about the mean of each rest."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.errors import InputError

@@ -1,7 +1,5 @@
 """What stays unclear of a recording that fits, so that a person can state it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

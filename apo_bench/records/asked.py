@@ -1,7 +1,5 @@
 """Settings of a trial as rows, files and options have them, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What tells one trial of a sweep from another."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from operator import itemgetter
 from typing import Any

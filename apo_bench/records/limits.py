@@ -1,7 +1,5 @@
 """Wall time that things may take [s], where nothing else is said."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,7 +1,5 @@
 """What a method is called: what the robot is told to do, and whether it feels for holes while it does that."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from apo_bench.errors import InputError, unknown

@@ -4,8 +4,6 @@ A physical failure is a result, not an exception. `{part}`, `{operation}` (count
 trial or its corrector) are filled in where the outcome is made; no other words appear in a row.
 """
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 STAGES = (

@@ -7,8 +7,6 @@
 `module:name`       a function of somebody's own
 """
 
-from __future__ import annotations
-
 import math
 
 from apo_bench.errors import InputError, unknown

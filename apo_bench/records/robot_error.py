@@ -9,8 +9,6 @@
 Several are joined by `+`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

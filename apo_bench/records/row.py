@@ -4,8 +4,6 @@ Lengths are in mm, angles in degrees, quaternions are wxyz, operations are numbe
 checked by these types: finite numbers in their range, and no other fields.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, NotRequired, TypedDict, get_args, get_type_hints

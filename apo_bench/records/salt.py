@@ -1,7 +1,5 @@
 """A secret that enters every stream of chance, so that nobody without it can draw the trials of a sweep again."""
 
-from __future__ import annotations
-
 import hashlib
 import hmac
 import os

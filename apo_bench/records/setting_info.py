@@ -1,7 +1,5 @@
 """What is to be known of a setting of a trial besides its name, type and default, said where the setting is stated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ What else lists settings is made from this: columns and keys of rows, axes of sw
 help of the command line, replay commands, and the tables of the documentation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real

@@ -3,8 +3,6 @@
 Whoever needs the object behind a name asks `apo_bench.names.resolve`.
 """
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 CORRECTORS = MappingProxyType(

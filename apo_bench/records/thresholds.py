@@ -1,7 +1,5 @@
 """What the judge demands: one set of numbers, stated in the scenario and repeated in every row."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, final
 

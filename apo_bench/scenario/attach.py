@@ -1,7 +1,5 @@
 """The lines of attach of a scenario: what the file states is checked against the contacts, the rest is found."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

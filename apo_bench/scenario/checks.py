@@ -1,7 +1,5 @@
 """Whether the numbers of a scenario fit its topology: contacts closed, parts apart, wherever the truth may vary to."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations, product
 from typing import NamedTuple

@@ -8,8 +8,6 @@ A contact is a pair of faces, flat or round, `["bottom", "table.top"]`, or a tab
 with the last, and stands for all the play of parts that fit if it is left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import get_args
 

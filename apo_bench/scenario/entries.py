@@ -1,7 +1,5 @@
 """The tables [parts] and [[operations]] of a scenario file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

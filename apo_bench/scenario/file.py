@@ -3,8 +3,6 @@
 Lengths in mm, angles in degrees, operations numbered from 1; `scenarios/stick_in_tower.toml` shows every key.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import fields
 from functools import lru_cache

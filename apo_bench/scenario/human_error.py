@@ -1,7 +1,5 @@
 """How a human's error spreads: what is put against a displaced part is displaced alike, until someone sees it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

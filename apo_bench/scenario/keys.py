@@ -1,7 +1,5 @@
 """What a value in a scenario file may be: poses, axes, spans."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NoReturn
 

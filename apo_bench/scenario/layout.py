@@ -1,7 +1,5 @@
 """The truth of a trial: where a seed puts the assembly, and how far it shifts and turns what no contact fixes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

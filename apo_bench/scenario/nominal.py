@@ -1,7 +1,5 @@
 """The operations of a scenario at its nominal goals, in macros."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 from apo_bench.assembly.goals import Poses

@@ -1,7 +1,5 @@
 """Whether the operations of a scenario follow from each other: what is carried hangs together, nothing goes twice."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.goals import Poses

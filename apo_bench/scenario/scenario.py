@@ -1,7 +1,5 @@
 """A scenario: one demonstration as a recipe. Files are read by `apo_bench.scenario.file`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether parts start on something: what starts in the air falls before anybody takes it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.goals import Poses

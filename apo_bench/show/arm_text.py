@@ -1,7 +1,5 @@
 """What an arm can do, in lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

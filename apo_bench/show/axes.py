@@ -1,7 +1,5 @@
 """The axes of contacts of round faces, to be drawn as dash-dot lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 

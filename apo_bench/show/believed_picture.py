@@ -1,7 +1,5 @@
 """What is believed after a step, drawn: the parts where the motion parameters put them (Fig. 9, 13 and 16)."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A trial in a browser, by viser: stepped through with a slider and buttons; served on this machine only."""
 
-from __future__ import annotations
-
 import io
 import threading
 import time

@@ -1,7 +1,5 @@
 """The task card of a scenario, in Markdown: everything in it is read off the scenario, nothing is said twice."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """A correction in words and tables for people, and as one JSON object."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

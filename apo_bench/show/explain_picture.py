@@ -1,7 +1,5 @@
 """The free directions of every part, drawn as arrows on the finished assembly, with a sentence for each below."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """What the contacts determine, in sentences and tables for people, and as one JSON object."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 

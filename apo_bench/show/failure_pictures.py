@@ -4,8 +4,6 @@ A trial is run again only where specification, assets and code are those of its 
 drawn where the row says that they ended. So are those of a salted trial whose salt was not given.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Mapping, Sequence

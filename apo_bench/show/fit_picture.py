@@ -1,7 +1,5 @@
 """How well a fit fits: histograms with the fitted densities, and quantiles against quantiles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What `apo-bench noise fit` found, as JSON and in words."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

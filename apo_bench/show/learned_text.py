@@ -1,7 +1,5 @@
 """What `apo-bench noise learn` found, as JSON and in words."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The card of a noise model: formula, frame, parameters, and a histogram of what it really does."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Mapping
 from typing import Any, NamedTuple

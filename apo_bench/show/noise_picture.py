@@ -1,7 +1,5 @@
 """Histograms of a noise model's errors, with the Gaussian that its observations state."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

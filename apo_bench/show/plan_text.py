@@ -4,8 +4,6 @@ Directions are those of the frame of the assembly at the nominal goals; what is 
 alone, so that another motion parameter changes the line of its operation and no other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """What `apo-bench recognise` found, as a table, in sentences and as JSON."""
 
-from __future__ import annotations
-
 from math import degrees
 from typing import Any
 

@@ -5,8 +5,6 @@ straight line `from` a pose `to` a pose. One that is guarded ends where contact 
 should be at `to`; it begins as far before as the plan comes from, or `NEAR_M` where nothing else says so.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the range finder sees, one row per operation: picture, range, difference, regions, fitted model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

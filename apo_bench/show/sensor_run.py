@@ -1,7 +1,5 @@
 """One demonstration through the range finder, and all that it made of that: as a record, a form, and lines."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, final
 

@@ -1,7 +1,5 @@
 """Where somebody is who steps through a trial, and what is shown there: the same in a window and in a browser."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal, final
 

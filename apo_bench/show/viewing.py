@@ -1,7 +1,5 @@
 """Something to be looked at, in MuJoCo's window where there is a display, else in a browser."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

@@ -4,8 +4,6 @@ It reads the nominal goals of the scenario, which no corrector may, and no conta
 layout are, it builds the same assembly.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 

@@ -1,7 +1,5 @@
 """The code that shapes a row, file by file: every source file of the package but those of the rooms named here."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from functools import cache

@@ -1,7 +1,5 @@
 """What a correction says of itself, as it stands in a row, and what the truth says of that."""
 
-from __future__ import annotations
-
 import math
 
 from apo_bench.assembly.correction_record import Correction

@@ -1,7 +1,5 @@
 """Hashes that say whether two rows were made of the same things."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys

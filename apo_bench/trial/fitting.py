@@ -4,8 +4,6 @@ A plan that fits is left as it is. So is one whose contacts are off, which no fr
 no choice was found. What is believed of contacts is what the corrector was told.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final

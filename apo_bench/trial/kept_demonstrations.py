@@ -5,8 +5,6 @@ trial, salted or not. The digest in it notices damage, not intent: whoever can w
 decides the truth of its trials.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

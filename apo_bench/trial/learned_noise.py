@@ -4,8 +4,6 @@ Every observation is corrected by `contact-robust`; the errors in the directions
 the noise that makes them most likely is looked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

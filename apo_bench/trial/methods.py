@@ -1,7 +1,5 @@
 """Correctors as a trial knows them: those of `correction`, and those that need a simulator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from apo_bench.names import resolve

@@ -1,7 +1,5 @@
 """What speaks against a plan before it is carried out: the test of its correction, the failure it predicts, the arm."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction

@@ -1,7 +1,5 @@
 """What a method makes of an observation: a plan, or why there is none."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, final

@@ -1,7 +1,5 @@
 """How far planned or reached poses are from the truth, split into what the contacts fix and what they leave free."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.equations import equations

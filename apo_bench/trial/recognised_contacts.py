@@ -9,8 +9,6 @@
 The truth, the robot and the judge keep the relations of the scenario.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from apo_bench.assembly.goals import Observation

@@ -1,7 +1,5 @@
 """A row: what was asked for, and how it ended; what only a replay can say is filled in by `trial`."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from itertools import dropwhile
 from typing import cast

@@ -1,7 +1,5 @@
 """The scene of a trial, compiled for those of its settings that shape it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from apo_bench.records.settings import SETTINGS, TrialSettings

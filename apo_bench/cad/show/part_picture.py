@@ -1,7 +1,5 @@
 """A picture of a part with the names of its faces, from two sides."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the noise of a camera consists of: errors in the frames of its rays, and errors that all operations share."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fit the noise of a camera to residuals: tails by maximum likelihood, rates of outliers and of misses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Tails from published quantiles, where the estimates themselves are not published."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

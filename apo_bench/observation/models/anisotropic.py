@@ -1,7 +1,5 @@
 """Noise of a camera that is worse along its line of sight: infinitely far away, or at a place of its own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, final
 

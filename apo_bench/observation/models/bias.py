@@ -1,7 +1,5 @@
 """Errors that stay: a model of a part has its origin in the wrong place, or the camera is not where it believes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, final
 

@@ -4,8 +4,6 @@ The camera's axes are those of OpenCV: x to the right, y down, z along the optic
 the camera, turned the shortest way so that its third axis is the ray: errors in it are (x, y, along; rx, ry, about).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import final
 

@@ -1,7 +1,5 @@
 """Noise that drifts: what is wrong in one operation is nearly as wrong in the next."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, final
 

@@ -1,7 +1,5 @@
 """Noise that draws from the residuals of a pose estimator themselves; `noise fit --residuals` writes a file of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path

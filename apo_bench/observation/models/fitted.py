@@ -1,7 +1,5 @@
 """Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple, final

@@ -1,7 +1,5 @@
 """Noise with heavy tails: most errors are smaller than a Gaussian's, and a few are much larger."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import inf
 from typing import ClassVar, final

@@ -1,7 +1,5 @@
 """Noise that is right on SE(3): the same in every direction, in the frame of the part that was seen."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, final

@@ -1,7 +1,5 @@
 """What every noise model has: its level, and facts for its card."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

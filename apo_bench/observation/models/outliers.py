@@ -1,7 +1,5 @@
 """Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import inf
 from typing import ClassVar, final

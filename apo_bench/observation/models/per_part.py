@@ -1,7 +1,5 @@
 """Noise of a camera that sees some parts much better than others: small, shiny or half hidden ones are worse."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final

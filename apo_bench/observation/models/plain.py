@@ -1,7 +1,5 @@
 """A plain function `(goals, rng) -> goals` as a noise model: all it must say is how large its errors are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite

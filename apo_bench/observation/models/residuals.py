@@ -1,7 +1,5 @@
 """How far estimates are from the truth, in the frames of the rays on which a camera saw the parts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Noise for parts that look the same when turned: which of the equal poses is reported, and how well it is known."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar, final
 

@@ -6,8 +6,6 @@ and Legendre in y with x = s sinh(y), which is dense where the density is high, 
 a closed form.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, final

@@ -3,8 +3,6 @@
 A piece that only touches such a wall in a corner would stay where it is, and stand out of it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flat areas cut into convex ones: exactly, along their own corners."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Prisms over flat outlines, with holes of any outline and with round bores along the way of the extrusion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise

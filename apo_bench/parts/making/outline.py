@@ -1,7 +1,5 @@
 """Flat outlines of lines and arcs, [mm]: as rings of corners, and their exact moments."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, final

@@ -1,7 +1,5 @@
 """Lengths of bores and shafts: how wide they are, from where to where along their axis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

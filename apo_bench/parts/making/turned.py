@@ -1,7 +1,5 @@
 """Bodies of revolution: shafts with chamfers, discs and bushes with bores, cones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 

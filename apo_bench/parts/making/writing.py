@@ -1,7 +1,5 @@
 """Bodies that were built become solids, and part files that are read as these solids again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path

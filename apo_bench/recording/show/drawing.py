@@ -1,7 +1,5 @@
 """A recording drawn: frames of camera and parts, their paths, and when each part rested."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the picture of a recording shows: of one that fits, of one that does not, of one without a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What was made of a recording, in words and as tables of files."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence

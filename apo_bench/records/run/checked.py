@@ -3,8 +3,6 @@
 Every complaint is one sentence that names the file, the line and the field.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType

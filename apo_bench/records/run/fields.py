@@ -1,7 +1,5 @@
 """What `run.json` and a line of `timing.jsonl` may say, checked when read and written; rows are in `row`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any

@@ -4,8 +4,6 @@ A file is data. What rows or `run.json` name is never imported unless it comes w
 the folder is trusted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

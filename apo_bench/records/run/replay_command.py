@@ -1,7 +1,5 @@
 """The command that runs the trial of a row again."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping
 from typing import Any

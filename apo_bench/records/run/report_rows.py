@@ -1,7 +1,5 @@
 """Rows as a report reads them: only the columns it shows, words kept once, so that 100,000 fit into memory."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from pathlib import Path

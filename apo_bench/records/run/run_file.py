@@ -1,7 +1,5 @@
 """`run.json`: what a sweep was asked to do and what its rows are made of; and whether another sweep is the same."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -1,7 +1,5 @@
 """The picture of a relation graph, as Fig. 7: parts with their ODLs, an arrow from each part to what it was put on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Rows are longest paths from the ground (Sugiyama). An arc that passes a row take
 leads back up: when it was made its environment part rested, and what stands moves together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import pairwise, permutations, product
 from math import factorial, prod

@@ -1,7 +1,5 @@
 """Where boxes, arrows and labels of the picture of a relation graph lie, in inches, y upwards."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

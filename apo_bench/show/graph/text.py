@@ -1,7 +1,5 @@
 """A relation graph in words for people, and as one JSON object."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
