@@ -181,8 +181,8 @@ def _margins(scene: Scene, plan: Plan) -> Array:
     low, high = scene.kinematics.range_of_joints
     least = np.full(len(scene.arm.joints), np.inf)
     for move in moves(plan, scene):
-        code, path = key_angles(scene, move.transfer)
-        if code:
+        angles = key_angles(move.transfer, scene)
+        if angles.code:
             return np.full(len(least), np.nan)
-        least = np.minimum(least, np.min([np.minimum(q - low, high - q) for q in path], axis=0))
+        least = np.minimum(least, np.min([np.minimum(q - low, high - q) for q in angles.reached], axis=0))
     return np.degrees(least)

@@ -54,9 +54,9 @@ def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove
 
 def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
     step, t = move.step, move.transfer
-    code, path = key_angles(scene, t)
+    code, path, ended = key_angles(t, scene)
     if code:
-        return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene))
+        return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
     if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
     T = t.T_world_goal @ pose.inverse(believed[t.part])
@@ -78,9 +78,8 @@ def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
     )
 
 
-def _at_limit(scene: Scene) -> str:
-    """The joint at its limit where the search for joint angles ended, or nothing."""
-    q = scene.kinematics.configuration.q[scene.kinematics.adr]
+def _at_limit(scene: Scene, q: Array) -> str:
+    """The joint at its limit where the search for joint angles ended, at q, or nothing."""
     low, high = scene.kinematics.range_of_joints
     room = np.minimum(q - low, high - q)
     k = int(room.argmin())

@@ -58,6 +58,11 @@ class Kinematics:
         """(2, joints): the lowest and the highest angle of each, [rad]."""
         return self._range[:, self.ids]
 
+    @property
+    def last(self) -> Array:
+        """Where the last search for joint angles ended, or what was last asked for, (joints,), [rad]."""
+        return np.array(self.configuration.q[self.adr])
+
     def forward(self, q: Array) -> Array:
         """The pose of the tip, (4, 4), world."""
         self._full[self.adr] = q

@@ -57,6 +57,17 @@ class Move(NamedTuple):
     transfer: Transfer
 
 
+class KeyAngles(NamedTuple):
+    """Joint angles at the tip poses of a transfer that must be in reach, [rad]."""
+
+    code: str
+    """Of the first end at which a tip pose has no joint angles, empty where all have."""
+    reached: tuple[Array, ...]
+    """(joints,) each, at the poses before that."""
+    ended: Array
+    """Where the search for the last of them ended, (joints,)."""
+
+
 class _Task(NamedTuple):
     """One transfer to be prepared, in terms of the plan."""
 
@@ -87,11 +98,13 @@ def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
 
 def unreachable(scene: Scene, transfer: Transfer) -> str:
     """The code of the first end of the transfer at which a tip pose has no joint angles, `` where all have."""
-    return key_angles(scene, transfer)[0]
+    return key_angles(transfer, scene).code
 
 
-def key_angles(scene: Scene, transfer: Transfer) -> tuple[str, list[Array]]:
-    """The same code, and joint angles, (joints,) each, at the tip poses that are reached before it."""
+@remembered
+def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
+    """Joint angles at the tip poses that must be in reach; remembered, since who foretells a transfer and who carries
+    it out ask for the same."""
     q, before, reached = np.array(scene.arm.home), None, list[Array]()
     for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
         for T in poses:
@@ -99,10 +112,10 @@ def key_angles(scene: Scene, transfer: Transfer) -> tuple[str, list[Array]]:
             if found is None and scene.arm.hand is not None:
                 found = _reached_on_the_way(scene, before, T, q)
             if found is None:
-                return code, reached
+                return KeyAngles(code, tuple(reached), scene.kinematics.last)
             q, before = found, T
             reached.append(q)
-    return "", reached
+    return KeyAngles("", tuple(reached), q)
 
 
 def _reached_on_the_way(scene: Scene, before: Array | None, T: Array, q: Array) -> Array | None:
