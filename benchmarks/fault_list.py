@@ -38,9 +38,9 @@ FAULTS = (
     Fault("geometry/swept.py", "return max(0.0, at - _SLACK_M)", "return max(0.0, at)", "the slack is kept"),
     Fault("geometry/symmetry.py", '"nij,mji->nm"', '"nij,mij->nm"', "a turn instead of its inverse"),
     Fault(
-        "correction/solvers/manifold.py",
-        "(L[:, :, 3:] @ step",
-        "(L[:, :, :3] @ step",
+        "correction/solvers/linear_step.py",
+        "twists(step, L[:, :, 3:])",
+        "twists(step, L[:, :, :3])",
         "steps are shortened by their shift instead of their turn",
     ),
     Fault(

@@ -19,8 +19,7 @@ from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.play import plays
-from apo_bench.correction.posterior import jacobian_rank
-from apo_bench.correction.solvers.manifold import SMALLEST, NearestGoals
+from apo_bench.correction.solvers.gauss_newton import SMALLEST
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.remembered import remembered
 
@@ -97,34 +96,6 @@ def p_value(chi_square: float, freedom: int) -> float:
     if not np.isfinite(chi_square):
         return 0.0
     return float(chdtrc(freedom, chi_square)) if freedom else 1.0
-
-
-def correction_length(
-    found: NearestGoals, slack_m: Array, correlated: Array | None, relaxed_by: Callable[[Array], NearestGoals]
-) -> tuple[float, int, NearestGoals | None]:
-    """The squared length of a correction and its degrees of freedom; of contradictory contacts, with what is left.
-
-    These have no nearest goals; those that share the contradiction out are returned with the numbers, otherwise None.
-
-    Args:
-        slack_m: (3 c,), standard deviation of each equation that the play of parts that fit leaves, [m].
-        correlated: (3 c, 3 c), the covariance of the equations that has these deviations, [m^2]; None: independent.
-        relaxed_by: The nearest goals if equations have these standard deviations, (3 c,), [m].
-    """
-    freedom = jacobian_rank(found.Jt)
-    if not found.finite:
-        return np.inf, freedom, None
-    holds = found.at_rest and np.abs(found.e).max(initial=0.0) <= SOFT_M
-    if holds and not slack_m.any():
-        return float(found.z @ found.z), freedom, None
-    if holds and correlated is not None:
-        Jt = found.Jt if isinstance(found.Jt, np.ndarray) else found.Jt.toarray()
-        return float(softened_length(found.z[None], Jt[None], correlated)[0]), freedom, None
-    soft = slack_m if holds else np.hypot(slack_m, SOFT_M)
-    relaxed = relaxed_by(soft)
-    asked = soft > 0.0
-    over = relaxed.e[asked] / soft[asked]
-    return float(relaxed.z @ relaxed.z + over @ over), freedom, None if holds else relaxed
 
 
 def softened_length(z: Array, Jt: Array, S: Array) -> Array:

@@ -18,12 +18,9 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.ending import opposing, refused_correction, status_sentence
-from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
-from apo_bench.correction.problem import Problem, Solved, Solver, problem
-from apo_bench.correction.solvers import compiled
-from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
-from apo_bench.correction.starts import best_start, turned_words
-from apo_bench.correction.whole import correct_compiled, layout
+from apo_bench.correction.problem import Problem, Solved, problem
+from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, NearestGoals
+from apo_bench.correction.starts import best_start, turned_far, turned_words
 from apo_bench.errors import InputError
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
@@ -44,9 +41,9 @@ class ContactCorrector:
     """The test fails if the p-value is below: the share of false alarms."""
     elsewhere: bool = True
     """Whether other starts are tried where what was seen leads to no solution, or far."""
-    solver: Solver | None = None
-    """What finds the nearest goals; None stands for `compiled.nearest_goals_compiled` where Numba is installed and can
-    keep what it compiles, else for `manifold.nearest_goals`. They give the same goals but for rounding."""
+    compiled: bool = True
+    """Whether kernels are used where Numba is installed and can keep what it compiles: the same goals but for
+    rounding."""
 
     def __post_init__(self) -> None:
         if self.doubt not in ("apply", "warn", "refuse", "drop"):
@@ -65,38 +62,53 @@ class ContactCorrector:
         Raises:
             InputError: A covariance is not positive definite.
         """
-        observation = lowered_observation(observation)
-        made = self.together((observation,))
-        return self.given(observation, None) if made is None else made[0]
+        return self.together((observation,))[0]
 
-    def together(self, observations: Sequence[Observation]) -> list[Correction] | None:
-        """Correct observations of one assembly with the same start poses and play, compiled; None where that cannot be.
+    def together(self, observations: Sequence[Observation]) -> list[Correction]:
+        """Correct observations of one assembly with the same start poses and play, at once.
 
         Raises:
             InputError: As of one.
         """
         observations = [lowered_observation(one) for one in observations]
-        loops = compiled.kept_loops() if self.solver is None else None
-        known = None if loops is None else layout(observations[0].assembly, observations[0].play_m)
-        if loops is None or known is None or any(one.shared or one.tails for one in observations):
-            return None
         seen = [one for one in observations if one.seen.all()]
-        made = iter(correct_compiled(loops, known, seen, self.doubt == "apply", self.level, self.given))
+        alone = any(6 * len(one.goals) > LARGEST_DENSE or one.shared or one.tails for one in seen)
+        batches = [[one] for one in seen] if alone else [seen] if seen else []
+        made = iter([one for batch in batches for one in self._corrected(batch)])
         return [next(made) if one.seen.all() else refused_correction(one) for one in observations]
 
-    def given(self, observation: Observation, found: NearestGoals | None) -> Correction:
-        """Correct an observation; `found` are its nearest goals without inequalities, if they are known already."""
-        observation = lowered_observation(observation)
-        if not observation.seen.all():
-            return refused_correction(observation)
-        asked = problem(observation, self.chosen_solver())
-        every, before_m = asked.without(()), largest(asked.gaps(observation.goals))
-        first = asked.solve(every, found)
+    def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
+        """Correct an observation by all contacts but those of some relations."""
+        asked = problem((lowered_observation(observation),), self.level, self.compiled)
+        kept = asked.without(dropped)
+        solved = asked.solve(kept)[0]
+        before_m = largest(asked.measured(None)[0])
+        return opposing(
+            asked.observation, self._report(asked.observation, solved, kept, solved.test, None, dropped, before_m)
+        )
+
+    def _corrected(self, observations: Sequence[Observation]) -> list[Correction]:
+        """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
+        asked = problem(observations, self.level, self.compiled)
+        every = np.ones(len(asked.exact), dtype=np.bool_)
+        before_m = np.abs(asked.measured(None)[0]).max(axis=1, initial=0.0).tolist()
+        solved = asked.solve(every)
+        far = turned_far(asked.goals, np.array([one.found.goals for one in solved])).tolist()
+        made = []
+        for i, one in enumerate(solved):
+            sure = (one.test.passes or self.doubt == "apply") and not far[i] and not one.away.any()
+            if sure and _status(one.found, largest(one.gaps), observations[i].gap_m) == "converged":
+                made.append(self._report(observations[i], one, every, one.test, None, (), before_m[i]))
+            else:
+                made.append(self._in_doubt(asked.only(i), one, every, before_m[i]))
+        return made
+
+    def _in_doubt(self, asked: Problem, first: Solved, every: NDArray[np.bool_], before_m: float) -> Correction:
+        """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
         if self.elsewhere:
             asked, first = best_start(asked, first)
-        solved = first
-        test = replace(first.test, level=self.level)
-        lost = not first.found.at_rest and largest(first.gaps) <= observation.gap_m
+        solved, test, gap_m = first, first.test, asked.observation.gap_m
+        lost = not first.found.at_rest and largest(first.gaps) <= gap_m
         if not test.passes and self.doubt != "apply" and first.found.finite and not lost:
             test = replace(test, suspects=asked.suspects(every))
         kept, dropped, after = every, tuple[str, ...](), test
@@ -106,24 +118,11 @@ class ContactCorrector:
                 break
             dropped += (self._most_suspect(asked, kept, worst[0]),)
             kept = asked.without(dropped)
-            solved = asked.solve(kept)
-            after = replace(solved.test, level=self.level)
-        return opposing(observation, self._report(asked, solved, kept, test, after, dropped, before_m))
-
-    def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
-        """Correct an observation by all contacts but those of some relations."""
-        observation = lowered_observation(observation)
-        asked = problem(observation, self.chosen_solver())
-        kept = asked.without(dropped)
-        solved = asked.solve(kept)
-        test, before_m = replace(solved.test, level=self.level), largest(asked.gaps(observation.goals))
-        return opposing(observation, self._report(asked, solved, kept, test, test, dropped, before_m))
-
-    def chosen_solver(self) -> Solver:
-        """What finds the nearest goals here."""
-        if self.solver is not None:
-            return self.solver
-        return nearest_goals if compiled.kept_loops() is None else compiled.nearest_goals_compiled
+            solved = asked.solve(kept)[0]
+            after = solved.test
+        turned, last = turned_words(asked, solved.found.goals), after if dropped else None
+        report = self._report(asked.observation, solved, kept, test, last, dropped, before_m, turned)
+        return opposing(asked.observation, report)
 
     def _most_suspect(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
         """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
@@ -132,34 +131,33 @@ class ContactCorrector:
 
     def _report(
         self,
-        asked: Problem,
+        observation: Observation,
         solved: Solved,
         kept: NDArray[np.bool_],
         test: Consistency,
-        after: Consistency,
+        after: Consistency | None,
         dropped: tuple[str, ...],
         before_m: float,
+        turned: str = "",
     ) -> Correction:
-        observation, found = asked.observation, solved.found
-        known = freedom(found.Jt)
-        directions = jacobian_rank(found.Jt) if known is None else known.rank
+        found, rank = solved.found, solved.rank
         status = _status(found, largest(solved.gaps[kept]), observation.gap_m)
-        if status == "converged" and self.doubt in ("refuse", "drop") and not after.passes:
+        if status == "converged" and self.doubt in ("refuse", "drop") and not (after or test).passes:
             status = "doubtful"
-        of = "every contact" if kept.all() else f"every contact but those of {', '.join(dropped)}"
+        of = f"every contact but those of {', '.join(dropped)}" if dropped else "every contact"
         doubts = "" if self.doubt == "apply" else _doubts(test, dropped)
         return Correction(
             goals=found.goals,
             status=status,
-            sentence=status_sentence(status, observation.gap_m, of) + turned_words(asked, found.goals) + doubts,
+            sentence=status_sentence(status, observation.gap_m, of) + turned + doubts,
             freed=pattern(observation.assembly).freed,
             gap_before_m=before_m,
             gap_after_m=largest(solved.gaps),
-            rank=directions,
-            trace=tuple(Iterate(turn.gap_m, directions, turn.step) for turn in found.trace),
+            rank=rank,
+            trace=tuple([Iterate(gap_m, rank, step) for gap_m, step in found.turns.tolist() if step == step]),
             test=test,
-            test_after=after if dropped else None,
-            covariance=marginals(found, known.free) if known is not None and status == "converged" else None,
+            test_after=after,
+            covariance=solved.covariance if status == "converged" else None,
             dropped=dropped,
         )
 

@@ -84,7 +84,7 @@ def checked_corrector(given: Any) -> Any:
 
 def _admitted(found: Any, observation: Observation, chosen: Any, name: str) -> Correction:
     """What a corrector returned, as a `Correction` that makes sense."""
-    if isinstance(found, Correction) and _ours(chosen) and _ours(getattr(chosen, "solver", None) or chosen):
+    if isinstance(found, Correction) and _ours(chosen):
         return found if isinstance(chosen, ContactCorrector) else opposing(observation, found)
     if not isinstance(found, Correction):
         return goals_as_given(

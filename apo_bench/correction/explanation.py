@@ -27,8 +27,7 @@ from apo_bench.correction.holding import Hold, by_relation, relation_holds
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, Freedom, freedom
 from apo_bench.correction.problem import problem
 from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
-from apo_bench.correction.solvers.joint import linearised_by
-from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import spread
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -129,19 +128,20 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     n, assembly = len(goals), observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    asked = problem(replace(observation, goals=goals, shared=()), nearest_goals)
+    asked = problem((replace(observation, goals=goals, shared=()),))
+    system = asked.compact.only(0)
     kept = asked.exact & asked.without(tuple(dropped))
     xi = pose.log(pose.inverse(observation.goals) @ goals)
     Jr = right_jacobian(xi)
-    B = Jr @ asked.L
-    _, Jt = linearised_by(asked.compact, goals, B)
-    every, relations = relation_holds(assembly), by_relation(assembly, asked.compact, Jt, kept)
+    B = Jr @ asked.L[0]
+    _, Jt = linearised_by(system, goals, B)
+    every, relations = relation_holds(assembly), by_relation(assembly, system, Jt, kept)
     known = freedom(relations.Jt)
     if known is None:
         raise _too_many(n)
     spans, shared = spread(B, known.free), tuple[SharedEstimate, ...]()
     if observation.shared:
-        shared, spans = estimate_shared(observation, xi, Jr, asked.compact.among(kept))
+        shared, spans = estimate_shared(observation, xi, Jr, system.among(kept))
     found = []
     for k, own in enumerate(_own(known, n)):
         block = slice(6 * k, 6 * k + 6)

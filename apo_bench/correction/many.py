@@ -7,15 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
-from apo_bench.correction.solvers.batch import compact_many
-from apo_bench.correction.solvers.inequalities import demanded
-from apo_bench.correction.solvers.manifold import NearestGoals
-from apo_bench.correction.solvers.whitened import scales
 from apo_bench.errors import InputError
 
 BATCH = 64
@@ -46,21 +40,7 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
             "correct those together that share them."
         )
     batches = (observations[i : i + BATCH] for i in range(0, len(observations), BATCH))
-    return tuple(made for some in batches for made in _chunk(some, corrector))
-
-
-def _chunk(observations: Sequence[Observation], corrector: ContactCorrector) -> list[Correction]:
-    if (made := corrector.together(observations)) is not None:
-        return made
-    if any(one.shared or one.tails for one in observations):
-        return [corrector.given(one, None) for one in observations]
-    goals, L = np.array([one.goals for one in observations]), np.array([scales(one.covariance) for one in observations])
-    observations = [lowered_observation(one) for one in observations]
-    plain = equations(observations[0].assembly, observations[0].start, observations[0].goals)
-    system, exact, _ = demanded(plain, observations[0].assembly, observations[0].play_m)
-    solve = corrector.chosen_solver()
-    found = solve(compact_many(observations[0].assembly, system, goals).among(exact), goals, L, None)
-    return [corrector.given(one, _one(found, i)) for i, one in enumerate(observations)]
+    return tuple(made for some in batches for made in corrector.together(some))
 
 
 def _odd_one(observations: Sequence[Observation]) -> int | None:
@@ -72,10 +52,3 @@ def _odd_one(observations: Sequence[Observation]) -> int | None:
     starts = np.array([[one.start[part] for part in first.start] for one in observations])
     odd = np.flatnonzero((starts != starts[0]).reshape(len(starts), -1).any(axis=1))
     return int(odd[0]) if len(odd) else None
-
-
-def _one(found: NearestGoals, i: int) -> NearestGoals:
-    return NearestGoals(
-        *(found.goals[i], found.z[i], found.e[i], found.Jt[i], found.B[i], found.at_rest[i], found.finite[i]),
-        trace=found.trace,
-    )

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from scipy.linalg.lapack import dpstrf
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgeqp3, dorgqr, dpstrf
 
 from apo_bench.correction.solvers import sparse
-from apo_bench.correction.solvers.manifold import NearestGoals
-from apo_bench.correction.solvers.whitened import spread
 from apo_bench.geometry.arrays import Array
 
 LARGEST_POSTERIOR = 600
@@ -78,7 +77,49 @@ def jacobian_rank(Jt: Any) -> int:
     return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
 
 
-def marginals(found: NearestGoals, free: Array) -> Array:
-    """The posterior covariance of the body twist of each corrected goal, (n, 6, 6), [m, rad]."""
-    spans = spread(found.B, free)
-    return np.asarray(spans @ np.swapaxes(spans, 1, 2))
+def projections(Jt: Any) -> tuple[NDArray[np.intp], Array | None]:
+    """The rank of each of b transposed Jacobians at a solution, and the projection onto what it leaves free.
+
+    An orthonormal basis Q of what the columns of Jt span comes from its QR decomposition, the longest column that is
+    left next (Businger and Golub, 1965); what is free is all else: P = 1 - Q Q^t, and cov(z) = P = P P^t.
+
+    Args:
+        Jt: (b, 6 n, 3 c), or a list of sparse matrices.
+
+    Returns:
+        (b,), and (b, 6 n, 6 n), None above `LARGEST_POSTERIOR` unknowns.
+    """
+    unknowns = Jt[0].shape[0]
+    if unknowns > LARGEST_POSTERIOR:
+        return np.array([jacobian_rank(one) for one in Jt]), None
+    one, rank = np.eye(unknowns), np.zeros(len(Jt), dtype=np.intp)
+    P = np.empty((len(Jt), unknowns, unknowns))
+    for i, each in enumerate(Jt):
+        matrix = each if isinstance(each, np.ndarray) else each.toarray()
+        basis = _row_space(matrix) if matrix.size else matrix
+        rank[i] = basis.shape[1]
+        np.subtract(one, basis @ basis.T, out=P[i])
+    return rank, P
+
+
+def _row_space(Jt: Array) -> Array:
+    """An orthonormal basis of the columns of Jt, (6 n, rank)."""
+    QR, _, reflectors, _, _ = dgeqp3(Jt)
+    lengths = np.square(QR.diagonal())
+    rank = int(np.count_nonzero(lengths > UNCLEAR[0] * lengths[0]))
+    if rank and not lengths[rank - 1] > UNCLEAR[1] * lengths[0]:
+        U, w, _ = np.linalg.svd(Jt, full_matrices=False)
+        return np.asarray(U[:, w > RANK_CUT_OFF * w[0]])
+    return np.asarray(dorgqr(QR[:, :rank], reflectors[:rank])[0])
+
+
+def marginals(B: Array, free: Array) -> Array:
+    """The posterior covariance of the body twist of each corrected goal, (b, n, 6, 6), [m, rad].
+
+    Args:
+        B: (b, n, 6, 6) or (b, n, 6, 6 n), as of `NearestGoals`.
+        free: (b, 6 n, f): an orthonormal basis of what is free, or the projection onto it.
+    """
+    b, n, _, width = B.shape
+    spans = B @ (free[:, None] if width != 6 else free.reshape(b, n, 6, free.shape[2]))
+    return np.asarray(spans @ np.swapaxes(spans, -1, -2))

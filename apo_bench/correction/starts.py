@@ -9,7 +9,6 @@ to the one nearest to what was seen is taken, in the metric of the noise.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import replace
 from math import cos, radians
 
 import numpy as np
@@ -20,9 +19,9 @@ from apo_bench.assembly.opposing import looking_away
 from apo_bench.correction.posterior import LARGEST_POSTERIOR
 from apo_bench.correction.problem import Problem, Solved, problem
 from apo_bench.correction.robust.inferred import inferred_goals
-from apo_bench.correction.solvers.batch import compact_many
+from apo_bench.correction.solvers.compact import laid_contacts
 from apo_bench.correction.solvers.curved import descended
-from apo_bench.correction.solvers.manifold import LARGEST_DENSE, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goals
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
@@ -52,7 +51,7 @@ def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
     Args:
         first: What comes of beginning with what was seen.
     """
-    observed, every = asked.observation.goals, np.ones(len(asked.exact), dtype=np.bool_)
+    observed, every = asked.goals[0], np.ones(len(asked.exact), dtype=np.bool_)
     usable, far = _holds(asked, first), bool(turned_far(observed, first.found.goals))
     if not far and (usable or _faces_oppose(asked, observed, first.found.goals)):
         return asked, first
@@ -61,10 +60,10 @@ def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
     usable = usable and _is_flush(asked, first)
     length = float(first.found.z @ first.found.z) * _SHORTER if usable else np.inf
     for goals in _solutions(asked, _starts(asked, first)):
-        begun = problem(asked.observation, asked.solver, goals)
-        if begun.begin is None or begun.begin @ begun.begin >= length:
+        begun = _begun_at(asked, goals)
+        if begun.begin is None or np.square(begun.begin).sum() >= length:
             break
-        solved = begun.solve(every)
+        solved = begun.solve(every)[0]
         if solved.found.z @ solved.found.z < length and _holds(begun, solved) and _is_flush(begun, solved):
             return begun, solved
     return asked, first
@@ -95,7 +94,12 @@ def _faces_oppose(asked: Problem, *goals: Array) -> bool:
 def _is_flush(asked: Problem, solved: Solved) -> bool:
     """Whether contacts also hold with vertices laid where the goals are: seen edge-on, they lie on one line."""
     goals = solved.found.goals
-    return largest(problem(asked.observation, asked.solver, goals).gaps(goals)) <= asked.observation.gap_m
+    return largest(_begun_at(asked, goals).measured(goals[None])[0]) <= asked.observation.gap_m
+
+
+def _begun_at(asked: Problem, goals: Array) -> Problem:
+    """The same, begun with goals, (n, 4, 4), and vertices laid there."""
+    return problem(asked.observations, asked.level, asked.compiled, goals[None])
 
 
 def _starts(asked: Problem, first: Solved) -> Array:
@@ -130,22 +134,24 @@ def _solutions(asked: Problem, starts: Array) -> Iterator[Array]:
     """Goals, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
     observation, (b, n, *_) = asked.observation, starts.shape
     L = scales(observation.covariance)
-    system = compact_many(observation.assembly, asked.system, starts).among(asked.exact)
+    every = asked.compact
+    laid = laid_contacts(observation.assembly, every.start, every.plane, starts)
+    system = laid.system.among(asked.exact)
     z = correction_to(observation.goals, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.goals, starts.shape)
-        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z)]
+        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, asked.compiled)]
     else:
-        one = (replace(system, points=points) for points in system.points)
-        found = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(one, z, strict=True)]
+        each = (system.only(i) for i in range(b))
+        found = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(each, z, strict=True)]
     goals = np.concatenate([each.goals.reshape(-1, n, 4, 4) for each in found])
     rest = np.concatenate([np.atleast_1d(each.at_rest) for each in found])
     e = np.concatenate([np.atleast_2d(each.e) for each in found])
     holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
     holds &= ~looking_away(observation.assembly, observation.start, goals).any(axis=1)
-    z = correction_to(observation.goals, asked.L, goals[holds])
+    z = correction_to(observation.goals, asked.L[0], goals[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:
         if rest[i] or 6 * n > LARGEST_DENSE:
             yield goals[i]
         else:
-            yield descended(replace(system, points=system.points[i]), observation.goals, L, goals[i])
+            yield descended(system.only(int(i)), observation.goals, L, goals[i])

@@ -52,7 +52,9 @@ def _series() -> Array:
 GENERATORS = _generators()
 """A twist xi is the matrix X = sum_i xi_i GENERATORS[i], (6, 4, 4)."""
 _TO_MATRIX = np.ascontiguousarray(GENERATORS[:, :3].reshape(6, 12))
-_TO_ADJOINT = _adjoints().reshape(6, 36)
+ADJOINTS = _adjoints()
+"""The adjoint matrix of a twist xi is sum_i xi_i ADJOINTS[i], (6, 6, 6)."""
+_TO_ADJOINT = ADJOINTS.reshape(6, 36)
 SERIES = _series()
 _ONE4, _ONE6, _SUM, _POWERS = np.eye(4), np.eye(6), np.ones(3), np.arange(float(_TERMS))
 

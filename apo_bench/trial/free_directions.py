@@ -20,9 +20,9 @@ from apo_bench.assembly.equations import Equations, equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.posterior import freedom
 from apo_bench.correction.robust.hypotheses import UNKNOWN
-from apo_bench.correction.solvers.compact import CompactEquations, compact_assembly
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
-from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.correction.solvers.whitened import noise_factor, spread
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -204,8 +204,15 @@ def _held(observation: Observation, goals: Array) -> _Held:
         inequalities = Inequalities(plain.among(~exact), none, none)
         off = violations(system, exact, inequalities, goals)
     limits = np.maximum(off, _EXACT_M)
+    compact = compact_equations(system, len(assembly))
     return _Held(
-        system, compact_assembly(assembly, system), exact, inequalities, off <= tolerance, limits, _factor(observation)
+        system,
+        compact,
+        exact,
+        inequalities,
+        off <= tolerance,
+        limits,
+        _factor(observation),
     )
 
 

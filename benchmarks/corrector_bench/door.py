@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 import apo_bench
-from apo_bench.correction.solvers.manifold import nearest_goals
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.own import observation
 from benchmarks.corrector_bench.problems import problem
@@ -26,7 +25,7 @@ YARDSTICK, UNCOMPILED, CONTACT, MANY = "paper", "plain", "contact", "correct_man
 WAYS = MappingProxyType(
     {
         YARDSTICK: "paper",
-        UNCOMPILED: apo_bench.ContactCorrector(solver=nearest_goals),
+        UNCOMPILED: apo_bench.ContactCorrector(compiled=False),
         CONTACT: "contact",
         "scipy": "least-squares",
         "gtsam": "benchmarks.corrector_bench.peers_gtsam:gtsam",

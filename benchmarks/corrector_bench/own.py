@@ -24,7 +24,7 @@ from benchmarks.corrector_bench.problems import Problem
 
 def contact(task: Task) -> Run:
     """Plain numpy, whole."""
-    from apo_bench.correction.solvers.manifold import nearest_goals
+    from apo_bench.correction.solvers.gauss_newton import nearest_goals
 
     return _whole(task, nearest_goals)
 
@@ -43,7 +43,7 @@ def _whole(task: Task, nearest: Callable[..., Any]) -> Run:
 
 def dense(task: Task) -> Run:
     """Plain numpy, whole, on dense matrices whatever the size."""
-    from apo_bench.correction.solvers.manifold import NearestGoals, nearest_goals
+    from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
 
     def one_of_one(system: CompactEquations, seen: Array, L: Array) -> NearestGoals:
         found = nearest_goals(system, seen[None], L[None])

@@ -6,7 +6,6 @@ import numpy as np
 
 import apo_bench
 from apo_bench.assembly.goals import Observation
-from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.geometry import pose
 from apo_bench.scenario.scenario import Scenario
 from benchmarks.corrector_bench.draws import LEVELS
@@ -26,7 +25,7 @@ def suite(draws: int) -> list[Row]:
 
 
 def _row(level: str, draws: int) -> Row:
-    plain = apo_bench.ContactCorrector(solver=nearest_goals)
+    plain = apo_bench.ContactCorrector(compiled=False)
     off, otherwise, count = 0.0, 0, 0
     for of in map(apo_bench.load_scenario, SCENARIOS):
         for seed in range(FIRST, FIRST + draws):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,16 +17,17 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.contact import ContactCorrector, Doubt
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
-from apo_bench.correction.solvers import compiled, loops, loops_around, manifold
+from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.manifold import NearestGoals
-from apo_bench.errors import InputError
+from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
+from apo_bench.correction.solvers.linear_step import DenseStep
+from apo_bench.correction.solvers.whitened import unspread
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import SERIES, exp_and_jacobian
 from apo_bench.scenario.file import load_scenario
 from tests import scenes
 
+by_kernels = partial(nearest_goals, compiled=True)
 SCENARIOS = ("bridge_cycle", "stick_on_castles", "carried_bridge", "vanished_fixture", "pocket_table")
 LEVELS = {(2.0, 1.0): 1e-12, (10.0, 8.0): 1e-9}
 """Noise in mm and degrees, and how far goals may differ, [m]. At the larger one rounding grows on the way: the plain
@@ -65,7 +67,7 @@ def _numba() -> None:
 def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
     for seed in range(6):
         given = drawn(name, *level, seed)
-        alike(manifold.nearest_goals(*given), compiled.nearest_goals_compiled(*given), LEVELS[level])
+        alike(nearest_goals(*given), by_kernels(*given), LEVELS[level])
 
 
 @pytest.mark.numeric
@@ -75,8 +77,8 @@ def test_soft_contacts_are_the_same_too(name: str) -> None:
         system, goals, L = drawn(name, 2.0, 1.0, seed)
         soft_m = np.repeat(np.arange(len(system)) % 2 * 5e-5, 3)
         alike(
-            manifold.nearest_goals(system, goals, L, soft_m),
-            compiled.nearest_goals_compiled(system, goals, L, soft_m),
+            nearest_goals(system, goals, L, soft_m),
+            by_kernels(system, goals, L, soft_m),
             1e-12,
         )
 
@@ -92,7 +94,7 @@ def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> N
         system = replace(system, points=points)
         goals = goals.reshape(6, -1, 4, 4)
     L = L.reshape(*goals.shape[:-3], -1, 6, 6)
-    alike(manifold.nearest_goals(system, goals, L), compiled.nearest_goals_compiled(system, goals, L), 1e-11)
+    alike(nearest_goals(system, goals, L), by_kernels(system, goals, L), 1e-11)
 
 
 @pytest.mark.numeric
@@ -100,21 +102,21 @@ def test_what_is_not_finite_is_said_and_left_alone() -> None:
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     three = np.array([goals, goals, goals])
     three[1, 0, 0, 3] = np.nan
-    found = compiled.nearest_goals_compiled(system, three, np.array([L, L, L]))
+    found = by_kernels(system, three, np.array([L, L, L]))
     assert found.finite.tolist() == [True, False, True]
     assert np.array_equal(found.goals[1], three[1], equal_nan=True)
     assert not found.z[1].any()
-    assert np.array_equal(found.goals[0], compiled.nearest_goals_compiled(system, goals, L).goals)
+    assert np.array_equal(found.goals[0], by_kernels(system, goals, L).goals)
     endless = goals.copy()
     endless[1, 1, 3] = np.inf
-    assert not compiled.nearest_goals_compiled(system, endless, L).finite
+    assert not by_kernels(system, endless, L).finite
 
 
 def test_no_contacts_ask_for_nothing() -> None:
     system, goals, L = drawn("bridge_cycle", 2.0, 1.0, 0)
     none = system.among(np.zeros(len(system), dtype=np.bool_))
-    found = compiled.nearest_goals_compiled(none, goals, L)
-    alike(manifold.nearest_goals(none, goals, L), found, 0.0)
+    found = by_kernels(none, goals, L)
+    alike(nearest_goals(none, goals, L), found, 0.0)
     assert np.array_equal(found.goals, goals)
 
 
@@ -134,7 +136,7 @@ def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
     system, goals, L = drawn("stick_on_castles", 2.0, 1.0, seed)
     plane = system.plane.copy()
     plane[-1, 3] += 3e-3
-    for nearest in (manifold.nearest_goals, compiled.nearest_goals_compiled):
+    for nearest in (nearest_goals, by_kernels):
         found = nearest(replace(system, plane=plane), goals, L)
         assert bool(found.finite)
         assert np.abs(found.e).max() > 1e-4
@@ -173,7 +175,7 @@ def check_same(expected: Correction, actual: Correction) -> None:
 def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(name: str, play_m: float) -> None:
     seen = [observed(name, 2.0, 1.0, seed, play_m) for seed in range(4)]
     for one in seen:
-        check_same(correct(one, ContactCorrector(solver=manifold.nearest_goals)), correct(one, "contact"))
+        check_same(correct(one, ContactCorrector(compiled=False)), correct(one, "contact"))
         assert np.array_equal(correct(one, "contact-fast").goals, correct(one, "contact").goals)
 
 
@@ -193,69 +195,38 @@ def test_doubts_are_the_same_compiled(doubt: Doubt) -> None:
     """Three times the noise that is stated: the test fails."""
     one = observed("stick_on_castles", 2.0, 1.0, 1)
     one = replace(one, covariance=one.covariance / 9.0)
-    check_same(ContactCorrector(doubt, solver=manifold.nearest_goals)(one), ContactCorrector(doubt)(one))
-
-
-def test_many_observations_are_corrected_by_the_solver_of_the_corrector() -> None:
-    built, rng = scenes.ALL["bridge"](), np.random.default_rng(0)
-    drawn_ones = [scenes.noisy(built.goals, rng, 1.0, 1.0) for _ in range(3)]
-    first = scenes.seen(built, drawn_ones[0])
-    seen = [replace(first, goals=goals) for goals in drawn_ones]
-    calls = list[int]()
-
-    def counting(system: CompactEquations, goals: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
-        calls.append(len(goals))
-        return compiled.nearest_goals_compiled(system, goals, L, soft_m)
-
-    for one, other in zip(correct_many(seen), correct_many(seen, ContactCorrector(solver=counting)), strict=True):
-        assert (one.status, one.rank) == (other.status, other.rank)
-        np.testing.assert_allclose(other.goals, one.goals, rtol=0, atol=1e-12)
-    assert calls == [3]
+    check_same(ContactCorrector(doubt, compiled=False)(one), ContactCorrector(doubt)(one))
 
 
 @pytest.fixture
 def no_numba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    compiled.compiled_loops.cache_clear()
-    compiled.kept_loops.cache_clear()
+    kernels.kernels.cache_clear()
     monkeypatch.setitem(sys.modules, "numba", None)
     yield
-    compiled.compiled_loops.cache_clear()
-    compiled.kept_loops.cache_clear()
-
-
-@pytest.mark.usefixtures("no_numba")
-def test_without_numba_the_extra_is_named() -> None:
-    with pytest.raises(InputError, match=r"pip install 'apo_bench\[fast\]'"):
-        compiled.nearest_goals_compiled(*drawn("bridge_cycle", 2.0, 1.0, 0))
+    kernels.kernels.cache_clear()
 
 
 @pytest.mark.usefixtures("no_numba")
 @pytest.mark.parametrize("name", ["contact", "contact-fast"])
 def test_without_numba_contact_is_not_compiled(name: str) -> None:
     one = observed("bridge_cycle", 2.0, 1.0, 0)
-    uncompiled = correct(one, ContactCorrector(solver=manifold.nearest_goals))
+    uncompiled = correct(one, ContactCorrector(compiled=False))
     assert np.array_equal(correct(one, name).goals, uncompiled.goals)
     np.testing.assert_allclose(correct_many([one])[0].goals, uncompiled.goals, rtol=0, atol=1e-12)
 
 
-def test_every_loop_is_handed_to_the_compiler() -> None:
-    for module in (loops, loops_around):
-        written = {f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__ and callable(f)}
-        assert written <= {*compiled.KERNELS, *compiled.HELPERS}
-
-
-@pytest.mark.numeric
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 0.999, 1.001, 3.0])
-def test_exp_and_its_derivative_in_three_by_three(turn: float) -> None:
-    """Uncompiled, against the matrix polynomials, below and above the angle at which the series is cut."""
+def test_kernels_run_as_they_stand(turn: float) -> None:
+    """Uncompiled, with goals turned little and far: what differs from the twins is rounding alone."""
+    system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)
     rng = np.random.default_rng(0)
-    xi = rng.standard_normal(6)
-    xi[3:] *= turn / np.linalg.norm(xi[3:])
-    seen, L = pose.exp(rng.standard_normal(6)), rng.standard_normal((6, 6))
-    T, B = np.eye(4), np.zeros((6, 6))
-    z = np.asarray(np.linalg.solve(L, xi), dtype=np.float64)
-    loops.displaced(seen, L, z, SERIES, T, B)
-    D, Jr = exp_and_jacobian(L @ z)
-    T[3] = seen[3]
-    np.testing.assert_allclose(T, seen @ D, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(B, Jr @ L, rtol=0, atol=1e-12)
+    xi = rng.standard_normal((1, len(goals), 6))
+    xi[..., 3:] *= turn / np.linalg.norm(xi[..., 3:], axis=-1, keepdims=True)
+    z, rows, mu = unspread(L, xi), np.arange(1), np.array([1e-3])
+    plain, looped = (DenseStep(system, goals[None], L[None], None, some) for some in (None, kernels.PLAIN))
+    for step in (plain, looped):
+        step.linearise(z, rows)
+    for name in ("T", "B", "e", "Jt", "gap_m", "gap2", "row_size"):
+        np.testing.assert_allclose(getattr(looped, name), getattr(plain, name), rtol=1e-12, atol=1e-12)
+    for expected, actual in zip(plain.change(z, mu, rows), looped.change(z, mu, rows), strict=True):
+        np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-9)

@@ -17,8 +17,7 @@ from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers import sparse
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.large import nearest_goals_sparse
-from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from benchmarks.corrector_bench.draws import draw
@@ -99,6 +98,10 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     else:
         monkeypatch.setattr(sparse, "WIDE", {"banded": 10**9, "together": 0}[request.param])
     return str(request.param)
+
+
+def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m: Array | None = None) -> NearestGoals:
+    return batch_goals(system, seen[None], L[None], soft_m, sparse=True).at(0)
 
 
 @pytest.mark.parametrize("name", SMALL)

@@ -15,10 +15,10 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.many import BATCH, correct_many
-from apo_bench.correction.solvers.batch import compact_many
-from apo_bench.correction.solvers.compact import compact_equations
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, laid_contacts
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
 from tests import scenes
 from tests.assembly.test_equations import random_scene
 from tests.correction.test_consistency import shifted
@@ -62,6 +62,11 @@ def test_many_are_one_after_the_other(name: str) -> None:
     check_same(correct_many(seen), [corrector(one) for one in seen])
 
 
+def laid_together(scene: scenes.Scene, goals: Array) -> CompactEquations:
+    start = np.array([scene.start[part] for part in scene.assembly.solids])
+    return laid_contacts(scene.assembly, start, pattern(scene.assembly).plane, goals).system
+
+
 @pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])
 def test_vertices_of_either_face(name: str) -> None:
     """Corners of the manipulated face are laid onto the other one at each observation's own goals."""
@@ -70,8 +75,7 @@ def test_vertices_of_either_face(name: str) -> None:
     assert laid.any()
     assert not laid.all()
     goals = np.array([one.goals for one in draws(scene, 5, 10.0, 8.0)])
-    system = equations(scene.assembly, scene.start, goals[0])
-    together = compact_many(scene.assembly, system, goals)
+    together = laid_together(scene, goals)
     for i, each in enumerate(goals):
         one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
         e, blocks = together.only(np.arange(5) == i).blocks(
@@ -87,7 +91,7 @@ def test_vertices_of_either_face(name: str) -> None:
 def test_vertices_of_random_assemblies(seed: int) -> None:
     scene, rng = random_scene(seed), np.random.default_rng(seed)
     goals = np.array([scenes.noisy(scene.goals, rng, 20.0, 20.0) for _ in range(3)])
-    together = compact_many(scene.assembly, equations(scene.assembly, scene.start, goals[0]), goals)
+    together = laid_together(scene, goals)
     e = together.residual(goals).reshape(3, -1, 3)
     for i, each in enumerate(goals):
         one = compact_equations(equations(scene.assembly, scene.start, each), len(each))

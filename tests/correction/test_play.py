@@ -13,7 +13,7 @@ from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.play import fit_covariance, plays
 from apo_bench.correction.problem import problem
-from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
 from benchmarks.corrector_bench.draws import draw
@@ -79,11 +79,12 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
     """Linear where play is: a quarter of a millimetre bends contacts of centimetres by some permille."""
     for name in ("stick_in_tower", "pocket_table"):
         seen = replace(look(name, 0), play_m=PLAY_M)
-        asked = problem(seen, nearest_goals)
-        exact = nearest_goals(asked.compact, seen.goals, asked.L)
-        soft = nearest_goals(asked.compact, seen.goals, asked.L, asked.slack_m)
-        over = soft.e[asked.slack_m > 0.0] / asked.slack_m[asked.slack_m > 0.0]
-        S = np.diag(asked.slack_m**2)
+        asked = problem((seen,))
+        system, slack_m = asked.compact.only(0), fit_deviation(seen.assembly, seen.play_m)
+        exact = nearest_goals(system, seen.goals, asked.L[0])
+        soft = nearest_goals(system, seen.goals, asked.L[0], slack_m)
+        over = soft.e[slack_m > 0.0] / slack_m[slack_m > 0.0]
+        S = np.diag(slack_m**2)
         short = float(softened_length(exact.z[None], exact.Jt[None], S)[0])
         assert short == pytest.approx(float(soft.z @ soft.z + over @ over), rel=5e-3)
 

@@ -18,7 +18,7 @@ from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes
@@ -69,7 +69,7 @@ def test_without_contacts_it_is_the_noise_that_is_left() -> None:
     scene, L = scenes.stick_in_tower(), crooked(3, np.random.default_rng(0))
     system = system_of(scene, scene.goals)
     found = nearest_goals(system.among(np.zeros(len(system), dtype=np.bool_)), scene.goals, L)
-    assert_allclose(marginals(found, np.eye(18)), L @ np.swapaxes(L, 1, 2), rtol=1e-12, atol=1e-20)
+    assert_allclose(marginals(found.B[None], np.eye(18)[None])[0], L @ np.swapaxes(L, 1, 2), rtol=1e-12, atol=1e-20)
 
 
 @pytest.mark.parametrize("correlated", [False, True])

@@ -22,7 +22,6 @@ from apo_bench.correction.many import correct_many
 from apo_bench.correction.own_code.forms import observation_message, parse_observation
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.show.explain_text import sentences
@@ -158,7 +157,7 @@ def test_the_test_and_the_regions_hold_what_they_say(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_compiled_and_plain_solvers_agree(kind):
     observation, _ = case(kind, seed=2)
-    plain = ContactCorrector(solver=nearest_goals)(observation)
+    plain = ContactCorrector(compiled=False)(observation)
     np.testing.assert_allclose(contact(observation).goals, plain.goals, atol=1e-9)
     np.testing.assert_allclose(correct_many([observation, observation])[1].goals, plain.goals, atol=1e-9)
 

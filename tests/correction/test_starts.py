@@ -12,7 +12,7 @@ from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.curved import descended
-from apo_bench.correction.solvers.manifold import nearest_goals
+from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import fixed_error_mm, look, shown

@@ -14,7 +14,6 @@ from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation, Plan, Step
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.solvers.manifold import nearest_goals
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
@@ -28,7 +27,7 @@ from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_recording, record_demonstration
 from apo_bench.trial.trial import run_trial
 
-plain = ContactCorrector(solver=nearest_goals)
+plain = ContactCorrector(compiled=False)
 SEVERAL_MM = 20.0
 """A cube that would be less than 20 mm deep in a castle need not be moved further than so: it has 15 mm of room."""
 

@@ -24,7 +24,7 @@ from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, State, Views, merged
-from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -132,9 +132,14 @@ def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hyp
     """Solve for the goals that are most likely with these states, and without these relations."""
     believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
-    far = bool((believed.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any())
-    made = contact_apply(believed) if trusted and far else _corrected(believed, dropped)
+    made = as_stated(believed) if trusted else _corrected(believed, dropped)
     return Hypothesis(case, states, dropped, believed, made)
+
+
+def as_stated(observation: Observation) -> Correction:
+    """The correction if every observation is believed as it is stated."""
+    far = (observation.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any()
+    return contact_apply(observation) if far else _as_begun(observation)
 
 
 def believed_observation(case: Case, states: States) -> Observation:

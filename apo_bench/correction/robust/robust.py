@@ -20,11 +20,11 @@ from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.ending import refused_correction
-from apo_bench.correction.robust.hypotheses import Case, Hypothesis
+from apo_bench.correction.robust.hypotheses import Case, Hypothesis, as_stated
 from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.room import least_crowded
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import BROAD, INLIER, Views, looked_again, views_of
+from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Views, looked_again, views_of
 from apo_bench.geometry.arrays import Array
 
 _SURE = 0.01
@@ -58,9 +58,15 @@ class RobustCorrector:
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
         given, observation = observation, lowered_observation(observation)
+        model = self.outliers or observation.outliers or OutlierModel()
+        if look is None and observation.seen.all() and model.surprises[INLIER] < model.surprises[GROSS]:
+            # One view of each operation, an inlier more likely than not: nothing is searched while the test holds.
+            made = as_stated(observation)
+            if made.ok and made.test is not None and made.test.p_value >= self.level:
+                return replace(made, sentence=made.sentence + _unexplained(made))
         views, again, first = views_of(observation), list[int](), None
         while True:
-            case = Case(observation, views, self.outliers or observation.outliers or OutlierModel())
+            case = Case(observation, views, model)
             search, baseless = Search(case, self.level), _baseless(observation, views)
             found = None if baseless else search.likeliest()
             first = first or search.first

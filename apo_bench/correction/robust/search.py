@@ -29,7 +29,7 @@ from apo_bench.correction.robust.hypotheses import (
     unbelieved,
 )
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, State, beliefs
-from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
 
 MOST_EXACT = 12

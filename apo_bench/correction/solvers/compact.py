@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +52,7 @@ class CompactEquations:
     def __len__(self) -> int:
         return len(self.letters)
 
-    def only(self, some: NDArray[np.bool_]) -> CompactEquations:
+    def only(self, some: Any) -> CompactEquations:
         """The equations of some of the observations, if each has points of its own."""
         return self if self.points.ndim == 3 else replace(self, points=self.points[some])
 
@@ -70,7 +70,7 @@ class CompactEquations:
     def placed(self, start: Array, plane: Array, points: Array) -> CompactEquations:
         """The same words with other constants, planes and points; what is known of the words goes along."""
         one = replace(self, start=start, plane=plane, points=points)
-        for known in ("_once", "_sides", "_signed_columns", "_rows"):
+        for known in ("_once", "_sides", "_signed_columns", "_rows", "_words"):
             one.__dict__[known] = getattr(self, known)
         return one
 
@@ -108,9 +108,9 @@ class CompactEquations:
     def words(self, T: Array) -> Array:
         """D_a^-1 D_b of every contact, (*, c, 4, 4)."""
         F = self._factors(T)
-        M = F[..., 0, :, :]
-        for j in range(1, self.letters.shape[1]):
-            M = M @ F[..., j, :, :]
+        M = np.broadcast_to(_ONE, (*F.shape[:-3], 4, 4))
+        for j in range(self.letters.shape[1]):
+            M = M @ F[..., j, :, :] if j else F[..., j, :, :]
         return np.asarray(M)
 
     def gathered(self, blocks: Array) -> Array:
@@ -145,6 +145,15 @@ class CompactEquations:
     def _rows(self) -> NDArray[np.intp]:
         """(c, w): where each letter stands among all matrices and then their inverses."""
         return self.letters + self.inverse * (len(self.start) + self.n + 1)
+
+    @cached_property
+    def _words(self) -> NDArray[np.intp]:
+        """(3, c, w): letters, columns, inverse."""
+        return np.array([self.letters, self.columns, self.inverse], dtype=np.intp)
+
+    def for_kernels(self) -> tuple[NDArray[np.intp], Array]:
+        """The words, (3, c, w), and all matrices with their inverses, (2, p + n + 1, 4, 4), as kernels take them."""
+        return self._words, np.array(self._constants.reshape(2, -1, 4, 4))
 
     @cached_property
     def _constants(self) -> Array:
@@ -186,14 +195,79 @@ def compact_equations(system: Equations, n: int) -> CompactEquations:
     return CompactEquations(system.start, letters, columns, system.inverse, plane, points, n)
 
 
-def compact_assembly(assembly: Assembly, system: Equations) -> CompactEquations:
-    """`compact_equations` of all equations of an assembly; what does not depend on goals is worked out once."""
+def linearised_by(system: CompactEquations, T: Array, B: Array) -> tuple[Array, Array]:
+    """e, (*, 3 c), [m], at the goals T, (*, n, 4, 4), and its derivative by z, transposed, (*, 6 n, 3 c).
+
+    Args:
+        B: (*, n, 6, 6) or (*, n, 6, 6 n): what a change of z makes of the body twist of each goal.
+    """
+    if B.shape[-1] == 6:
+        e, blocks = system.blocks(T, B)
+        return e, system.gathered(blocks)
+    # Every goal depends on every number of z: J by all body twists, times what z makes of them.
+    size = B.shape[-1]
+    e, blocks = system.blocks(T, np.broadcast_to(np.eye(6), (*T.shape[:-2], 6, 6)))
+    return e, np.asarray(np.swapaxes(B.reshape(*T.shape[:-3], size, size), -1, -2) @ system.gathered(blocks))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """The vertices of all contacts, laid onto the faces that they lie on at some goals."""
+
+    system: CompactEquations
+    """With points (*, c, 3, 4)."""
+    vertex: Array
+    """(*, m, 4), frame of the environment part, [m]."""
+    forms: Array
+    """As of `forms_at`, at these goals."""
+    known: Pattern
+
+    def forms_at(self, T: Array) -> Array:
+        """n D_a^-1 D_b of each contact, (*, c, 4), at the goals T, (*, n, 4, 4): e of any vertex is this times it."""
+        return np.asarray((self.system.plane[:, None] @ self.system.words(T))[..., 0, :])
+
+    def gaps(self, forms: Array) -> Array:
+        """The largest |e| of each contact, (*, c), [m]."""
+        if not len(self.known.contact):
+            return np.zeros(forms.shape[:-1])
+        e = (forms.take(self.known.contact, axis=-2) * self.vertex).sum(axis=-1)
+        return np.asarray(np.maximum.reduceat(np.abs(e), self.known.begin[:-1], axis=-1))
+
+    def looking_away(self, forms: Array) -> NDArray[np.bool_]:
+        """Which contacts have faces that do not look at each other, (*, c), as `assembly.opposing` has it."""
+        cosines = (forms[..., :3] * self.known.onto[:, :3]).sum(axis=-1)
+        return np.asarray(cosines > self.known.opposing)
+
+
+def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) -> Laid:
+    """The compact equations of all contacts of an assembly, vertices where they are at the goals, (*, n, 4, 4).
+
+    Vertices of the environment's face are where they are; those of the manipulated face are laid onto the other one:
+    taken back by the word of their contact at the goals, and dropped onto its plane. That is one affine map for each
+    contact, which takes the three points that stand for the vertices along.
+
+    Args:
+        start: (p, 4, 4).
+        plane: (c, 4), shifted to where contacts are asked to be.
+    """
     known, base = pattern(assembly), _words_alone(assembly)
-    points, rows = np.array(base.points), known.laid[known.contact]
-    if rows.any():
-        number = (np.cumsum(known.laid) - 1)[known.contact[rows]]
-        points[known.laid] = moments(system.vertex[rows, :3], number, int(np.count_nonzero(known.laid)))
-    return base.placed(system.start, system.plane[known.begin[:-1]], points)
+    system = base.placed(start, plane, base.points)
+    words = system.words(goals)
+    maps = np.where(known.laid[:, None, None], _drops(assembly) @ pose.inverse(words), _ONE)
+    vertex = (maps.take(known.contact, axis=-3) @ known.corners[..., None])[..., 0]
+    forms = (plane[:, None] @ words)[..., 0, :]
+    points = base.points @ np.swapaxes(maps, -1, -2)
+    return Laid(system.placed(start, plane, points), vertex, forms, known)
+
+
+@remembered
+def _drops(assembly: Assembly) -> Array:
+    """The maps v -> v - n (n v) that drop points onto the face of the environment of each contact, (c, 4, 4)."""
+    onto = pattern(assembly).onto
+    normal = np.array(onto)
+    normal[:, 3:] = 0.0
+    return np.asarray(_ONE - normal[:, :, None] * onto[:, None, :])
 
 
 @remembered
@@ -202,12 +276,8 @@ def _words_alone(assembly: Assembly) -> CompactEquations:
     known, p, n = pattern(assembly), len(assembly.solids), len(assembly)
     k = known.letters - p
     columns, start = np.where((k >= 0) & (k < n), k, n), np.tile(_ONE, (p, 1, 1))
-    return CompactEquations(start, known.letters, columns, known.inverse, known.plane, corner_moments(known), n)
-
-
-def corner_moments(known: Pattern) -> Array:
-    """Three points that stand for the corners of each contact, (c, 3, 4), in the frame that these are in."""
-    return moments(known.corners[:, :3], known.contact, len(known.letters))
+    points = moments(known.corners[:, :3], known.contact, len(known.letters))
+    return CompactEquations(start, known.letters, columns, known.inverse, known.plane, points, n)
 
 
 def moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:

@@ -1,6 +1,6 @@
 """The shortest correction where contacts bend as much as the correction is long: Newton's method.
 
-`manifold` takes a step to the shortest z on the linearised contacts. Where these bend about what was seen, as for a
+`gauss_newton` takes a step to the shortest z on the linearised contacts. Where these bend about what was seen, as for a
 part that was seen upside down, of which every turn is about as far, its steps shrink by a percent only. The second
 derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions says where they lead.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.manifold import STEP, shortened_step
+from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
 from apo_bench.correction.solvers.whitened import correction_to
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian

@@ -18,9 +18,9 @@ from apo_bench.assembly.equations import Equations
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
-from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.joint import linearised_by
-from apo_bench.correction.solvers.manifold import NearestGoals, SolverTurn, project, settles, shortened_step
+from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.gauss_newton import NearestGoals, damping, settles, shortened_step
+from apo_bench.correction.solvers.linear_step import shortest
 from apo_bench.correction.solvers.whitened import pulled, spread
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
@@ -113,19 +113,19 @@ def nearest_between(
             f"walls with {system.n} operations were given, up to {LARGEST_POSTERIOR // 6} are allowed; "
             'ask for "centred" contacts instead.'
         )
-    known, before, trace, pace = jacobian_rank(start.Jt), np.inf, list(start.trace), 1.0
+    known, before, turns, pace = jacobian_rank(start.Jt), np.inf, list(start.turns), 1.0
     z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
     for _ in range(_TURNS):
         e, Jt = linearised_by(system, T, B)
-        shortest = z + project(e[None], Jt[None], z[None], None, _SETTLED)[0][0]
+        nearest = _settled(e, Jt, z)
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = inequalities.system.linearised(T)
         J_wall = pulled(J_wall.reshape(len(inequalities), -1), B)
-        ahead = e_wall + J_wall @ (shortest - z)
+        ahead = e_wall + J_wall @ (nearest - z)
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
-        step = shortest + free @ u - z
+        step = nearest + free @ u - z
         length = float(np.abs(step).max(initial=0.0))
-        trace.append(SolverTurn(float(np.abs(e).max(initial=0.0)), length))
+        turns.append(np.array([np.abs(e).max(initial=0.0), length]))
         over = bool(settles(np.array(length), np.array(before)))
         rest = over and room
         pace = _paced(pace, step, last)
@@ -135,7 +135,16 @@ def nearest_between(
         T, B, before = observed @ D, Jr @ L, length
         if over:
             break
-    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), tuple(trace))
+    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), np.array(turns))
+
+
+def _settled(e: Array, Jt: Array, z: Array) -> Array:
+    """The shortest z that satisfies the linearised equations, (6 n,), damped as if they held."""
+    if not len(e):
+        return np.zeros(len(z))
+    J, m = Jt.T[None], len(e)
+    mu = damping(np.array([np.square(J).sum() / m]), np.array([e @ e / m]), _SETTLED)
+    return np.asarray(shortest(J, e[None], z[None], np.full((1, m), mu))[0])
 
 
 def active_rank(Jt: Array, inequalities: Inequalities, found: NearestGoals) -> int:

@@ -1,4 +1,4 @@
-"""Sparse matrices for the solver of `manifold`: time and memory grow with the contacts, not with their square.
+"""Sparse matrices for the solver of `gauss_newton`: time and memory grow with the contacts, not with their square.
 
 Two contacts meet in J J^t only where an operation occurs in both. Contacts are numbered so that those that meet are
 near each other (reverse Cuthill-McKee); if all entries then lie in a narrow band, as in a row of castles, a banded
@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.linear_step import turn_of, twists
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import exp_and_jacobian
 
 WIDE = 240
 """Rows of a band above which it is no longer worth it."""
@@ -84,6 +86,49 @@ def sparse_solver(where: Incidence) -> _Solver:
         if 3 * int(np.abs(a - b).max(initial=0)) + 3 <= WIDE:
             return _banded(where, first[a >= b], second[a >= b], order)
     return _together(where)
+
+
+@final
+class SparseStep:
+    """One observation of many operations: the step of `gauss_newton` on sparse matrices."""
+
+    settled = 1e-5, 1e-7  # rounding of thousands of operations is larger
+
+    def __init__(self, system: CompactEquations, observed: Array, L: Array, soft_m: Array | None) -> None:
+        self._system = system if system.points.ndim == 3 else system.only(0)
+        self._observed, self._L, self._where = observed, L, incidence(system)
+        self._solve = sparse_solver(self._where)
+        self._soft2 = np.zeros(3 * len(system)) if soft_m is None else soft_m * soft_m
+        self.T, self.B, self.e = observed, L, np.zeros((1, len(self._soft2)))
+        self.gap_m, self.gap2, self.row_size = np.zeros((3, 1))
+        self._blocks = np.zeros((len(self._where.contact), 6, 3))
+
+    @property
+    def Jt(self) -> list[Any]:
+        return [self._where.matrix(self._blocks).T]
+
+    def linearise(self, z: Array, rows: NDArray[np.intp]) -> None:
+        if not len(rows):
+            return
+        # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
+        D, Jr = exp_and_jacobian(twists(z, self._L))
+        self.T, self.B = self._observed @ D, Jr @ self._L
+        e, every = self._system.blocks(self.T[0], self.B[0])
+        self.e, self._blocks = e[None], every[self._where.contact, self._where.letter]
+        self.gap_m[0] = np.abs(e).max(initial=0.0)
+        self.gap2[0] = (e * e) @ (self._soft2 == 0.0) / max(len(e), 1)
+        self.row_size[0] = np.square(self._blocks).sum() / max(len(e), 1)
+
+    def change(self, z: Array, mu: Array, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        if not len(rows):
+            return z[rows], mu, mu
+        wanted = self._where.times(self._blocks, z[0]) - self.e[0]
+        step = self._solve(mu[0] + self._soft2, self._blocks, wanted)[None] - z
+        return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L)
+
+    def leave_alone(self, which: NDArray[np.bool_]) -> None:
+        self.T, self.B, self._blocks = self._observed, self._L, np.zeros_like(self._blocks)
+        self.e = self._system.residual(self.T)
 
 
 def sparse_rank(Jt: Any) -> int:

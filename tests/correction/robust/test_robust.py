@@ -24,7 +24,7 @@ from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.correction.robust.room import crowding
 from apo_bench.correction.robust.search import Rest
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
-from apo_bench.correction.solvers.joint import linearised_by
+from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

@@ -1,0 +1,275 @@
+"""The dense work of the solver in loops over numbers, for a compiler; each loop has a twin of a few lines of NumPy.
+
+Nothing is decided here: how much to damp, when to stop and what a result is worth is said where these are called, once
+for both twins. Plain Python that runs as it stands, and imports nothing from the package: Numba (Lam, Pitrou and
+Seibert, 2015) compiles it at the first correction and keeps the result for as long as this file stays as it is. It is
+written for a short compilation, too: few statements, each with few indices, and no views. Arrays are C-contiguous; b
+observations of one assembly with c contacts, n operations and p parts.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+_Index = NDArray[np.intp]
+_SAFE = ("reassoc", "contract", "nsz")
+"""Liberties that the compiler may take: sums in another order, but numbers that are not finite stay what they are."""
+_SHORT = 9
+"""Terms of the series of exp that are enough below one radian."""
+
+
+class Kernels(NamedTuple):
+    """The loops, compiled."""
+
+    linearised: Callable[..., None]
+    change: Callable[..., None]
+
+
+@cache
+def kernels() -> Kernels | None:
+    """The loops, compiled; None where Numba is not installed, or would have to compile anew in every process."""
+    try:
+        from numba import config, njit
+
+        vars(config)["CACHE_DIR"] = os.environ.get("NUMBA_CACHE_DIR", "")  # not what a file in the current folder says
+        compiler: Any = njit(fastmath=set(_SAFE), error_model="numpy", cache=True)
+        return Kernels(compiler(linearised), compiler(change))
+    except (ImportError, RuntimeError):
+        return None
+
+
+def linearised(
+    words: _Index,
+    factors: _Array,
+    plane: _Array,
+    points: _Array,
+    observed: _Array,
+    L: _Array,
+    soft2: _Array,
+    z: _Array,
+    rows: _Index,
+    series: _Array,
+    adjoints: _Array,
+    six: _Array,
+    behind: _Array,
+    forms: _Array,
+    T: _Array,
+    B: _Array,
+    e: _Array,
+    J: _Array,
+    gap_m: _Array,
+    gap2: _Array,
+    row_size: _Array,
+) -> None:
+    """Goals T = T_seen exp(L z), the equations e there and their derivative J by z (Eq. 14), of some observations.
+
+    Args:
+        words: (3, c, w): letters, columns and inverse (0 or 1) of `CompactEquations`.
+        factors: (2, p + n + 1, 4, 4): all matrices, and their inverses; those of the goals are overwritten.
+        points: (b, c, 3, 4); observed (b, n, 4, 4); L (b, n, 6, 6); z (b, 6 n).
+        soft2: (3 c,), the variance of each equation, 0 of those that are demanded.
+        rows: Which observations.
+        series: `geometry.twist.SERIES`; `adjoints` is `geometry.twist.ADJOINTS`.
+        six: (6, 6, 6), scratch, as are behind (w + 1, 3, 4) and forms (w + 1, 4).
+        T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c) and J (b, 3 c, 6 n), and their sizes as
+            `LinearStep` has them, (b,) each.
+    """
+    n, c, w = observed.shape[1], len(plane), words.shape[2]
+    first = factors.shape[1] - 1 - n
+    for o in rows:
+        for k in range(n):
+            # xi = L z, its squared angle, and the coefficients of ad, .., ad^4 in J_r.
+            square = 0.0
+            for i in range(6):
+                t = 0.0
+                for j in range(6):
+                    t += L[o, k, i, j] * z[o, 6 * k + j]
+                six[0, 0, i] = t
+                if i > 2:
+                    square += t * t
+            for j in range(4):
+                t = 0.0
+                for i in range((_SHORT if square < 1.0 else len(series)) - 1, -1, -1):
+                    t = t * square + series[i, 2 + j]
+                six[0, 1, j] = t
+            # ad, then ad^2 and b + c ad + d ad^2, then J_r = 1 + a ad + (b + c ad + d ad^2) ad^2.
+            for i in range(6):
+                for j in range(6):
+                    t = 0.0
+                    for q in range(6):
+                        t += six[0, 0, q] * adjoints[q, i, j]
+                    six[1, i, j] = t
+            for i in range(6):
+                for j in range(6):
+                    t = 0.0
+                    for q in range(6):
+                        t += six[1, i, q] * six[1, q, j]
+                    six[2, i, j] = t
+                    six[3, i, j] = six[0, 1, 2] * six[1, i, j] + six[0, 1, 3] * t
+                six[3, i, i] += six[0, 1, 1]
+            for i in range(6):
+                for j in range(6):
+                    t = six[0, 1, 0] * six[1, i, j]
+                    for q in range(6):
+                        t += six[3, i, q] * six[2, q, j]
+                    six[4, i, j] = t
+                six[4, i, i] += 1.0
+            for i in range(6):
+                for j in range(6):
+                    t = 0.0
+                    for q in range(6):
+                        t += six[4, i, q] * L[o, k, q, j]
+                    B[o, k, i, j] = t
+            # exp(xi) - 1 = A^t X, with A the upper left block of J_r: T = T_seen + T_seen A^t X, and T^-1.
+            for i in range(3):
+                for j in range(4):
+                    t = 0.0
+                    for q in range(3):
+                        t += six[4, q, i] * (six[1, q, j] if j < 3 else six[0, 0, q])
+                    six[5, i, j] = t
+            for i in range(4):
+                for j in range(4):
+                    t = observed[o, k, i, j]
+                    for q in range(3):
+                        t += observed[o, k, i, q] * six[5, q, j]
+                    T[o, k, i, j] = t
+                    factors[0, first + k, i, j] = t
+            for i in range(3):
+                t = 0.0
+                for j in range(3):
+                    factors[1, first + k, i, j] = T[o, k, j, i]
+                    t -= T[o, k, j, i] * T[o, k, j, 3]
+                factors[1, first + k, i, 3] = t
+        gap_m[o] = 0.0
+        gap2[o] = 0.0
+        row_size[o] = 0.0
+        for i in range(c):
+            last = w
+            while last > 0 and words[0, i, last - 1] == first + n:  # padding
+                last -= 1
+            # behind[j] = F_j+1 .. F_w v of the three points v, and e = n F_1 .. F_w v.
+            for r in range(3):
+                for q in range(6 * n):
+                    J[o, 3 * i + r, q] = 0.0
+                for d in range(4):
+                    behind[last, r, d] = points[o, i, r, d]
+            for j in range(last - 1, -1, -1):
+                side, letter = words[2, i, j], words[0, i, j]
+                for r in range(3):
+                    for d in range(4):
+                        t = 0.0
+                        for q in range(4):
+                            t += factors[side, letter, d, q] * behind[j + 1, r, q]
+                        behind[j, r, d] = t
+            for r in range(3):
+                t = 0.0
+                for q in range(4):
+                    t += plane[i, q] * behind[0, r, q]
+                e[o, 3 * i + r] = t
+                gap_m[o] = max(gap_m[o], abs(t))
+                gap2[o] += t * t / (3 * c) if soft2[3 * i + r] == 0.0 else 0.0
+            # forms[j] = n F_1 .. F_j = (a, .). A letter T has p behind and a before itself: its rows are
+            # (a h, p x a) B of points p with last number h; T^-1 stays on the other side, with the opposite sign.
+            for d in range(4):
+                forms[0, d] = plane[i, d]
+            for j in range(last):
+                side, letter = words[2, i, j], words[0, i, j]
+                for d in range(4):
+                    t = 0.0
+                    for q in range(4):
+                        t += forms[j, q] * factors[side, letter, q, d]
+                    forms[j + 1, d] = t
+                k = words[1, i, j]
+                if k < n:
+                    at, sign = (j, -1.0) if side == 1 else (j + 1, 1.0)
+                    for r in range(3):
+                        for d in range(3):
+                            x, y = (d + 1) % 3, (d + 2) % 3
+                            shift = sign * behind[at, r, 3] * forms[at, d]
+                            turn = sign * (behind[at, r, x] * forms[at, y] - behind[at, r, y] * forms[at, x])
+                            for q in range(6):
+                                J[o, 3 * i + r, 6 * k + q] += shift * B[o, k, d, q] + turn * B[o, k, 3 + d, q]
+            for r in range(3 * i, 3 * i + 3):
+                for q in range(6 * n):
+                    row_size[o] += J[o, r, q] * J[o, r, q] / (3 * c)
+
+
+def change(
+    J: _Array,
+    e: _Array,
+    z: _Array,
+    L: _Array,
+    mu: _Array,
+    soft2: _Array,
+    rows: _Index,
+    R: _Array,
+    y: _Array,
+    step: _Array,
+    length: _Array,
+    turned: _Array,
+) -> None:
+    """J^t (J J^t + mu + soft2)^-1 (J z - e) - z of some observations, by R R^t = J J^t + mu + soft2 (Cholesky).
+
+    Args:
+        J: (b, m, 6 n); e is (b, m), z (b, 6 n), L (b, n, 6, 6).
+        mu: (rows,), above zero; soft2 is (m,).
+        rows: Which observations.
+        R: (m, m), scratch, one over each pivot's root on the diagonal; so is y (m,).
+        step: (rows, 6 n), overwritten.
+        length: (rows,), overwritten: its largest component.
+        turned: (rows,), overwritten: the largest turn of a goal, [rad].
+    """
+    m, size = e.shape[1], z.shape[1]
+    for x in range(len(rows)):
+        o = rows[x]
+        # Row by row: J J^t, its factor, J z - e, and the first substitution.
+        for i in range(m):
+            t = -e[o, i]
+            for q in range(size):
+                t += J[o, i, q] * z[o, q]
+            for j in range(i + 1):
+                s = 0.0
+                for q in range(size):
+                    s += J[o, i, q] * J[o, j, q]
+                for q in range(j):
+                    s -= R[i, q] * R[j, q]
+                if j < i:
+                    s *= R[j, j]
+                    t -= s * y[j]
+                else:
+                    # By rounding alone a pivot would be less than what is added.
+                    s = 1.0 / math.sqrt(max(s, 0.0) + mu[x] + soft2[i])
+                R[i, j] = s
+            y[i] = t * R[i, i]
+        # The second substitution, and J^t y - z.
+        for q in range(size):
+            step[x, q] = -z[o, q]
+        for i in range(m - 1, -1, -1):
+            y[i] *= R[i, i]
+            for q in range(i):
+                y[q] -= R[i, q] * y[i]
+            for q in range(size):
+                step[x, q] += y[i] * J[o, i, q]
+        length[x] = 0.0
+        turned[x] = 0.0
+        for k in range(size // 6):
+            s = 0.0
+            for i in range(6):
+                length[x] = max(length[x], abs(step[x, 6 * k + i]))
+                t = 0.0
+                for q in range(6):
+                    t += L[o, k, i, q] * step[x, 6 * k + q]
+                s += t * t if i > 2 else 0.0
+            turned[x] = max(turned[x], math.sqrt(s))
+
+
+PLAIN = Kernels(linearised, change)
+"""The loops as they stand, not compiled."""

@@ -1,0 +1,158 @@
+"""One linear step of the solver: what differs between dense and sparse matrices, and what kernels do quicker.
+
+The loop of `gauss_newton` knows no matrices. It asks a step to linearise the contact equations at some z, and for the
+shortest z that satisfies what was linearised.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.kernels import Kernels
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.twist import ADJOINTS, SERIES, exp_and_jacobian
+
+SURE, NEXT = 1e-6, 1e-9
+"""When the solver rests, as of `gauss_newton.settles`."""
+Rows = NDArray[np.intp]
+"""Numbers of observations of a batch."""
+
+
+class LinearStep(Protocol):
+    """The contact equations of b observations where they were linearised last."""
+
+    T: Array
+    """(b, n, 4, 4): goals."""
+    B: Array
+    """(b, n, 6, 6) or (b, n, 6, 6 n): what a change of z makes of the body twists at T."""
+    e: Array
+    """(b, 3 c), [m]."""
+    gap_m: Array
+    """(b,): the largest |e|."""
+    gap2: Array
+    """(b,): the mean square of e of the equations that are demanded."""
+    row_size: Array
+    """(b,): the mean square of the rows of J."""
+    settled: tuple[float, float]
+    """`sure` and `following` of `gauss_newton.settles`."""
+
+    @property
+    def Jt(self) -> Any:
+        """(b, 6 n, 3 c)."""
+
+    def linearise(self, z: Array, rows: Rows) -> None:
+        """Linearise some observations at their z, (b, 6 n)."""
+
+    def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
+        """The step from z, (b, 6 n), of some observations to J^t (J J^t + mu + soft^2)^-1 (J z - e).
+
+        Returns:
+            The step (rows, 6 n), its largest component (rows,), and how far it turns a goal at most (rows,), [rad].
+        """
+
+    def leave_alone(self, which: NDArray[np.bool_]) -> None:
+        """Forget what was linearised of some observations, (b,): goals are those that were seen."""
+
+
+@final
+class DenseStep:
+    """Dense matrices, with kernels or without; errors may be shared."""
+
+    settled = SURE, NEXT
+
+    def __init__(
+        self, system: CompactEquations, observed: Array, L: Array, soft_m: Array | None, kernels: Kernels | None
+    ) -> None:
+        b, n, m = len(observed), system.n, 3 * len(system)
+        self._system, self._observed, self._L = system, observed, L
+        self._soft2 = np.zeros(m) if soft_m is None else soft_m * soft_m
+        self.T, self.B = np.empty((b, n, 4, 4)), np.empty(L.shape)
+        self.e, self._J = np.empty((b, m)), np.empty((b, m, 6 * n))
+        self.gap_m, self.gap2, self.row_size = np.empty((3, b))
+        self._kernels = kernels if L.shape[-1] == 6 else None
+        if self._kernels is not None:
+            points = system.points if system.points.ndim == 4 else np.tile(system.points, (b, 1, 1, 1))
+            self._words, self._factors = system.for_kernels()
+            self._plane, self._points, self._observed, self._L = map(_own, (system.plane, points, observed, L))
+            self._soft2 = _own(self._soft2)
+            width = system.letters.shape[1]
+            self._scratch = np.empty((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
+            self._factor = np.empty((m, m)), np.empty(m)
+
+    @property
+    def Jt(self) -> Array:
+        return np.swapaxes(self._J, 1, 2)
+
+    def linearise(self, z: Array, rows: Rows) -> None:
+        if self._kernels is not None:
+            seen = self._words, self._factors, self._plane, self._points, self._observed, self._L, self._soft2
+            out = self.T, self.B, self.e, self._J, self.gap_m, self.gap2, self.row_size
+            self._kernels.linearised(*seen, z, rows, SERIES, ADJOINTS, *self._scratch, *out)
+            return
+        # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
+        some, m = self._views(rows), max(self.e.shape[1], 1)
+        L = self._L[some]
+        D, Jr = exp_and_jacobian(twists(z[some], L))
+        T = self._observed[some] @ D
+        B = Jr @ L
+        e, Jt = linearised_by(self._system.only(some), T, B)
+        self.T[some], self.B[some], self.e[some], self._J[some] = T, B, e, np.swapaxes(Jt, 1, 2)
+        self.gap_m[some] = np.abs(e).max(axis=1, initial=0.0)
+        self.gap2[some] = (e * e) @ (self._soft2 == 0.0) / m
+        self.row_size[some] = np.einsum("bij,bij->b", Jt, Jt) / m
+
+    def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
+        if self._kernels is not None:
+            step, length, turned = np.empty((len(rows), z.shape[1])), np.empty(len(rows)), np.empty(len(rows))
+            given = self._J, self.e, z, self._L, mu, self._soft2, rows
+            self._kernels.change(*given, *self._factor, step, length, turned)
+            return step, length, turned
+        some = self._views(rows)
+        now = z[some]
+        step = shortest(self._J[some], self.e[some], now, mu[:, None] + self._soft2) - now
+        return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L[some])
+
+    def _views(self, rows: Rows) -> Any:
+        """The same rows; a slice where that is all, which copies nothing."""
+        return slice(None) if len(rows) == len(self.T) else rows
+
+    def leave_alone(self, which: NDArray[np.bool_]) -> None:
+        self.T[which], self.B[which], self._J[which] = self._observed[which], self._L[which], 0.0
+        self.e[which] = self._system.only(np.flatnonzero(which)).residual(self.T[which])
+
+
+def shortest(J: Array, e: Array, z: Array, added: Array) -> Array:
+    """J^t (J J^t + added)^-1 (J z - e), (b, 6 n): the shortest z that satisfies the linearised equations.
+
+    Args:
+        J: (b, m, 6 n).
+        e: (b, m); so is `added`, above zero, to the diagonal.
+    """
+    b, m = e.shape
+    Jt = np.swapaxes(J, 1, 2)
+    A = J @ Jt
+    A.reshape(b, m * m)[:, :: m + 1] += added
+    wanted = J @ z[..., None] - e[..., None]
+    return np.asarray((Jt @ np.linalg.solve(A, wanted))[..., 0])
+
+
+def twists(z: Array, L: Array) -> Array:
+    """L z of every operation, (b, n, *), of L (b, n, *, 6) or (b, n, *, 6 n)."""
+    width = L.shape[3]
+    return np.asarray((L @ z.reshape(len(L), z.shape[1] // width, width, 1))[..., 0])
+
+
+def turn_of(step: Array, L: Array) -> Array:
+    """How far steps (b, 6 n) of z turn a goal at most, (b,), [rad]."""
+    turned = twists(step, L[:, :, 3:])
+    return np.asarray(np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0)))
+
+
+def _own(x: Array) -> Array:
+    """An array made contiguous and writable: the compiled code knows one kind of array."""
+    known = x.flags
+    return x if known.c_contiguous and known.writeable else np.array(x, dtype=np.float64, order="C")
