@@ -4,8 +4,6 @@ No sentence says more than its counts: an interval only where there are seeds en
 the difference is beyond chance, "as often" only where the interval lies close around 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

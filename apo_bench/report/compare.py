@@ -1,7 +1,5 @@
 """Two sweeps against each other, trial by trial: two versions, two machines, two fidelities."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter

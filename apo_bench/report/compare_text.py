@@ -1,7 +1,5 @@
 """A comparison in words: tables for the terminal and the page, and one JSON object."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The report of a sweep: one page that answers, tables and figures beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What was run: specification, versions and command out of `run.json`, whatever of it there is."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

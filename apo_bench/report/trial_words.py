@@ -1,7 +1,5 @@
 """How a trial ended, in a few words."""
 
-from __future__ import annotations
-
 from apo_bench.records.row import Row
 
 FAILED = "failed"

@@ -1,7 +1,5 @@
 """Calibration: whether corrections are as uncertain as they say, and whether their test catches wrong relations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

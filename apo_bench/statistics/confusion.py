@@ -1,7 +1,5 @@
 """Prediction against physics: how often a plan said beforehand what then happened."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """What replays take: operations beyond doing each once, simulated time, and how far finished parts were pushed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median

@@ -1,7 +1,5 @@
 """The gap of the contacts before and after correction: quantiles over the trials of a cell."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final

@@ -1,7 +1,5 @@
 """McNemar's exact test: whether two methods over the same seeds are right equally often."""
 
-from __future__ import annotations
-
 
 def mcnemar(only_first: int, only_second: int) -> float:
     """The two-sided exact p-value: how unlikely so uneven a split is if each discordant pair falls either way alike.

@@ -5,8 +5,6 @@ independent: each gives one number, how many of its trials were right, and the i
 seeds. Where every seed has one trial they are Wilson's and Tango's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ those are far off. Of a pair, one method against a reference at one seed, `win` 
 is right and `lose` that at which the reference alone is.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How rates are said."""
 
-from __future__ import annotations
-
 from apo_bench.records.settings import RANGE
 from apo_bench.statistics.rates import Cell
 

@@ -1,8 +1,6 @@
 """Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp,
 fidelity, number of looks and robot error."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

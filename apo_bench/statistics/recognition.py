@@ -1,7 +1,5 @@
 """Precision and recall of recognised contacts over the noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final

@@ -1,7 +1,5 @@
 """Settings: what the methods and levels of one table or panel have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 

@@ -1,7 +1,5 @@
 """All that a report says in numbers about who succeeds, in one call."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """What a sweep took: wall times of trials, and what its workers did, out of `timing.jsonl`."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Which trials of a sweep wait, which are under way, and what becomes of one whose worker ends: on every executor."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import deque

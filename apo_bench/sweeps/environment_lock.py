@@ -1,7 +1,5 @@
 """The environment lock of a sweep: what all its rows are made with, wherever they are made."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

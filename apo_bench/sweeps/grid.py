@@ -1,7 +1,5 @@
 """The grids of a sweep: which trials there are, and which of them share a demonstration."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -7,8 +7,6 @@
 ("failed", text)        a trial could not be run; nothing follows
 """
 
-from __future__ import annotations
-
 import traceback
 from typing import Any
 

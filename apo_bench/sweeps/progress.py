@@ -1,7 +1,5 @@
 """How far a sweep is: a bar with an estimate and live rates on a terminal, a line a minute anywhere else."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Iterator

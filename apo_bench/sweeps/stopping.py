@@ -1,7 +1,5 @@
 """Ctrl-C and its kin: the first asks for a clean end, the second ends at once."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Many trials: spread over processes or machines, each row written as its trial ends, resumed where it was left."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

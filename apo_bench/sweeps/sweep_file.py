@@ -12,8 +12,6 @@
 Lengths in mm, angles in degrees; paths as on the command line, from the current folder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path

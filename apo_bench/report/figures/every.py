@@ -1,7 +1,5 @@
 """Every figure of a sweep that has something to show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from apo_bench.report.figures.levels import (

@@ -1,7 +1,5 @@
 """Figures over the noise level: success, paired differences, gaps, and contacts that were recognised."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar

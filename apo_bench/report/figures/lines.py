@@ -1,7 +1,5 @@
 """A panel of lines with bands: methods over levels, or whatever else is over whatever else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 

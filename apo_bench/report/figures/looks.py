@@ -1,7 +1,5 @@
 """Success over the number of looks: what it is worth to look again, beside the methods that cannot ask for it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from apo_bench.records.method import knows_truth, may_look

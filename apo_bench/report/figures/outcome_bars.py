@@ -1,7 +1,5 @@
 """Where trials ended: for every method and level a bar of shares, success first, then the stages that failed."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Predicted against real failure, as squares whose shade is a share: one panel for each method."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

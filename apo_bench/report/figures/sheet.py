@@ -4,8 +4,6 @@ One unit of a sheet is one px; a panel is 360 of them wide. In a page every pane
 panels find their places in windows of any width, and their colours follow the page's.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import textwrap

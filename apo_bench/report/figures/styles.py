@@ -1,7 +1,5 @@
 """Colours, markers and dashes: told apart without colour too, on a light and on a dark page."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple

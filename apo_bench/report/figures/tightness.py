@@ -1,7 +1,5 @@
 """Success over tightness, clearance over level: how much room a part has for what the camera errs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.records.method import knows_truth

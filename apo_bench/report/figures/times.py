@@ -1,7 +1,5 @@
 """Wall times of trials: a line from the 5th to the 95th percentile with a dot at the median, by scenario and method."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The page of a comparison, and its tables beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple

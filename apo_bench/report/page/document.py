@@ -1,7 +1,5 @@
 """Pages out of templates: one file, no address outside it, and a policy that lets a browser load none."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

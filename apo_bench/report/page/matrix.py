@@ -1,7 +1,5 @@
 """The headline: for every setting a matrix of methods over levels, with a button for each cell."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

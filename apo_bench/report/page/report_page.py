@@ -1,7 +1,5 @@
 """The page of a sweep: the answer, who succeeds, where and why not, with every trial under its cell."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

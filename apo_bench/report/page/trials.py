@@ -1,7 +1,5 @@
 """The trials of every cell of a page: columns, packed, to be unpacked by the script when a cell is opened."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

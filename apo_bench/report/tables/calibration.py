@@ -1,7 +1,5 @@
 """Whether corrections are as uncertain as they say."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.records.method import knows_relations

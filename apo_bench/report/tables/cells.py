@@ -1,7 +1,5 @@
 """The cells of a sweep: success rates with their intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from apo_bench.records.method import knows_relations, knows_truth, may_look

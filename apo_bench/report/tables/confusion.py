@@ -1,7 +1,5 @@
 """Prediction against physics: counted by scenario and method, and in one line."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.report.tables.table import Column, Table

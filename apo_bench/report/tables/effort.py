@@ -1,7 +1,5 @@
 """What replays take, and what a sweep took."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.report.tables.table import Column, Table

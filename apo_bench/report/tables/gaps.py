@@ -1,7 +1,5 @@
 """The gap of the contacts as seen and as planned."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.report.tables.saying import level_text, millimetres, place_columns

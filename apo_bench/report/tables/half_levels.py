@@ -1,7 +1,5 @@
 """How much noise a method bears: the level of half success, and the area under success over level."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.report.tables.saying import interval_columns, place_columns, points, span

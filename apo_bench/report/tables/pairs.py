@@ -1,7 +1,5 @@
 """Two methods over the same seeds, cell by cell."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.report.tables.saying import (

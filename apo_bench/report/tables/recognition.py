@@ -1,7 +1,5 @@
 """Precision and recall of recognised contacts over the noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from apo_bench.report.tables.saying import percents, rate_columns

@@ -1,7 +1,5 @@
 """How numbers and places are said in tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

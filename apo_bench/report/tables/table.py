@@ -1,7 +1,5 @@
 """One table, said once: the page, the terminal, Markdown, CSV and Parquet are made from its columns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter

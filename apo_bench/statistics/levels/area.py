@@ -6,8 +6,6 @@ is the success of a trial whose level is drawn evenly on that axis. Between leve
 area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final

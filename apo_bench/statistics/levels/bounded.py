@@ -7,8 +7,6 @@ spread still has an interval. Twice the log ratio is held against Fisher's F wit
 for many seeds is the chi-square of Wilks' theorem and for few is what Student's t would ask for (Owen's advice).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry.arrays import Array

@@ -12,8 +12,6 @@ by how much more the score of h varies from seed to seed than the likelihood say
 of Statistics 12, 1984, 46-60; here never by less than 1).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import final

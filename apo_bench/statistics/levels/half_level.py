@@ -9,8 +9,6 @@ the one from which it is surely under it. They are found by exact binomial tests
 levels to the first one that does not reject: each is wrong in at most 2.5 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """One trial in a process of its own, as sweeps run it: what ends the process or takes too long is a row too."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Local processes that share the work of a sweep; one that dies or hangs costs one trial, and is replaced."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from multiprocessing import connection

@@ -6,8 +6,6 @@ a task has started outlives its limit, a worker outlives a parent that is killed
 dies before its first task is not said. Nor does `concurrent.futures`, where one death breaks the pool.
 """
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 import os

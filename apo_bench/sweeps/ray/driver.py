@@ -4,8 +4,6 @@ Ray writes what it likes to the terminal, handles signals its own way, and ends 
 it has a process of its own. What is worth saying goes through a pipe to the sweep, which alone writes rows.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import shutil

@@ -5,8 +5,6 @@ along, twice, is lost; so is one that takes too long. Ray decides where a task r
 would begin with the first trial of a unit, and count a lost node as it counts a trial that ends its worker.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a sweep needs besides the package, to be sent to other machines: files below the current folder."""
 
-from __future__ import annotations
-
 import os
 import re
 import site

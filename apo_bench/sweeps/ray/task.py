@@ -1,7 +1,5 @@
 """What runs on the nodes of a Ray cluster: a task that runs one unit of work and yields messages."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import platform
