@@ -338,7 +338,8 @@ def _changed(document: Any, rng: Chance) -> Any:
         for _ in range(depth):
             holder[key] = [holder[key]] if rng.random() < 0.9 else {"x": holder[key]}
     elif isinstance(holder[key], int | float):
-        holder[key] = holder[key] * float(rng.choice([-1.0, 0.999, 10.0, 1e6, 1e-9]))
+        factor = float(rng.choice([-1.0, 0.999, 10.0, 1e6, 1e-9]))
+        holder[key] = holder[key] * factor if abs(holder[key]) < 1e300 else -holder[key]
     else:
         holder[key] = [holder[key]] * int(rng.choice([0, 2, 7, 1000]))
     return document
