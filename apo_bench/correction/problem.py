@@ -30,7 +30,7 @@ from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.posterior import jacobian_rank, marginals, projections
 from apo_bench.correction.solvers.compact import CompactEquations, Laid, compact_equations, laid_contacts
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals
-from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, demanded, nearest_between
+from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, bounded, nearest_between
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor, scales
 from apo_bench.correction.tailed import drawn_lengths, drawn_p_value
 from apo_bench.geometry.arrays import Array, frozen
@@ -257,25 +257,27 @@ def problem(
     assembly, shared = first.assembly, any(one.shared for one in observations)
     goals = np.array([one.goals for one in observations])
     start = np.array([first.start[part] for part in assembly.solids]).reshape(-1, 4, 4)
-    exact, plane = _demands(assembly, first.play_m)
+    exact, low, high, plane = _demands(assembly, first.play_m)
     there = goals if at is None else at
     laid = laid_contacts(assembly, start, plane, there)
     inequalities = tuple[Inequalities, ...]()
     if not exact.all():
         systems = (equations(assembly, first.start, T) for T in there)
-        inequalities = tuple(demanded(system, assembly, first.play_m)[2] for system in systems)
+        inequalities = tuple(bounded(system, exact, low, high) for system in systems)
     L = np.array([noise_factor(one) for one in observations]) if shared else _factors(observations)
     begin = None if at is None else np.array([correction_to(*one) for one in zip(goals, L, at, strict=True)])
     return Problem(tuple(observations), goals, L, laid, exact, inequalities, level, compiled, begin)
 
 
 @remembered
-def _demands(assembly: Assembly, play_m: float) -> tuple[NDArray[np.bool_], Array]:
-    """Which contacts are equations, (c,), and their planes, (c, 4), where they are asked to be."""
+def _demands(assembly: Assembly, play_m: float) -> tuple[NDArray[np.bool_], Array, Array, Array]:
+    """Which contacts are equations, (c,), their least and largest distances, (c,), [m], and their planes, (c, 4), where
+    equations are asked to be.
+    """
     low, high = assembly.intervals(play_m).T
     exact, plane = low == high, np.array(pattern(assembly).plane)
     plane[:, 3] -= np.where(exact, low, 0.0)
-    return exact, frozen(plane)
+    return exact, low, high, frozen(plane)
 
 
 def _factors(observations: Sequence[Observation]) -> Array:

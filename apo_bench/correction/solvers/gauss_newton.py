@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.kernels import kernels
-from apo_bench.correction.solvers.linear_step import DenseStep, LinearStep, turn_of
+from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, turn_of
 from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry.arrays import Array
 
@@ -175,10 +175,7 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
         turns[count, going, 0] = step.gap_m[going]
         turns[count, going, 1] = length
         rest = settles(length, before[going], *step.settled)
-        too_far = ~rest & (turned > LARGEST_TURN)
-        if too_far.any():
-            change[too_far] *= (LARGEST_TURN / turned[too_far])[:, None]
-        z[going] += change
+        z[going] += _shortened(change, np.where(rest, 0.0, turned))
         step.linearise(z, going)
         at_rest[going] = rest
         before[going] = length
@@ -202,7 +199,7 @@ def damping(row_size: Array, gap2: Array, turn: int) -> Array:
     return np.maximum(share * size, SMALLEST)
 
 
-def settles(size: Array, before: Array, sure: float = 1e-6, following: float = 1e-9) -> NDArray[np.bool_]:
+def settles(size: Array, before: Array, sure: float = SURE, following: float = NEXT) -> NDArray[np.bool_]:
     """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor.
 
     Args:
@@ -214,7 +211,11 @@ def settles(size: Array, before: Array, sure: float = 1e-6, following: float = 1
 
 def shortened_step(step: Array, L: Array) -> Array:
     """Steps (b, 6 n), shortened where a goal of an observation would turn further than `LARGEST_TURN`."""
-    largest = turn_of(step, L)
-    if (largest <= LARGEST_TURN).all():
+    return _shortened(step, turn_of(step, L))
+
+
+def _shortened(step: Array, turned: Array) -> Array:
+    """The same of steps of which it is known how far they turn a goal at most, (b,), [rad]."""
+    if (turned <= LARGEST_TURN).all():
         return step
-    return step * np.minimum(1.0, LARGEST_TURN / np.maximum(largest, SMALLEST))[:, None]
+    return step * np.minimum(1.0, LARGEST_TURN / np.maximum(turned, SMALLEST))[:, None]

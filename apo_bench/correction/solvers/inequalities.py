@@ -79,17 +79,18 @@ def demanded(system: Equations, assembly: Assembly, play_m: float) -> tuple[Equa
     """What each contact demands: shifted planes, (c,) whether it is an equation, and the inequalities of the others."""
     low, high = lowered(assembly).intervals(play_m).T
     exact = low == high
+    inequalities = bounded(system, exact, low, high)
     if exact.all() and not low.any():
-        none = np.zeros(0)
-        return system, exact, Inequalities(system.among(~exact), none, none)
+        return system, exact, inequalities
     plane = np.array(system.plane)
     plane[:, 3] -= np.where(exact, low, 0.0)[system.contact]
-    inequalities = system.among(~exact)
-    return (
-        replace(system, plane=plane),
-        exact,
-        Inequalities(inequalities, low[~exact][inequalities.contact], high[~exact][inequalities.contact]),
-    )
+    return replace(system, plane=plane), exact, inequalities
+
+
+def bounded(system: Equations, exact: NDArray[np.bool_], low: Array, high: Array) -> Inequalities:
+    """The inequalities of contacts that are no equations, (c,), between their distances low and high, (c,), [m]."""
+    walls = system.among(~exact)
+    return Inequalities(walls, low[~exact][walls.contact], high[~exact][walls.contact])
 
 
 def nearest_between(

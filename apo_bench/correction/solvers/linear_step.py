@@ -17,7 +17,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import ADJOINTS, SERIES, exp_and_jacobian
 
 SURE, NEXT = 1e-6, 1e-9
-"""When the solver rests, as of `gauss_newton.settles`."""
+"""When the solver rests with dense matrices: `sure` and `following` of `gauss_newton.settles`."""
 Rows = NDArray[np.intp]
 """Numbers of observations of a batch."""
 
