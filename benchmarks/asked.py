@@ -19,7 +19,8 @@ from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).resolve().parents[1]
-FIRST, LAST = "<!-- seeds -->", "<!-- end of seeds -->"
+FIRST = "<!-- seeds -->"
+LAST = "<!-- end of seeds -->"
 """Around the sentence on a page."""
 
 

@@ -9,7 +9,8 @@ from benchmarks.baselines import Count, Place
 
 COLUMNS = (("oracle", 0.0), ("none", 2.0), ("snap", 2.0), ("snap+search", 2.0), ("contact", 2.0))
 COLUMNS += (("by-heart", 2.0), ("by-heart", 4.0))
-ENOUGH, FEW = 0.95, 0.5
+ENOUGH = 0.95
+FEW = 0.5
 """Rates from which `snap` is enough, and up to which a scenario needs more."""
 BY_HEART = 0.2
 """Rate up to which memory does not help."""

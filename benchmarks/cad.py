@@ -24,9 +24,11 @@ from benchmarks.cad_cases import CASES
 from benchmarks.cad_clones import FILES
 
 ROOT = Path(__file__).parents[1]
-KEPT, PAGE = ROOT / "benchmarks" / "results" / "cad.csv", ROOT / "docs" / "results" / "cad.md"
+KEPT = ROOT / "benchmarks" / "results" / "cad.csv"
+PAGE = ROOT / "docs" / "results" / "cad.md"
 NEXT = "\n"
-LIMIT_S, LIMIT_MB = 60.0, 2000.0
+LIMIT_S = 60.0
+LIMIT_MB = 2000.0
 _COMMAND = "import sys; from apo_bench.cli.app import main; sys.exit(main())"
 _MEASURE = """
 import resource, subprocess, sys
@@ -57,7 +59,8 @@ class Became(NamedTuple):
 def imported(path: Path, *options: str) -> Became:
     """Import one file by the command line."""
     with tempfile.TemporaryDirectory() as folder:
-        out, err = Path(folder) / "out", Path(folder) / "err"
+        out = Path(folder) / "out"
+        err = Path(folder) / "err"
         command = [sys.executable, "-c", _COMMAND, "part", "import", str(path), *options, "--out", f"{folder}/parts"]
         with out.open("wb") as said, err.open("wb") as failed:
             start = [sys.executable, "-S", "-c", _MEASURE, *command]

@@ -42,8 +42,10 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 
 HERE = Path(__file__).parent
-KEPT, PAGE = HERE / "results" / "calibration.json", HERE.parent / "docs" / "how" / "contact.md"
-BEGIN, END = "<!-- table: python benchmarks/calibration.py -->", "<!-- end of table -->"
+KEPT = HERE / "results" / "calibration.json"
+PAGE = HERE.parent / "docs" / "how" / "contact.md"
+BEGIN = "<!-- table: python benchmarks/calibration.py -->"
+END = "<!-- end of table -->"
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 OUTLIER_M = 0.05
 """An operation that is seen farther away is an outlier of models that have them."""
@@ -92,7 +94,8 @@ def drawn(name: str, draws: int, stated: tuple[MeasuredNoise, Camera] | None = N
     for seed in range(50 * draws):
         if made == draws:
             return
-        scenario, rng = scenarios[seed % len(scenarios)], np.random.default_rng([seed, 20])
+        scenario = scenarios[seed % len(scenarios)]
+        rng = np.random.default_rng([seed, 20])
         layout = draw_layout(scenario, rng, 0.0)
         n = len(layout.goals)
         shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
@@ -120,7 +123,8 @@ def measured(seen: Observation, truth: Array) -> Draw:
             for T, S, main in zip(truth, seen.goals, mains, strict=True)
         ]
     )
-    made, alone = correct(seen, "contact"), correct(replace(seen, shared=()), "contact")
+    made = correct(seen, "contact")
+    alone = correct(replace(seen, shared=()), "contact")
 
     def off(goals: Array) -> float:
         return float(1e3 * np.sqrt(np.square(goals[:, :3, 3] - truth[:, :3, 3]).sum(axis=1).mean()))

@@ -46,7 +46,9 @@ PACKAGES = ("apo_bench", "numpy", "scipy", "daqp", "numba", "gtsam", "pyceres")
 
 
 def main() -> int:
-    given, commit, rows = _arguments(), _commit(), list[Row]()
+    given = _arguments()
+    commit = _commit()
+    rows = list[Row]()
     suites = _kept(given.out)
     for suite in given.only:
         start = time.monotonic()

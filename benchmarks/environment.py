@@ -22,13 +22,16 @@ from apo_bench.trial.stages import record_demonstration
 from apo_bench.trial.trial import run_trial
 
 ROOT = Path(__file__).resolve().parents[1]
-KEPT, PAGE = ROOT / "benchmarks" / "results" / "environment.csv", ROOT / "docs" / "guide" / "environment.md"
-BEGIN, END = "<!-- table: python benchmarks/environment.py -->", "<!-- end of table -->"
+KEPT = ROOT / "benchmarks" / "results" / "environment.csv"
+PAGE = ROOT / "docs" / "guide" / "environment.md"
+BEGIN = "<!-- table: python benchmarks/environment.py -->"
+END = "<!-- end of table -->"
 POLICIES = ("random", "none", "snap", "contact-robust", "oracle")
 SEEDS = range(10)
 LEFT_OUT = ("gearbox",)
 """Ten operations: a random action alone takes minutes."""
-ID, FAST = "APOReplay-v0", "contact"
+ID = "APOReplay-v0"
+FAST = "contact"
 
 
 def main() -> None:

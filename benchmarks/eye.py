@@ -40,7 +40,8 @@ def measured(scene: Scene, shown: Recording, level: float, seed: int) -> list[di
         found = of[k].found if k in of else None
         if found is not None:
             xi = pose.log(pose.inverse(found.T) @ shown.demonstration.goals[k])
-            row["mm"], row["deg"] = 1e3 * np.linalg.norm(xi[:3]), np.degrees(np.linalg.norm(xi[3:]))
+            row["mm"] = 1e3 * np.linalg.norm(xi[:3])
+            row["deg"] = np.degrees(np.linalg.norm(xi[3:]))
             row["chi_square"] = float(xi @ np.linalg.solve(found.covariance, xi))
         rows.append(row)
     rows[-1]["surprises"] = sum(event.operation is None for event in events)
@@ -66,9 +67,11 @@ def noticed(scene: Scene, shown: Recording, event: Event) -> int:
 
     Per part some 1500 can be seen in both views together.
     """
-    parts, demonstration = shifted(shown), shown.demonstration
+    parts = shifted(shown)
+    demonstration = shown.demonstration
     stages = (demonstration.start, *placements(demonstration.assembly, demonstration.start, demonstration.goals))
-    solids, play = scene.scenario.assembly.solids, 1e-3 * scene.clearance_mm
+    solids = scene.scenario.assembly.solids
+    play = 1e-3 * scene.clearance_mm
     count = 0
     for view, region in zip(shown.images.finder.views, event.regions, strict=True):
         for mask, poses in ((region.appeared, demonstration.final), (region.vanished, stages[-2])):
@@ -94,7 +97,9 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for name in args.scenarios:
         scene = build_scene(load_scenario(name))
-        rows, moved, watch = [], [], []
+        rows = []
+        moved = []
+        watch = []
         for seed in range(args.trials):
             began = time.process_time()
             shown = record_demonstration(scene, args.careless, seed, "range")

@@ -69,7 +69,8 @@ def main() -> int:
     jobs: list[Fault | str] = [*rooms, *(fault for _, fault in chosen)]
     with tempfile.TemporaryDirectory() as work, ThreadPoolExecutor(asked.workers) as pool:
         ran = list(pool.map(lambda job: run(ROOT, job, Path(work) / threading.current_thread().name), jobs))
-    sound, found = dict(zip(rooms, ran, strict=False)), list(zip(chosen, ran[len(rooms) :], strict=True))
+    sound = dict(zip(rooms, ran, strict=False))
+    found = list(zip(chosen, ran[len(rooms) :], strict=True))
     for room, whole in sound.items():
         print(f"   {room:12} without an error: {whole.by}, {whole.seconds:.0f} s")
     for (number, fault), one in found:

@@ -126,7 +126,8 @@ def prepared(work: Path, only: Sequence[str] | None = None) -> Mapping[str, Kind
         only: Kinds that are wanted; None: all.
     """
     with open(os.devnull, "w") as nowhere:
-        stdout, sys.stdout = sys.stdout, nowhere
+        stdout = sys.stdout
+        sys.stdout = nowhere
         try:
             (work / ELSEWHERE).touch()
             made = kinds(work)
@@ -173,14 +174,16 @@ def run_case(made: Mapping[str, Kind], seed: int, case: int, work: Path, *, show
     out = arguments[arguments.index("--out") + 1] if "--out" in arguments else ""
     if out and not (place / out).exists() and rng.random() < SPECIAL:
         (place / out).symlink_to(work / ELSEWHERE)
-        level, special = "link at --out", (*special, out)
+        level = "link at --out"
+        special = (*special, out)
     if show:
         print(f"{name}, {level}, {path.name}: apo-bench {' '.join(arguments)}")
         print(path.read_bytes()[:4000].decode(errors="replace") if path.is_file() else level)
     ending, cpu_s, mb, said = _forked(place, arguments, kind.longest_s, kind.largest_mb)
     changes = changed_files(place, before, kind.writes, special)
     if ending in FINE and (changes or (work / ELSEWHERE).read_bytes()):
-        ending, said = WROTE, f"{changes}\n{said}"
+        ending = WROTE
+        said = f"{changes}\n{said}"
         (work / ELSEWHERE).write_bytes(b"")
     if show:
         print(said)
@@ -218,7 +221,8 @@ def _forked(
         child = os.fork()
         if not child:
             _become(place, arguments, out.fileno(), err.fileno(), longest_s)
-        until, status = time.perf_counter() + PATIENCE_S, None
+        until = time.perf_counter() + PATIENCE_S
+        status = None
         while status is None:
             found, state, used = os.wait4(child, os.WNOHANG)
             if found:
@@ -233,7 +237,8 @@ def _forked(
         said, printed = ((file.seek(0), file.read(1_000_000).decode(errors="replace"))[1] for file in (err, out))
     if arguments[0] == "sweep":  # whose file may name code
         said = said.replace(f"{RAN}\n", "")
-    cpu_s, mb = used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
+    cpu_s = used.ru_utime + used.ru_stime
+    mb = used.ru_maxrss / 1e3
     if until == np.inf or cpu_s > longest_s:
         ending = f"longer than {longest_s:g} s"
     elif mb > largest_mb:
@@ -309,7 +314,8 @@ def lines(found: Sequence[Ended]) -> list[str]:
     table = [f"{'':24}" + "".join(f"{ending:>20}" for ending in endings)]
     for kind in sorted({case.kind for case in found}):
         table.append(f"{kind:24}" + "".join(f"{counts[kind, ending]:20}" for ending in endings))
-    slowest, largest = max(found, key=lambda case: case.cpu_s), max(found, key=lambda case: case.mb)
+    slowest = max(found, key=lambda case: case.cpu_s)
+    largest = max(found, key=lambda case: case.mb)
     table.append(
         f"slowest: {slowest.cpu_s:.1f} s (case {slowest.case}); largest: {largest.mb:.0f} MB (case {largest.case})"
     )

@@ -11,12 +11,14 @@ import numpy as np
 Chance = np.random.Generator
 _ODD = (np.nan, np.inf, -np.inf, 0.0, 1e38, -1e38, 1e-38, 1e9, -1.0, 2.0)
 _SIGNS = (b"PK\1\2", b"PK\3\4", b"PK\5\6")
-_DEPTH, _TIMES = 8, 60
+_DEPTH = 8
+_TIMES = 60
 
 
 def by_stl(raw: bytes, rng: Chance) -> bytes:
     """One number, triangle or count of a binary file replaced, removed, repeated or exchanged."""
-    head, rows = raw[:84], [raw[i : i + 50] for i in range(84, len(raw), 50)]
+    head = raw[:84]
+    rows = [raw[i : i + 50] for i in range(84, len(raw), 50)]
     i, j = (int(k) for k in rng.integers(0, len(rows), 2))
     kind = int(rng.integers(7))
     if kind == 0:

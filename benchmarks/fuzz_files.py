@@ -126,7 +126,8 @@ def _observed(seen: object) -> bytes:
 def _poses(n: int = 120) -> tuple[bytes, bytes, bytes]:
     """Estimates, and the truth in both of its forms."""
     rng = np.random.default_rng(0)
-    true, t = Rotation.random(n, random_state=1), rng.uniform([-200, -200, 600], [200, 200, 1200], (n, 3))
+    true = Rotation.random(n, random_state=1)
+    t = rng.uniform([-200, -200, 600], [200, 200, 1200], (n, 3))
     off = t + rng.normal(0, 3, (n, 3))
     turned = true * Rotation.from_rotvec(rng.normal(0, 2, (n, 3)), degrees=True)
 
@@ -159,7 +160,8 @@ def _residuals(work: Path, estimates: bytes, truth: bytes) -> bytes:
 
 def _run(work: Path) -> Mapping[str, bytes]:
     """The folder of a small sweep."""
-    out, methods = work / "run", ("oracle", "none")
+    out = work / "run"
+    methods = ("oracle", "none")
     run_sweep(SweepSettings(("block_on_block",), (0.0, 1.0), (0.0,), methods, trials=2, fidelity="contact"), out)
     return {name: (out / name).read_bytes() for name in ("trials.jsonl", "run.json", "timing.jsonl")}
 

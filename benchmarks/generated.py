@@ -49,8 +49,12 @@ Between = Callable[[float, float], float]
 
 def pinned(between: Between, rng: np.random.Generator) -> Assembled:
     """A plate, two or three pins through it, a cover over them."""
-    width, depth, thick, r = between(84, 110), between(46, 60), between(14, 20), between(3.5, 5.5)
-    play, cover = between(0.2, 0.4), between(9, 13)
+    width = between(84, 110)
+    depth = between(46, 60)
+    thick = between(14, 20)
+    r = between(3.5, 5.5)
+    play = between(0.2, 0.4)
+    cover = between(9, 13)
     length = round(thick + cover + between(14, 22), 1)
     xs = [-width / 2 + 16, width / 2 - 16] + ([0.0] if rng.uniform() < 0.5 else [])
     ys = [0.0, 0.0, round(depth / 2 - 14, 1)]
@@ -72,14 +76,19 @@ def pinned(between: Between, rng: np.random.Generator) -> Assembled:
 
 def bushed(between: Between, rng: np.random.Generator) -> Assembled:
     """A block, two bushes with a collar in it, a pin with a head in each."""
-    width, thick, r = between(90, 110), between(24, 32), between(4, 5.5)
-    outer, play, flange = round(r + between(5, 7), 1), between(0.2, 0.4), between(14, 18)
+    width = between(90, 110)
+    thick = between(24, 32)
+    r = between(4, 5.5)
+    outer = round(r + between(5, 7), 1)
+    play = between(0.2, 0.4)
+    flange = between(14, 18)
     bores = [bore((x, 0), outer + play, 0, thick, f"bore_{i}") for i, x in enumerate((-width / 4, width / 4), start=1)]
     block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
     inner = [Step(0, thick + flange, r + play, name="bore")]
     walls = [Step(0, thick, outer, name="side"), Step(thick, thick + flange, outer + 4, name="rim")]
     bush = turned(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
-    long, head = thick + flange - 2, between(12, 16)
+    long = thick + flange - 2
+    head = between(12, 16)
     pin = turned(
         [Step(0, long, r, name="side"), Step(long, long + head, r + 3, name="grip")],
         flats={0.0: "tip", long: "ledge", long + head: "head"},
@@ -92,8 +101,13 @@ def bushed(between: Between, rng: np.random.Generator) -> Assembled:
 
 def bracketed(between: Between, rng: np.random.Generator) -> Assembled:
     """Two brackets on the pegs of a plate, a shaft through both."""
-    thick, play, far, r = between(12, 16), between(0.2, 0.35), between(30, 40), 2.0 * float(rng.integers(3, 5))
-    high, peg, width = between(34, 42), between(3, 4), between(34, 40)
+    thick = between(12, 16)
+    play = between(0.2, 0.35)
+    far = between(30, 40)
+    r = 2.0 * float(rng.integers(3, 5))
+    high = between(34, 42)
+    peg = between(3, 4)
+    width = between(34, 40)
     plate = extrude(rectangle(150, width + 20), 0, thick, bottom="bottom", top="top")
     pegs = [
         shaft(peg, thick, thick + 12, "peg", chamfer_high=1).moved((x, y, 0)).prefixed(f"p{i}_")
@@ -125,9 +139,16 @@ def bracketed(between: Between, rng: np.random.Generator) -> Assembled:
 
 def slotted(between: Between, rng: np.random.Generator) -> Assembled:
     """A base with a slot, a key in it, pins in the key, rings over the pins."""
-    wide, deep, length, r = between(24, 32), between(10, 14), between(70, 90), between(3.5, 5)
-    side, floor, play = between(14, 20), between(10, 14), between(0.2, 0.35)
-    w, out, top = wide / 2, wide / 2 + side, floor + deep
+    wide = between(24, 32)
+    deep = between(10, 14)
+    length = between(70, 90)
+    r = between(3.5, 5)
+    side = between(14, 20)
+    floor = between(10, 14)
+    play = between(0.2, 0.35)
+    w = wide / 2
+    out = wide / 2 + side
+    top = floor + deep
     section = polygon(
         (-out, 0), (out, 0), (out, top), (w, top), (w, floor), (-w, floor), (-w, top), (-out, top),
         names={0: "bottom", 3: "slot_p", 4: "floor", 5: "slot_n"},
@@ -157,15 +178,19 @@ def slotted(between: Between, rng: np.random.Generator) -> Assembled:
 
 def stacked(between: Between, rng: np.random.Generator) -> Assembled:
     """A foot with a post, rings and plates over it, a cap on top."""
-    r, play, thick = between(7, 9), between(0.2, 0.4), between(12, 16)
-    count, heights = int(rng.integers(2, 4)), [between(12, 18) for _ in range(3)]
+    r = between(7, 9)
+    play = between(0.2, 0.4)
+    thick = between(12, 16)
+    count = int(rng.integers(2, 4))
+    heights = [between(12, 18) for _ in range(3)]
     post = thick + sum(heights[:count]) + 8
     foot = join(
         extrude(rectangle(between(90, 110), between(70, 90)), 0, thick, bottom="bottom", top="top"),
         shaft(r, thick, post, "post", chamfer_high=1.5, top="end"),
     )
     parts: dict[str, Body] = {"foot": foot}
-    places, z = [Place("foot", "foot", (0, 0, 0))], thick
+    places = [Place("foot", "foot", (0, 0, 0))]
+    z = thick
     for i, h in enumerate(heights[:count], start=1):
         hole = [bore((0, 0), r + play, 0, h, "bore")]
         parts[f"plate_{i}"] = extrude(

@@ -35,14 +35,17 @@ from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of
 
 ROOT = Path(__file__).parents[1]
-KEPT, PAGE = ROOT / "benchmarks" / "results" / "generated.csv", ROOT / "docs" / "results" / "generated.md"
+KEPT = ROOT / "benchmarks" / "results" / "generated.csv"
+PAGE = ROOT / "docs" / "results" / "generated.md"
 PICTURE = ROOT / "docs" / "pictures" / "generated.png"
-FIRST, LAST = "<!-- rates -->", "<!-- end of rates -->"
+FIRST = "<!-- rates -->"
+LAST = "<!-- end of rates -->"
 """Around what is written into the page."""
 COLUMNS = ("assembly", "method", "seed", "success", "stage", "code", "operation", "sentence")
 CHECK = "check"
 """In place of a method: all but the trials of `scenario check`."""
-FEW, METHODS = 5, ("oracle", "contact", "none", "snap", "snap+search", "by-heart")
+FEW = 5
+METHODS = ("oracle", "contact", "none", "snap", "snap+search", "by-heart")
 """Seeds of all methods; of `contact` there are more."""
 HEADS = {"oracle": "`oracle`"} | {method: f"`{method}` at 1 mm" for method in METHODS[1:]}
 
@@ -85,7 +88,8 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
             if not asked:
                 continue
             scenes[name] = scenes.get(name) or scene_of(asked[0])
-            recording, cache = record_demonstration(scenes[name], asked[0].careless, seed), ReplayCache()
+            recording = record_demonstration(scenes[name], asked[0].careless, seed)
+            cache = ReplayCache()
             for settings in asked:
                 row = run_trial(settings, scenes[name], recording=recording, cache=cache)
                 said = row["failure_stage"], row["failure_code"], row["failure_operation"], row["sentence"]
@@ -109,7 +113,8 @@ def lines_of(path: Path) -> list[Line]:
 
 def keep(lines: Sequence[Line]) -> None:
     """Write the rows in order, of seeds that every assembly has, and the tables into the page."""
-    order, names = (CHECK, *METHODS), {line["assembly"] for line in lines}
+    order = (CHECK, *METHODS)
+    names = {line["assembly"] for line in lines}
     seen = Counter((line["method"], line["seed"]) for line in lines)
     lines = [line for line in lines if seen[line["method"], line["seed"]] == len(names)]
     lines = sorted(lines, key=lambda x: (int(x["assembly"]), order.index(x["method"]), int(x["seed"] or 0)))

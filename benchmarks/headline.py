@@ -41,7 +41,8 @@ BLOCKS = {
     ROOT / "docs" / "index.md": ("pictures", "results/headline.md"),
 }
 """Pages with the sentence and the figure: where pictures are from there, and where all numbers are."""
-BEGIN, END = "<!-- written by benchmarks/headline.py -->", "<!-- until here -->"
+BEGIN = "<!-- written by benchmarks/headline.py -->"
+END = "<!-- until here -->"
 LEFT_OUT = ("reached", "thresholds")
 """Not kept of a row: the poses reached are most of its size, the thresholds are those of the scenario."""
 EARLIER = "*The two sections below are of an earlier run than the tables above.*"

@@ -81,7 +81,9 @@ def apart(heights: Sequence[float]) -> list[float]:
 
 def draw_outliers(axis: Any, look: Look) -> None:
     """Bars by noise and method, with their percentages."""
-    y, ticks, names = 0.0, [], []
+    y = 0.0
+    ticks = []
+    names = []
     for noise, title in NOISES.items():
         axis.text(0, y, title, va="center", fontweight="bold", fontsize=FONT - 1.5)
         y -= 1

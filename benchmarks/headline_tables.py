@@ -81,7 +81,8 @@ def differing(pairs: Sequence[Paired], methods: Sequence[str]) -> list[str]:
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for p in apart:
-        at, (low, high) = p.place, (100 * x for x in p.interval)
+        at = p.place
+        low, high = (100 * x for x in p.interval)
         lines.append(
             f"| {at.scenario} | {'careless' if at.careless else 'careful'} | {at.level:g} | {at.noise} | `{at.method}` "
             f"| {p.pairs} | {p.only_method} | {p.only_reference} "
@@ -104,7 +105,8 @@ def lasting(contact: Path, full: Path) -> list[str]:
         times = read_timing(folder)
         first = min(t["seed"] for t in times)
         some = [t for t in times if t["seed"] < first + 40]
-        seeds, minutes = len({t["seed"] for t in some}), sum(map(worked_s, some)) / 2 / 60
+        seeds = len({t["seed"] for t in some})
+        minutes = sum(map(worked_s, some)) / 2 / 60
         lines.append(f"| {name} | {seeds} | {len(some)} | {minutes:.1f} | {minutes * 40 / seeds:.0f} min |")
     return [*lines, ""]
 

@@ -109,7 +109,8 @@ def arrows_of(tree: Path) -> Mapping[str, set[str]]:
     arrows: dict[str, set[str]] = {room.split(".")[1]: set() for room in graph.find_children(PACKAGE)}
     for module in graph.modules:
         for imported in graph.find_modules_directly_imported_by(module):
-            a, b = (*module.split("."), "")[1], (*imported.split("."), "")[1]
+            a = (*module.split("."), "")[1]
+            b = (*imported.split("."), "")[1]
             if a and b and a != b:
                 arrows[a].add(b)
     return arrows

@@ -44,8 +44,10 @@ ALIKE = (0.0, 0.5, 0.9)
 SHAPES = tuple(product(("logistic", "lapses", "normal", "early", "late"), (2.0, 6.0)))
 """Of curves that have a half level, and their steepness; `early` ones leave the ceiling early, `late` ones late."""
 HERE = Path(__file__).parent
-TABLE, PAGE = HERE / "results" / "coverage.csv", HERE.parent / "docs" / "how" / "statistics.md"
-BEGIN, END = "<!-- tables: python benchmarks/intervals.py -->", "<!-- end of tables -->"
+TABLE = HERE / "results" / "coverage.csv"
+PAGE = HERE.parent / "docs" / "how" / "statistics.md"
+BEGIN = "<!-- tables: python benchmarks/intervals.py -->"
+END = "<!-- end of tables -->"
 
 
 class Setting(NamedTuple):
@@ -116,16 +118,19 @@ def area(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
 
 def area_difference(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
     """Against a reference that withstands less."""
-    p, q = falling(s.rate, 2.0), falling(s.rate, 2.0, s.other)
+    p = falling(s.rate, 2.0)
+    q = falling(s.rate, 2.0, s.other)
     ours, theirs = (np.round(right @ weights(LEVELS), 12) for right in drawn([p, q], s, count, rng))
-    apart, truth = ours - theirs, np.full(count, (p - q) @ weights(LEVELS))
+    apart = ours - theirs
+    truth = np.full(count, (p - q) @ weights(LEVELS))
     most = reach(apart, LEVELS)
     return surprise(apart, np.ones_like(apart), truth, -most, most) <= threshold(s.seeds)
 
 
 def half_level(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
     """The interval holds every half level whose surprise is below the threshold."""
-    (right,), found = drawn([shaped(s)], s, count, rng), []
+    (right,) = drawn([shaped(s)], s, count, rng)
+    found = []
     for part in np.array_split(right.astype(float), max(1, count // 100)):
         profiled = profile(np.log(LEVELS), part)
         found += [np.interp(np.log(middle(s)), profiled.log_half, surprising) for surprising in profiled.surprise]
@@ -133,7 +138,8 @@ def half_level(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def sure_bounds(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
-    (right,), level = drawn([shaped(s)], s, count, rng), middle(s)
+    (right,) = drawn([shaped(s)], s, count, rng)
+    level = middle(s)
     over, under = sure(right.sum(axis=1), np.full((count, len(LEVELS)), s.seeds))
     return (np.r_[0.0, LEVELS][over] <= level) & (level <= np.r_[LEVELS, np.inf][len(LEVELS) - under])
 
@@ -185,7 +191,8 @@ STUDIES = {
     "half level": half_level,
     "sure bounds": sure_bounds,
 }
-known_wilson, known_tango = cache(wilson), cache(tango)
+known_wilson = cache(wilson)
+known_tango = cache(tango)
 
 
 def main(workers: int = 2, experiments: int = 10_000) -> None:

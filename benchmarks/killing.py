@@ -31,14 +31,17 @@ FROM_THE_START = 0.2
 def main(kills: int, seed: int) -> int:
     rng = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory() as folder:
-        whole, part = Path(folder) / "whole", Path(folder) / "part"
+        whole = Path(folder) / "whole"
+        part = Path(folder) / "part"
         began = time.perf_counter()
         subprocess.run(command(whole, 2), check=True, capture_output=True)
         wanted = lines(whole)
         print(f"undisturbed: {len(wanted)} rows in {time.perf_counter() - began:.0f} s", flush=True)
         before: list[bytes] = []
         for kill in range(1, kills + 1):
-            workers, after_s, group = 1 + kill % 3, float(rng.uniform(0.0, LATEST_S)), bool(rng.integers(2))
+            workers = 1 + kill % 3
+            after_s = float(rng.uniform(0.0, LATEST_S))
+            group = bool(rng.integers(2))
             goal = len(before) + (rng.random() > FROM_THE_START)
             done = killed(command(part, workers), part, goal, after_s, group)
             now = lines(part)

@@ -36,19 +36,24 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.learned_noise import learn
 
 HERE = Path(__file__).parent
-KEPT, PAGE = HERE / "results" / "learned.json", HERE.parent / "docs" / "guide" / "noise.md"
-BEGIN, END = "<!-- table: python benchmarks/learned.py -->", "<!-- end of table -->"
+KEPT = HERE / "results" / "learned.json"
+PAGE = HERE.parent / "docs" / "guide" / "noise.md"
+BEGIN = "<!-- table: python benchmarks/learned.py -->"
+END = "<!-- end of table -->"
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
-LEARNED_FROM, TRIED = 50, 100
+LEARNED_FROM = 50
+TRIED = 100
 """Draws of each scenario."""
-OUTLIER_M, OUTLIER_RAD = 0.025, np.radians(30.0)
+OUTLIER_M = 0.025
+OUTLIER_RAD = np.radians(30.0)
 """No inlier of these cameras is so far off, or turned so far."""
 
 
 def _camera(
     outliers: float = 0.0, view: ViewNoise | None = None, constant: ConstantError | None = None
 ) -> MeasuredNoise:
-    shift, turn = Split(Tail(0.5), Tail(3.0), 50.0), Split(Tail(1.0), Tail(0.5), 30.0)
+    shift = Split(Tail(0.5), Tail(3.0), 50.0)
+    turn = Split(Tail(1.0), Tail(0.5), 30.0)
     return MeasuredNoise("a camera of this benchmark", shift, turn, 0.0, outliers, 1448.6, view, constant)
 
 
@@ -77,7 +82,8 @@ def seen_by(measured: MeasuredNoise, seeds: range) -> Iterator[tuple[Observation
             shown = Demonstration(scenario.assembly, layout.start, truth, layout.start, np.zeros((len(truth), 6, 6)))
             seen = Fitted(measured, Level(1.0, 1.0))(scenario.assembly, shown, rng)
             if measured.constant is not None:
-                P, c = measured.constant.frame, measured.constant.twist
+                P = measured.constant.frame
+                c = measured.constant.twist
                 seen = replace(seen, goals=P @ pose.exp(c) @ pose.inverse(P) @ seen.goals)
             yield seen, truth
 
@@ -92,7 +98,10 @@ def told(seen: Observation, noise: MeasuredNoise | None) -> Observation:
 
 def measured(draws: list[tuple[Observation, Array]], noise: MeasuredNoise | None) -> dict[str, Any]:
     """Root mean square errors of goals, alarms of the test at 1 %, and how often the 95 % region covers the truth."""
-    off, turned, p, covered = [], [], [], []
+    off = []
+    turned = []
+    p = []
+    covered = []
     for seen, truth in draws:
         given = told(seen, noise)
         made = correct(given, "contact")
@@ -130,7 +139,8 @@ def main() -> None:
 
 def _outlying(seen: Observation, truth: Array) -> bool:
     xi = pose.log(pose.inverse(truth) @ seen.goals)
-    far, turned = np.linalg.norm(xi[:, :3], axis=1), np.linalg.norm(xi[:, 3:], axis=1)
+    far = np.linalg.norm(xi[:, :3], axis=1)
+    turned = np.linalg.norm(xi[:, 3:], axis=1)
     return bool((far > OUTLIER_M).any() or (turned > OUTLIER_RAD).any())
 
 

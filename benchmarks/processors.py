@@ -86,7 +86,9 @@ def main() -> int:
     own = under({})
     if isinstance(own, str):
         sys.exit(f"the kernels of this processor are not known: {own}")
-    results, left_out, first = list[dict[str, Any]](), list[str](), None
+    results = list[dict[str, Any]]()
+    left_out = list[str]()
+    first = None
     for switch in (Switch("none", {}, own), *switches(own)):
         if isinstance(switch, str):
             print(switch)

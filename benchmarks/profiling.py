@@ -77,16 +77,22 @@ def main() -> None:
 def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
     """Shares of the processor time of replays of a few seeds: level 1, careless humans."""
     plans = [planned(scene, method, seed) for seed in SEEDS]
-    step, inverse = mujoco.mj_step, Kinematics.inverse
-    physics, kinematics, whole, passed = Clock(), Clock(), 0.0, 0.0
-    mujoco.mj_step, Kinematics.inverse = physics.around(step), kinematics.around(inverse)
+    step = mujoco.mj_step
+    inverse = Kinematics.inverse
+    physics = Clock()
+    kinematics = Clock()
+    whole = 0.0
+    passed = 0.0
+    mujoco.mj_step = physics.around(step)
+    Kinematics.inverse = kinematics.around(inverse)
     try:
         for each in plans:
             began = time.process_time()
             passed += replay(each, scene, fidelity=fidelity).sim_seconds
             whole += time.process_time() - began
     finally:
-        mujoco.mj_step, Kinematics.inverse = step, inverse
+        mujoco.mj_step = step
+        Kinematics.inverse = inverse
     return {
         "scenario": scene.scenario.name,
         "method": method,
@@ -111,7 +117,9 @@ def planned(scene: Scene, method: str, seed: int) -> Any:
 
 def profile(scene: Scene, lines: int = 15) -> list[str]:
     """The functions in which one replay at full fidelity spends most time themselves, under the profiler."""
-    todo, watch, told = planned(scene, "paper", 0), cProfile.Profile(), io.StringIO()
+    todo = planned(scene, "paper", 0)
+    watch = cProfile.Profile()
+    told = io.StringIO()
     watch.enable()
     replay(todo, scene)
     watch.disable()

@@ -40,9 +40,12 @@ LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LOW = 0.5
 """The level up to which there are most seeds."""
 HERE = Path(__file__).parent
-RESULTS, DOCS = HERE / "results", HERE.parent / "docs"
-PAGE, FIGURE = DOCS / "how" / "recognition.md", DOCS / "pictures" / "recognition.png"
-BEGIN, END = "<!-- table: python benchmarks/recognition.py -->", "<!-- end of table -->"
+RESULTS = HERE / "results"
+DOCS = HERE.parent / "docs"
+PAGE = DOCS / "how" / "recognition.md"
+FIGURE = DOCS / "pictures" / "recognition.png"
+BEGIN = "<!-- table: python benchmarks/recognition.py -->"
+END = "<!-- end of table -->"
 
 
 @cache
@@ -52,7 +55,8 @@ def scene(scenario: str) -> Scene:
 
 def rows_of(scenario: str, seed: int, wide: int, twice: int) -> list[dict[str, Any]]:
     """One row for each carelessness, level and way of recognising, as far as a sweep's row says it."""
-    made, here = [], scene(scenario)
+    made = []
+    here = scene(scenario)
     levels = LEVELS if seed < wide else tuple(level for level in LEVELS if level <= LOW)
     kinds = RECOGNISED[: 1 + (seed < wide) + (seed < twice)]
     for careless in (0.0, 1.0) if here.scenario.careless is not None and seed < wide else (0.0,):

@@ -28,9 +28,12 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.recognised_contacts import count_contacts, recognise_by
 
 HERE = Path(__file__).parent
-KEPT, PAGE = HERE / "results" / "recognition_static.json", HERE.parent / "docs" / "how" / "recognition.md"
-BEGIN, END = "<!-- table: python benchmarks/recognition_static.py -->", "<!-- end of static table -->"
-LEVELS, KINDS = (0.5, 1.0, 2.0, 4.0), ("recognised", "recognised-jointly")
+KEPT = HERE / "results" / "recognition_static.json"
+PAGE = HERE.parent / "docs" / "how" / "recognition.md"
+BEGIN = "<!-- table: python benchmarks/recognition_static.py -->"
+END = "<!-- end of static table -->"
+LEVELS = (0.5, 1.0, 2.0, 4.0)
+KINDS = ("recognised", "recognised-jointly")
 SURE = (0.0, 0.5, 0.9, 0.99, 1.01)
 """Sets are counted by how likely they say that they are, between these."""
 
@@ -50,7 +53,8 @@ def main(draws: int = 24) -> None:
 
 
 def seen(scenario: str, seed: int, level: float) -> Observation:
-    known, rng = load_scenario(scenario), np.random.default_rng([seed, 20])
+    known = load_scenario(scenario)
+    rng = np.random.default_rng([seed, 20])
     layout = draw_layout(known, rng, 0.0)
     still = np.zeros((len(layout.goals), 6, 6))
     play_m = 1e-3 * known.clearance_mm
@@ -119,7 +123,8 @@ def by_probability(rows: list[dict[str, Any]]) -> list[str]:
     for low, high in pairwise(SURE):
         here = [r for r in rows if r["probability"] is not None and low <= r["probability"] < high]
         if here:
-            share, mean = np.mean([right(r) for r in here]), np.mean([r["probability"] for r in here])
+            share = np.mean([right(r) for r in here])
+            mean = np.mean([r["probability"] for r in here])
             between = f"{100 * low:g} to {100 * min(high, 1.0):g} %"
             lines.append(f"| {between} | {len(here)} | {100 * share:.1f} % | {100 * mean:.1f} % |")
     return lines

@@ -99,12 +99,14 @@ def tracked(truth: Truth, errors: Errors, rng: np.random.Generator) -> tuple[Arr
 
 def _camera(rng: np.random.Generator) -> Array:
     """Obliquely from above, from any side, looking at the workspace."""
-    turn, up = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.5, 1.1)
+    turn = rng.uniform(0.0, 2.0 * np.pi)
+    up = rng.uniform(0.5, 1.1)
     z = -np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
     X = np.eye(4)
-    X[:3, :3], X[:3, 3] = np.column_stack([x, np.cross(z, x), z]), WORKSPACE_MIDDLE_M - rng.uniform(0.8, 1.2) * z
+    X[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    X[:3, 3] = WORKSPACE_MIDDLE_M - rng.uniform(0.8, 1.2) * z
     return X
 
 

@@ -133,7 +133,8 @@ def _ros_json(found: Mapping[str, Tracked], path: Path) -> None:
     lines = []
     for t, name, T in _rows(found):
         packed = pose.pack(T).tolist()
-        at, turn = dict(zip("xyz", packed[:3], strict=True)), dict(zip("wxyz", packed[3:], strict=True))
+        at = dict(zip("xyz", packed[:3], strict=True))
+        turn = dict(zip("wxyz", packed[3:], strict=True))
         message = {"header": _stamp(t), "pose": {"position": at, "orientation": turn}}
         lines.append(json.dumps({"topic": f"/tracker/{name}", "msg": message}))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -143,13 +144,16 @@ def _ros_tf(found: Mapping[str, Tracked], path: Path) -> None:
     messages = []
     for t, name, T in _rows(found):
         packed = pose.pack(T).tolist()
-        at, turn = dict(zip("xyz", packed[:3], strict=True)), dict(zip("wxyz", packed[3:], strict=True))
+        at = dict(zip("xyz", packed[:3], strict=True))
+        turn = dict(zip("wxyz", packed[3:], strict=True))
         transform = {"translation": at, "rotation": turn}
         messages.append({"transforms": [{"header": _stamp(t), "child_frame_id": name, "transform": transform}]})
     path.write_text(json.dumps(messages), encoding="utf-8")
 
 
-_MM, _M, _CM = 1e3, 1.0, 1e2
+_MM = 1e3
+_M = 1.0
+_CM = 1e2
 _WXYZ = _with(_MM, lambda R: R.as_quat(scalar_first=True))
 FORMS: Mapping[str, Form] = {
     "csv-wxyz": Form("csv", "log.csv", "", _csv("x_mm,y_mm,z_mm,qw,qx,qy,qz", _WXYZ)),

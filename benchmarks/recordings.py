@@ -81,7 +81,8 @@ def imported(truth: Truth, form: Form, errors: Errors, seed: int) -> Imported:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         path = write_recording(form, found, first_places(truth, found), folder, errors.stays or None)
-        camera, objects = read_camera(folder / "camera.toml"), read_objects(folder / "objects.toml")
+        camera = read_camera(folder / "camera.toml")
+        objects = read_objects(folder / "objects.toml")
         tracks = part_tracks(read_log(path, form.format, camera.conventions), objects)
     return import_recording(tracks, camera, truth.scene.scenario, Stated(), "log", objects.models)
 

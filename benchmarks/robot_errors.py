@@ -39,7 +39,8 @@ def main() -> None:
 
 def page(rows: Iterable[Row]) -> str:
     cells = [cell for cell in tally(rows) if cell.trials]
-    scenarios, methods = sorted({cell.scenario for cell in cells}), list(dict.fromkeys(cell.method for cell in cells))
+    scenarios = sorted({cell.scenario for cell in cells})
+    methods = list(dict.fromkeys(cell.method for cell in cells))
     errors = list(dict.fromkeys(cell.robot_error for cell in cells))
     errors.sort(key=_by_size)
     columns = [(method, scenario) for method in methods for scenario in scenarios]
@@ -58,7 +59,8 @@ def _line(error: str, columns: Sequence[tuple[str, str]], first: str, cells: Seq
     of = {(cell.method, cell.scenario): cell for cell in cells}
     said = [f"{of[at].successes} of {of[at].trials}" if at in of else "" for at in columns]
     own = [cell for cell in cells if cell.method == first]
-    trials, won = sum(cell.trials for cell in own), sum(cell.successes for cell in own)
+    trials = sum(cell.trials for cell in own)
+    won = sum(cell.successes for cell in own)
     low, high = wilson(won, trials)
     return f"| `{error}` | {' | '.join(said)} | {100 * won / trials:.0f} % ({100 * low:.0f} to {100 * high:.0f}) |"
 

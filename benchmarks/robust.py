@@ -23,7 +23,8 @@ from apo_bench.statistics.rates import wilson
 from benchmarks.asked import ROBUST, block
 
 ROOT = Path(__file__).parents[1]
-KEPT, PAGE = ROOT / "benchmarks" / "results" / "robust.csv", ROOT / "docs" / "results" / "robust.md"
+KEPT = ROOT / "benchmarks" / "results" / "robust.csv"
+PAGE = ROOT / "docs" / "results" / "robust.md"
 NAMES = {
     "benchmarks/gross.toml": "24 % gross outliers, 1 mm and 1 degree",
     "outliers": "10 % ten times as bad, 2 % missed",
@@ -135,7 +136,8 @@ def difference(noise: str, rows: Iterable[Row]) -> str:
     pairs = [
         (end["contact"], end["contact-robust"]) for end in ends.values() if {"contact", "contact-robust"} <= set(end)
     ]
-    won, lost = sum(b and not a for a, b in pairs), sum(a and not b for a, b in pairs)
+    won = sum(b and not a for a, b in pairs)
+    lost = sum(a and not b for a, b in pairs)
     low, high = tango(won, lost, len(pairs))
     plain, robust = (sum(pair[i] for pair in pairs) for i in (0, 1))
     said = f"{100 * (won - lost) / len(pairs):+.1f} points ({100 * low:+.1f} to {100 * high:+.1f})"

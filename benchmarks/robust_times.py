@@ -33,7 +33,9 @@ from benchmarks.corrector_bench.problems import lined_up
 
 HERE = Path(__file__).resolve().parent
 TASKS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
-OPERATIONS, OUTLIERS, PLAY_M = 10, 3, 0.25e-3
+OPERATIONS = 10
+OUTLIERS = 3
+PLAY_M = 0.25e-3
 SEED = 17
 
 
@@ -55,7 +57,8 @@ def row(draws: int) -> Iterator[Observation]:
     assembly = replace(whole, operations=whole.operations[:OPERATIONS])
     start = {part: pose.at([0.4 * i, -1.0, 0.0]) for i, part in enumerate(assembly.solids)} | {"table": np.eye(4)}
     sigma = np.repeat([1e-3, np.radians(1.0)], 3)
-    covariance, seen = np.tile(np.diag(sigma**2), (OPERATIONS, 1, 1)), np.ones(OPERATIONS, dtype=np.bool_)
+    covariance = np.tile(np.diag(sigma**2), (OPERATIONS, 1, 1))
+    seen = np.ones(OPERATIONS, dtype=np.bool_)
     for i in range(4 * (draws + 1)):
         rng = np.random.default_rng([SEED, i])
         goals = truth[:OPERATIONS] @ pose.exp(sigma * rng.standard_normal((OPERATIONS, 6)))

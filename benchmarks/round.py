@@ -24,7 +24,8 @@ from apo_bench.statistics.rates import wilson
 from benchmarks.asked import ROUND, block
 
 ROOT = Path(__file__).parents[1]
-KEPT, PAGE = ROOT / "benchmarks" / "results" / "round.csv", ROOT / "docs" / "results" / "round.md"
+KEPT = ROOT / "benchmarks" / "results" / "round.csv"
+PAGE = ROOT / "docs" / "results" / "round.md"
 METHODS = ("oracle", "none", "search", "by-heart", "snap", "snap+search", "paper", "contact")
 CHAINED = ("none", "search", "paper", "contact")
 """Methods of the table of one long chain."""
@@ -63,7 +64,8 @@ def main() -> None:
     asked.add_argument("folders", nargs="+", type=Path)
     asked.add_argument("--half", nargs="*", default=[], type=Path, help="sweeps with half the time step")
     given = asked.parse_args()
-    rows, half = judged(given.folders), judged(given.half)
+    rows = judged(given.folders)
+    half = judged(given.half)
     cells = {place: cell_of(each) for place, each in grouped(rows).items()}
     with KEPT.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

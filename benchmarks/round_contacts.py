@@ -32,7 +32,8 @@ from apo_bench.geometry.solid import Solid
 from apo_bench.parts.making import Step, bore, extrude, rectangle, solid_of, turned
 
 PAGE = Path(__file__).parent.parent / "docs" / "how" / "contact.md"
-BEGIN, END = "<!-- table: python benchmarks/round_contacts.py -->", "<!-- end of table -->"
+BEGIN = "<!-- table: python benchmarks/round_contacts.py -->"
+END = "<!-- end of table -->"
 DEVIATIONS = np.repeat([1e-3, np.radians(1.0)], 3)
 PLATE = pose.at((0.03, 0.02, 0.0), (0.0, 0.0, 25.0))
 TURN = (0.0, 0.0, 70.0)
@@ -62,7 +63,8 @@ def table(draws: int) -> str:
 def row(kind: str, draws: int) -> str:
     assembly, start, truth = scene(kind)
     assert largest_gap(assembly, start, truth) < 1e-9
-    rng, C = np.random.default_rng([17, list(KINDS).index(kind)]), np.tile(np.diag(DEVIATIONS**2), (2, 1, 1))
+    rng = np.random.default_rng([17, list(KINDS).index(kind)])
+    C = np.tile(np.diag(DEVIATIONS**2), (2, 1, 1))
     seen = []
     for _ in range(draws):
         goals = truth @ pose.inverse(pose.exp(rng.standard_normal((2, 6)) * DEVIATIONS))

@@ -34,11 +34,14 @@ def corrected(draws: int, out: str, plain: bool) -> None:
     from apo_bench.scenario.file import scenario_names
 
     every = [apo_bench.load_scenario(name) for name in sorted(scenario_names())]
-    goals, words = dict[str, Array](), list[str]()
+    goals = dict[str, Array]()
+    words = list[str]()
     for draw in range(draws):
-        of, (mm, degrees) = every[draw % len(every)], LEVELS[draw // len(every) % len(LEVELS)]
+        of = every[draw % len(every)]
+        mm, degrees = LEVELS[draw // len(every) % len(LEVELS)]
         method = METHODS[draw // (len(every) * len(LEVELS)) % len(METHODS)]
-        rng, n = np.random.default_rng([draw, 11]), len(of.assembly)
+        rng = np.random.default_rng([draw, 11])
+        n = len(of.assembly)
         sigma = np.repeat([1e-3 * mm, np.radians(degrees)], 3) * rng.uniform(0.5, 1.5, size=(n, 1))
         L = sigma[:, :, None] * (np.tril(rng.normal(scale=0.2, size=(n, 6, 6)), -1) + np.eye(6))
         seen = of.goals @ pose.exp((L @ rng.standard_normal((n, 6, 1)))[..., 0])
@@ -69,7 +72,8 @@ def main() -> None:
     if asked.out:
         corrected(asked.draws, asked.out, asked.plain)
         return
-    here, there = Path(__file__).resolve().parents[1], Path(asked.folder).resolve()
+    here = Path(__file__).resolve().parents[1]
+    there = Path(asked.folder).resolve()
     with tempfile.TemporaryDirectory() as folder:
         for name, package in (("before", there), ("now", here)):
             command = [sys.executable, __file__, "-", "--draws", str(asked.draws), "--out", f"{folder}/{name}.npz"]

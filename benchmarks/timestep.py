@@ -23,7 +23,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
 
-SCENARIOS, LEVELS = ("stick_in_tower", "stick_on_castles"), (0.05, 0.1, 0.2)
+SCENARIOS = ("stick_in_tower", "stick_on_castles")
+LEVELS = (0.05, 0.1, 0.2)
 STEPS = (0.001, 0.0005)
 RESULT = Path(__file__).parent / "results" / "timestep.json"
 

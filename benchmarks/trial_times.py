@@ -97,7 +97,8 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
         if name not in scenes:
             scenes[name] = build_scene(load_scenario(name))
             run_trial(settings, scenes[name])
-        began, worked = time.perf_counter(), time.process_time()
+        began = time.perf_counter()
+        worked = time.process_time()
         row = run_trial(settings, scenes[name])
         said = {
             "wall_s": time.perf_counter() - began,

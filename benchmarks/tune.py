@@ -35,7 +35,10 @@ from apo_bench.simulation.settling import settle
 from apo_bench.trial.pose_error import goal_errors
 from apo_bench.trial.stages import Recording, observe_recording, record_demonstration, replay_and_judge
 
-SCENARIOS, LEVELS, CARELESS, FIRST_SEED = ("stick_in_tower", "vanished_fixture"), (1.0, 2.0), 1.0, 100_000
+SCENARIOS = ("stick_in_tower", "vanished_fixture")
+LEVELS = (1.0, 2.0)
+CARELESS = 1.0
+FIRST_SEED = 100_000
 GRIDS: Mapping[str, tuple[Callable[..., Any], Mapping[str, tuple[float, ...]]]] = {
     "least-squares": (least_squares, {"contact_m": (1e-3, 3e-4, 1e-4, 1e-5, 1e-6)}),
     "penalty": (penalty, {"contact_m": (3e-4, 1e-4, 3e-5), "length": (0.05, 0.1, 0.2)}),
@@ -96,7 +99,8 @@ def _corrector(method: str, values: Values) -> Callable[..., Any]:
 
 
 def _replayed(scene: Scene, shown: Recording, level: float, seed: int, corrector: Callable[..., Any]) -> Replayed:
-    seen, truth = observe_recording(shown, make_noise("isotropic", Level(level, level)), seed), shown.layout.goals
+    seen = observe_recording(shown, make_noise("isotropic", Level(level, level)), seed)
+    truth = shown.layout.goals
     made = correct(seen, corrector)
     fixed_mm, free_mm = goal_errors(seen.assembly, seen.start, truth, made.goals)
     won = made.ok and replay_and_judge(Plan(seen.assembly, seen.start, made.goals), scene, truth).verdict.success

@@ -60,18 +60,22 @@ RIGHT_MM = 0.35
 OPPOSING = -0.9
 """Cosine between the normals of two faces that look at each other, at most."""
 HERE = Path(__file__).parent
-RESULTS, PAGE = HERE / "results" / "turned.json", HERE.parent / "docs" / "how" / "contact.md"
-BEGIN, END = "<!-- table: python benchmarks/turned.py -->", "<!-- end of table -->"
+RESULTS = HERE / "results" / "turned.json"
+PAGE = HERE.parent / "docs" / "how" / "contact.md"
+BEGIN = "<!-- table: python benchmarks/turned.py -->"
+END = "<!-- end of table -->"
 
 
 def turned(scenario: Scenario, rng: np.random.Generator) -> tuple[Layout, Observation]:
     """A layout, and what was seen of it with one operation turned."""
-    layout, n = draw_layout(scenario, rng), len(scenario.assembly)
+    layout = draw_layout(scenario, rng)
+    n = len(scenario.assembly)
     human = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
     seen = make_noise("isotropic", Level(LEVEL, LEVEL))(scenario.assembly, human, rng)
     axis = rng.standard_normal(3) if (a := int(rng.integers(4))) == 3 else np.eye(3)[a]
     way = np.radians(rng.choice(TURNS)) * axis / np.linalg.norm(axis)
-    goals, k = np.array(seen.goals), int(rng.integers(n))
+    goals = np.array(seen.goals)
+    k = int(rng.integers(n))
     goals[k] = goals[k] @ pose.exp(np.concatenate([np.zeros(3), way]))
     return layout, Observation(scenario.assembly, layout.start, goals, seen.covariance, seen.seen)
 
@@ -103,9 +107,11 @@ def count(draws: int, correctors: tuple[str, ...]) -> dict[str, dict[str, int]]:
     found = {name: dict.fromkeys(("draws", "converged", "right", "same way"), 0) for name in correctors}
     names = of_boxes()
     for i in range(draws):
-        scenario, name = scenario_of(names[i % len(names)]), correctors[i // len(names) % len(correctors)]
+        scenario = scenario_of(names[i % len(names)])
+        name = correctors[i // len(names) % len(correctors)]
         layout, seen = turned(scenario, np.random.default_rng([SEED, i]))
-        made, row = correct(seen, name), found[name]
+        made = correct(seen, name)
+        row = found[name]
         row["draws"] += 1
         if made.ok:
             row["converged"] += 1

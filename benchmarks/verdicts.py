@@ -103,7 +103,8 @@ def compared(row: Row) -> Compared:
     pushed = conditions.get("pushed", False) if scenario.success_means == "as_demonstrated" else moved > limit
     wide = None if conditions.get("gap", True) else too_wide(scenario, row)
     before = conditions | {"pushed": pushed, "gap": conditions.get("gap", False) or wide is not None}
-    old, new = not any(before.values()), bool(row["success"])
+    old = not any(before.values())
+    new = bool(row["success"])
     if old == new:
         return Compared(row, old, new, "")
     if old:
@@ -146,9 +147,11 @@ def truth(scenario: str, seed: int, salt: Any, clearance_mm: float) -> Layout:
 @lru_cache(maxsize=4096)
 def wide_contacts(name: str, seed: int, salt: Any, clearance_mm: float, margin_mm: float) -> tuple[Wide, ...]:
     """The contacts that stand at the end and that the play of all faces together lets farther apart."""
-    assembly, layout = load_scenario(name).assembly, truth(name, seed, salt, clearance_mm)
+    assembly = load_scenario(name).assembly
+    layout = truth(name, seed, salt, clearance_mm)
     history = placements(assembly, layout.start, layout.goals)
-    away, found = fixtures(assembly), []
+    away = fixtures(assembly)
+    found = []
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
             play = joint_play_mm(assembly, contact, made, history[made], clearance_mm)
@@ -160,7 +163,8 @@ def wide_contacts(name: str, seed: int, salt: Any, clearance_mm: float, margin_m
 def off_mm(scenario: Scenario, contact: Contact, poses: Mapping[str, Array]) -> float:
     """The largest distance of a corner of the overlap of two flat faces from the plane of the first, [mm]."""
     m, e = contact
-    face, T = scenario.assembly.face(m), poses[m.part]
+    face = scenario.assembly.face(m)
+    T = poses[m.part]
     corners = overlap(face, T, scenario.assembly.face(e), poses[e.part]).corners
     return 1e3 * float(np.abs((corners - T[:3, 3]) @ T[:3, :3] @ face.plane[:3] + face.plane[3]).max(initial=0.0))
 
@@ -194,7 +198,8 @@ def counted(found: Sequence[Compared]) -> Counts:
 
 
 def page(found: Sequence[Compared]) -> list[str]:
-    every, changed = cells(found), [each for each in found if each.why]
+    every = cells(found)
+    changed = [each for each in found if each.why]
     seeds = [each.row["seed"] for each in found]
     whole = counted(found)
     apart = {cell: n for cell, n in every.items() if n.pushed or n.gap or n.refused}

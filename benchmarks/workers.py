@@ -67,7 +67,8 @@ def main() -> None:
 def rows_per_second(way: str, trials: int) -> float:
     """Of trials at fidelity contact, from the second seed on."""
     grid = SweepSettings(SCENARIOS, (1.0,), (0.0, 1.0), ("none", "paper", "contact"), trials=trials, fidelity="contact")
-    loaded, arm = load_all([grid]), find_arm(grid.arm).files
+    loaded = load_all([grid])
+    arm = find_arm(grid.arm).files
     lock = environment_lock(names_of([grid]), loaded, arm)
     ended: list[tuple[float, int]] = []
 
@@ -104,9 +105,11 @@ def _by_threads(work: tuple[Unit, ...], lock: EnvironmentLock, emit: Emit, count
 
 def cold_start(arguments: tuple[str, ...], rounds: int) -> dict[str, float]:
     """The least wall time of a new interpreter, and the least time of the processor, [s]."""
-    walls, used = [], []
+    walls = []
+    used = []
     for _ in range(rounds):
-        began, before = time.perf_counter(), _used()
+        began = time.perf_counter()
+        before = _used()
         subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
         walls.append(time.perf_counter() - began)
         used.append(_used() - before)

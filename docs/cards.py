@@ -20,7 +20,9 @@ from benchmarks.baselines import kept
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "scenarios.md"
 PICTURE = "../pictures/graph_{}.png"
-JUDGE, FIRST, LAST = HERE / "how" / "judge.md", "<!-- by heart -->", "<!-- end of by heart -->"
+JUDGE = HERE / "how" / "judge.md"
+FIRST = "<!-- by heart -->"
+LAST = "<!-- end of by heart -->"
 """The page with what memory is worth, and the marks around that."""
 
 

@@ -29,7 +29,8 @@ from apo_bench.trial.stages import observe_recording, record_demonstration, repl
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 5
-SIZE, COLUMNS = (420, 360), 4
+SIZE = (420, 360)
+COLUMNS = 4
 
 
 class Moment(NamedTuple):
@@ -116,7 +117,8 @@ def _draw(name: str, strip: Strip) -> None:
     scene = build_scene(load_scenario(name))
     shown = record_demonstration(scene, 1.0, SEED)
     seen = observe_recording(shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
-    raw, corrected = apply_method("none", seen, None).plan, apply_method(strip.method, seen, None).plan
+    raw = apply_method("none", seen, None).plan
+    corrected = apply_method(strip.method, seen, None).plan
     assert raw is not None, "everything was seen"
     assert corrected is not None, f"{strip.method} corrects {name}"
     failed, right = (_watched(scene, each, shown.layout.goals) for each in (raw, corrected))
@@ -152,7 +154,8 @@ def _state(watched: tuple[ReplayResult, list[tuple[float, Array]]], moment: Mome
 
 def _camera(goals: Array) -> SceneCamera:
     """Looks at the middle of all places where something is put, across the assembly, from the side off the arm."""
-    low, high = goals[:, :3, 3].min(axis=0), goals[:, :3, 3].max(axis=0)
+    low = goals[:, :3, 3].min(axis=0)
+    high = goals[:, :3, 3].max(axis=0)
     turn = float(np.degrees(np.arctan2(goals[0][1, 0], goals[0][0, 0])))
     far = 0.42 + 0.7 * float(np.linalg.norm(high - low))
     return camera_view(np.array([*(low + high)[:2] / 2, 0.06]), far, turn + 225.0, -24.0)

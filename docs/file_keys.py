@@ -237,7 +237,8 @@ def page() -> str:
     }
     lines = [HEAD]
     for file, tables in MEANINGS.items():
-        said, known = {t: set(keys) for t, keys in tables.items()}, {t: set(k[1]) for t, k in found[file].items()}
+        said = {t: set(keys) for t, keys in tables.items()}
+        known = {t: set(k[1]) for t, k in found[file].items()}
         if said != known:
             raise ValueError(f"docs/file_keys.py, {file}: {said} is explained, {known} is read.")
         lines += ["", f"## {file}"]
@@ -267,7 +268,8 @@ def noise_keys() -> Keys:
         for path in presets().values():
             measured, _ = read_noise(path)
         with tempfile.TemporaryDirectory() as folder:
-            own, still = Path(folder) / "own.toml", ConstantError(np.zeros(6), np.eye(4))
+            own = Path(folder) / "own.toml"
+            still = ConstantError(np.zeros(6), np.eye(4))
             own.write_text(noise_text(replace(measured, view=ViewNoise(1.0, 1.0), constant=still)), encoding="utf-8")
             read_noise(own)
     return named(heard, lambda key: key)

@@ -18,7 +18,9 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import record_demonstration
 
 SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
-SIZE, COLUMNS, SEED = (600, 500), 5, 0
+SIZE = (600, 500)
+COLUMNS = 5
+SEED = 0
 AZIMUTH_DEG = {"wedge_under_roof": -35.0}
 """From where it is looked at, if not from the usual side."""
 

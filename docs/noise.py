@@ -60,8 +60,12 @@ does not explain the correction. All relations are right, so that is a false ala
 
 def row(name: str) -> str:
     """What `contact` makes of one model, as a line of the table."""
-    shown, noise = nominal_demonstration(), make_noise(name, LEVEL)
-    whole, fails, seen_off, off = 0, 0, [], []
+    shown = nominal_demonstration()
+    noise = make_noise(name, LEVEL)
+    whole = 0
+    fails = 0
+    seen_off = []
+    off = []
     for seed in range(TRIALS):
         seen = observe(shown, noise, np.random.default_rng([seed, 2]))
         made = correct(seen, "contact")

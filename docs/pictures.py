@@ -22,7 +22,8 @@ from apo_bench.trial.stages import observe_recording, record_demonstration
 from apo_bench.trial.story import Story
 
 HERE = Path(__file__).parent / "pictures"
-SEED, LEVEL = 7, 2.0
+SEED = 7
+LEVEL = 2.0
 
 
 def main() -> None:

@@ -28,20 +28,26 @@ from apo_bench.simulation.scene.render import camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import replay_and_judge
 
-ARM, GRIPPER = "ur5e_primitive", "arm/gripper/base"
-SIZE, CLOSE = (1560, 1120), (760, 760)
+ARM = "ur5e_primitive"
+GRIPPER = "arm/gripper/base"
+SIZE = (1560, 1120)
+CLOSE = (760, 760)
 """Width and height of the whole and of the inset [px]."""
-WIDE_DEG, NARROW_DEG = 38.0, 9.0
+WIDE_DEG = 38.0
+NARROW_DEG = 9.0
 """Vertical angle of view of the two."""
 HALF_M = 0.03
 """Of a castle, along the hole."""
-HOLE_M, NEAR_M, HELD_M = 0.04, 0.01, 0.3
+HOLE_M = 0.04
+NEAR_M = 0.01
+HELD_M = 0.3
 """Height of the hole above the table, how near the stick is to its axis while it goes in, and to the gripper."""
 INSET = (0.645, 0.475, 0.35, 0.515)
 """In the whole: left, bottom, width, height, as shares."""
 BOX = 68
 """Half of the frame about the tower [px]."""
-JAMS, FITS = "#d7263d", "#2a9d4a"
+JAMS = "#d7263d"
+FITS = "#2a9d4a"
 
 
 class View(NamedTuple):
@@ -61,7 +67,8 @@ class View(NamedTuple):
         right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.cos(el)
         off = points - (self.at - self.distance_m * ahead)
         scale = self.size[1] / 2 / np.tan(np.radians(self.fovy_deg / 2)) / (off @ ahead)
-        x, y = off @ right * scale, off @ np.cross(right, ahead) * scale
+        x = off @ right * scale
+        y = off @ np.cross(right, ahead) * scale
         return np.stack([self.size[0] / 2 + x, self.size[1] / 2 - y], axis=1)
 
 
@@ -83,7 +90,8 @@ class Shot(NamedTuple):
 
 def shot(scene: Scene, plan: Plan, reference: Array, title: str, said: str, color: str) -> Shot:
     """The state of a replay at which the stick is as far in as it comes."""
-    model, data = scene.work.model, mujoco.MjData(scene.work.model)
+    model = scene.work.model
+    data = mujoco.MjData(scene.work.model)
     data.qpos[:] = state = deepest(scene, plan, reference)
     mujoco.mj_forward(model, data)
     along = reference[0][:3, 0]
@@ -113,8 +121,10 @@ def shot(scene: Scene, plan: Plan, reference: Array, title: str, said: str, colo
 def deepest(scene: Scene, plan: Plan, reference: Array) -> Array:
     """The state of the replay at which the stick, still in the gripper, is as far in as it comes."""
     model = scene.work.model
-    stick, gripper = model.body("stick/").id, model.body(GRIPPER).id
-    along, across = reference[0][:3, 0], reference[0][:3, 1]
+    stick = model.body("stick/").id
+    gripper = model.body(GRIPPER).id
+    along = reference[0][:3, 0]
+    across = reference[0][:3, 1]
     hole = reference[0][:3, 3] + [0.0, 0.0, HOLE_M]
     best: list[tuple[float, Array]] = []
 
@@ -151,7 +161,8 @@ def photo(scene: Scene, state: Array, view: View, hidden: tuple[str, ...] = ()) 
     for geom in range(model.ngeom):
         if hidden and model.body(model.geom_bodyid[geom]).name.startswith(hidden):
             model.geom_rgba[geom, 3] = 0.0
-    model.vis.global_.fovy, model.vis.headlight.ambient[:] = view.fovy_deg, 0.45 if hidden else 0.25
+    model.vis.global_.fovy = view.fovy_deg
+    model.vis.headlight.ambient[:] = 0.45 if hidden else 0.25
     model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
     camera = camera_view(view.at, view.distance_m, view.azimuth_deg, view.elevation_deg)
     image = picture_with_arm(scene, scene.scenario.start, state, *view.size, camera)

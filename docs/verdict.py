@@ -26,9 +26,14 @@ from tests.end_states import reached, verdict
 from tests.judging import test_verdict as first
 
 HERE = Path(__file__).parent
-PAGE, BEGIN = HERE / "results" / "audit.md", "<!-- written by docs/verdict.py -->"
-WIDTH, HEIGHT, QUALITY = 480, 320, 80
-NEAREST_M, AZIMUTH_DEG, ELEVATION_DEG = 0.28, -75.0, -28.0
+PAGE = HERE / "results" / "audit.md"
+BEGIN = "<!-- written by docs/verdict.py -->"
+WIDTH = 480
+HEIGHT = 320
+QUALITY = 80
+NEAREST_M = 0.28
+AZIMUTH_DEG = -75.0
+ELEVATION_DEG = -28.0
 DOUBTFUL = {
     "bridge, A lies along the seam, turned by 80 degrees": "bridge_cycle",
     "bridge, turned by 60 degrees": "bridge_cycle",
@@ -157,7 +162,8 @@ def draw(state: audited.Seen, scenario: str, path: Path) -> None:
 def camera(poses: Mapping[str, Array], away: Collection[str]) -> SceneCamera:
     """One that sees all but the table and what was put away."""
     at = np.array([T[:3, 3] for part, T in poses.items() if part not in ("table", *away)])
-    low, high = at.min(axis=0), at.max(axis=0)
+    low = at.min(axis=0)
+    high = at.max(axis=0)
     return camera_view(
         (low + high) / 2, NEAREST_M + 0.9 * float(np.linalg.norm(high - low)), AZIMUTH_DEG, ELEVATION_DEG
     )

@@ -58,7 +58,8 @@ def altered(folder: Path, copied: Path, rng: np.random.Generator) -> str:
 
 def of_bytes(text: bytes, rng: np.random.Generator) -> bytes:
     """Some bytes are lost, changed, added or there twice."""
-    at, many = int(rng.integers(len(text) + 1)), int(rng.integers(1, 9))
+    at = int(rng.integers(len(text) + 1))
+    many = int(rng.integers(1, 9))
     noise = rng.bytes(many)
     ways = (
         text[:at] + text[at + many :],

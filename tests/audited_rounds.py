@@ -148,7 +148,8 @@ CONES = [
 """Cones in their seats, and on the rim of a hole."""
 
 SLOPE = np.radians(30.0)
-DOWN, OUT = np.array([0.0, -np.cos(SLOPE), -np.sin(SLOPE)]), np.array([0.0, -np.sin(SLOPE), np.cos(SLOPE)])
+DOWN = np.array([0.0, -np.cos(SLOPE), -np.sin(SLOPE)])
+OUT = np.array([0.0, -np.sin(SLOPE), np.cos(SLOPE)])
 MIDDLE = mm(0, 0, 10 + 30 * np.tan(SLOPE))
 ABOUT = MIDDLE @ pose.exp([0, 0, 0, *np.radians(3.0) * OUT]) @ pose.inverse(MIDDLE)
 TOP = 20.0 + 60.0 * np.tan(SLOPE)

@@ -116,10 +116,15 @@ def at_edge(share: float) -> np.ndarray:
     return mm(700 + 30 - 60 * share, 0, 0)
 
 
-HALF_X, HALF_Y, HALF_Z = (180, 0, 0), (0, 180, 0), (0, 0, 180)
-QUARTER_X, QUARTER_Y, QUARTER_Z = (90, 0, 0), (0, 90, 0), (0, 0, 90)
+HALF_X = (180, 0, 0)
+HALF_Y = (0, 180, 0)
+HALF_Z = (0, 0, 180)
+QUARTER_X = (90, 0, 0)
+QUARTER_Y = (0, 90, 0)
+QUARTER_Z = (0, 0, 90)
 GROUP = ("cube2", "cube3", "stick")
-IN_A, IN_B = mm(-60, 150, 19), mm(60, 150, 19)
+IN_A = mm(-60, 150, 19)
+IN_B = mm(60, 150, 19)
 
 TURNED = [
     Seen("tower, the stick turned by a quarter about its length", TOWER, [shift("stick", 3, 0, 0, 0, QUARTER_X)], True),

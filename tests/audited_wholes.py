@@ -10,7 +10,8 @@ from tests.audited_states import HALF_Z, QUARTER_X, Seen, kept, used_later
 from tests.end_states import BRIDGE, CARRIED, CASTLES, END, FIXTURE, POCKETS, TOWER, moved, put, shift
 from tests.scenes import mm
 
-UPPER, TWO = ("castle2", "stick"), ("cube2", "cube3", "stick")
+UPPER = ("castle2", "stick")
+TWO = ("cube2", "cube3", "stick")
 
 WHOLES = [
     Seen("tower, all of it nudged by 40 mm at the end", TOWER, [moved(END, mm(40, 0, 0))], True),

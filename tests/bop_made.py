@@ -48,7 +48,8 @@ def draw(n: int, known: Known, rng: np.random.Generator, objects: int = 5) -> Ma
     where = np.stack([np.ones(n, dtype=int), index // objects, 1 + index % objects], axis=1)
     t = np.column_stack([rng.uniform(-200, 200, n), rng.uniform(-200, 200, n), rng.uniform(600, 1500, n)])
     R = Rotation.from_quat(rng.standard_normal((n, 4))).as_matrix()
-    shift, turn = _limited(n, known.shift, 50.0, rng), _limited(n, known.turn, 30.0, rng)
+    shift = _limited(n, known.shift, 50.0, rng)
+    turn = _limited(n, known.turn, 30.0, rng)
     gross = rng.random(n) < known.outliers
     direction = rng.standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

@@ -19,7 +19,8 @@ Z = np.array([0.0, 0.0, 1.0])
 
 def pins() -> Solid:
     """A base of 100 x 40 x 10 mm with two pins of 8 mm that are 30 mm high and end in chamfers; frame: its bottom."""
-    found, walls = [Box("base", 0.005 * Z, np.array([0.05, 0.02, 0.005]))], {}
+    found = [Box("base", 0.005 * Z, np.array([0.05, 0.02, 0.005]))]
+    walls = {}
     for name, x in (("a", -0.03), ("b", 0.03)):
         at = np.array([x, 0.0, 0.0])
         walls[f"{name}_pin"] = RoundFace(f"{name}_pin", at, Z, (0.01, 0.039), (0.004, 0.004), False)

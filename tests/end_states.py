@@ -105,6 +105,10 @@ def snapshot(state: Mapping) -> Snapshot:
     return Snapshot(poses, **{name: state.get(name, value) for name, value in FIELDS.items()})
 
 
-TOWER, CASTLES, FIXTURE = scenes.stick_in_tower, scenes.stick_on_castles, scenes.fixture
+TOWER = scenes.stick_in_tower
+CASTLES = scenes.stick_on_castles
+FIXTURE = scenes.fixture
 ALIGNED = scenes.fixture_alignment
-CARRIED, POCKETS, BRIDGE = scenes.subassembly_on_castles, scenes.pockets, scenes.bridge
+CARRIED = scenes.subassembly_on_castles
+POCKETS = scenes.pockets
+BRIDGE = scenes.bridge

@@ -14,7 +14,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 
 RATE_HZ = 30.0
-_MOVE_S, _REST_S = 1.0, 0.8
+_MOVE_S = 1.0
+_REST_S = 0.8
 CAMERA = pose.at((0.9, -0.2, 0.8), (-130.0, 20.0, 60.0))
 """T_world_camera."""
 

@@ -91,7 +91,8 @@ def table() -> Solid:
 def tilted(at: tuple[float, float, float], turn: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     """A pose, mm and degrees."""
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = Rotation.from_euler("xyz", turn, degrees=True).as_matrix(), np.array(at) * MM
+    T[:3, :3] = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
+    T[:3, 3] = np.array(at) * MM
     return T
 
 

@@ -78,7 +78,8 @@ def peg(name: str = "peg", radius: float = 5.0, length: float = 50.0) -> Solid:
 
 def bored(radius: float, outer: float, height: float, *, wide: bool = False) -> list[Hull]:
     """Wedges about a hole of a radius, to a circle or a square around it, [mm]."""
-    k, found = radius / np.cos(np.pi / SIDES), []
+    k = radius / np.cos(np.pi / SIDES)
+    found = []
     for i in range(SIDES):
         turn = 2.0 * np.pi * np.array([i, i + 1]) / SIDES
         way = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -107,9 +108,11 @@ def plate(
 
 def sides(half: float, height: float) -> list[Face]:
     """px, nx, py and ny of a square column."""
-    bottom, found = square(half, 0), []
+    bottom = square(half, 0)
+    found = []
     for i, name in enumerate(("ny", "px", "py", "nx")):
-        a, b = bottom[i], bottom[(i + 1) % 4]
+        a = bottom[i]
+        b = bottom[(i + 1) % 4]
         lift = np.array([0.0, 0.0, 1e-3 * height])
         found.append(Face(name, np.array([a, b, b + lift, a + lift])))
     return found
@@ -154,7 +157,8 @@ def countersunk(name: str = "plate") -> Solid:
     for i in range(SIDES):
         turn = 2.0 * np.pi * np.array([i, i + 1]) / SIDES
         way = np.column_stack([np.cos(turn), np.sin(turn)])
-        far, k = 30 * way / np.abs(way).max(axis=1)[:, None], 1.0 / np.cos(np.pi / SIDES)
+        far = 30 * way / np.abs(way).max(axis=1)[:, None]
+        k = 1.0 / np.cos(np.pi / SIDES)
         levels = [(3 * k * way, 0), (far, 0), (3 * k * way, 14), (far, 14)]
         above = [(3 * k * way, 14), (far, 14), (9 * k * way, 20), (far, 20)]
         for tail, rows in (("low", levels), ("high", above)):
@@ -165,7 +169,8 @@ def countersunk(name: str = "plate") -> Solid:
 
 def prism(name: str, profile: Sequence[tuple[float, float]], length: float) -> tuple[Hull, list[Face]]:
     """A convex profile (y, z) [mm], counter-clockwise seen from +x, along x; faces `s0`, `s1`, .. and `px`, `nx`."""
-    flat, x = np.array(profile, dtype=np.float64), length / 2
+    flat = np.array(profile, dtype=np.float64)
+    x = length / 2
     near, far = (1e-3 * np.column_stack([np.full(len(flat), end), flat]) for end in (-x, x))
     faces = [Face("px", far), Face("nx", near[::-1])]
     for i in range(len(flat)):
@@ -182,7 +187,8 @@ def wedge(name: str = "wedge", angle_deg: float = 30.0) -> Solid:
     rise = 60.0 * np.tan(np.radians(angle_deg))
     piece, faces = prism("wedge", [(-30, 0), (30, 0), (30, 10 + rise), (-30, 10)], 60)
     names = {"s0": "bottom", "s1": "py", "s2": "slope", "s3": "ny"}
-    area, moment = 60 * (10 + rise / 2), 60 * 10 * 5 + 30 * rise * (10 + rise / 3)
+    area = 60 * (10 + rise / 2)
+    moment = 60 * 10 * 5 + 30 * rise * (10 + rise / 3)
     named = [Face(names.get(face.name, face.name), face.outline) for face in faces]
     built = solid(name, named, [piece], moment / area, 60 * area)
     center = np.array([0.0, 1e-3 * (30 * rise * 10) / area, 1e-3 * moment / area])
@@ -221,7 +227,8 @@ def rail(name: str = "rail") -> Solid:
 def slider(name: str = "slider", angle_deg: float = 60.0) -> Solid:
     """What goes over the rail: two cheeks that lean inwards and a roof; its bottom is 5 mm above the base."""
     lean = 1.0 / np.tan(np.radians(angle_deg))
-    low, high = 10 + 5 * lean, 10 + 20 * lean
+    low = 10 + 5 * lean
+    high = 10 + 20 * lean
     cheek_r, right = prism("cheek_r", [(low, 15), (40, 15), (40, 30), (high, 30)], 60)
     cheek_l, left = prism("cheek_l", [(-40, 15), (-low, 15), (-high, 30), (-40, 30)], 60)
     roof, cover = prism("roof", [(-40, 30), (40, 30), (40, 40), (-40, 40)], 60)
@@ -348,7 +355,8 @@ def as_scenario(of: Scene, **changes: object) -> Scenario:
         low, _ = world_bounds([(of.assembly.solids[part], T)])
         T[:3, 3] += (0.2 * i - 0.5, 0.45, -low[2]) - T[:3, 3] * (1, 1, 0)
         start[part] = T
-    n, given = len(of.assembly), load_scenario("stick_on_castles")
+    n = len(of.assembly)
+    given = load_scenario("stick_on_castles")
     values = {field.name: getattr(given, field.name) for field in fields(Scenario)}
     values |= {
         "assembly": of.assembly,

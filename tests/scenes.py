@@ -23,7 +23,9 @@ def wall(name: str, axis: str, at: float, low: Sequence[float], high: Sequence[f
     j, k = (c for c in range(3) if c != i)
     square = np.array([(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])])
     corners = np.empty((4, 3))
-    corners[:, i], corners[:, j], corners[:, k] = at, square[:, 0], square[:, 1]
+    corners[:, i] = at
+    corners[:, j] = square[:, 0]
+    corners[:, k] = square[:, 1]
     face = Face(name, corners * 1e-3, fit=fit)
     outwards = (axis[0] == "+") == (face.normal[i] > 0)
     return face if outwards else Face(name, corners[::-1] * 1e-3, fit=fit)
@@ -107,7 +109,8 @@ def table(name: str = "table") -> Solid:
 
 def table_with_pockets(name: str = "table") -> Solid:
     """Pockets A and B, 50 x 50 and 6 deep, at x = -60 and 60, y = 150; faces only, the slab is not cut."""
-    faces, holes = [], []
+    faces = []
+    holes = []
     for pocket, x in (("A", -60.0), ("B", 60.0)):
         faces += [
             wall(f"{pocket}_fl", "+z", -6, (x - 25, 125), (x + 25, 175)),
@@ -266,7 +269,8 @@ def careless(name: str, mm: float, low_mm: float = 0.0) -> tuple[Scene, Array]:
         mm: How far aside: operation 2 along y, in example 5.3 with castle 2 against the cube, in Fig. 6 along x.
         low_mm: How far a stick sinks in its slot or hole, the clearance, before it is seen.
     """
-    built, goals = ALL[name](), ALL[name]().goals.copy()
+    built = ALL[name]()
+    goals = ALL[name]().goals.copy()
     goals[[1, 2] if name == "fixture" else [1], 0 if name == "pockets" else 1, 3] += mm * 1e-3
     lying = {"stick_in_tower": [2], "subassembly_on_castles": [3], "fixture": [4], "pockets": [4]}[name]
     goals[lying, 2, 3] -= low_mm * 1e-3

@@ -63,7 +63,8 @@ class Equations:
 
     def among(self, contacts: NDArray[np.bool_]) -> Equations:
         """The equations of these contacts, (c,), alone."""
-        rows, number = contacts[self.contact], np.cumsum(contacts) - 1
+        rows = contacts[self.contact]
+        number = np.cumsum(contacts) - 1
         return Equations(
             start=self.start,
             letters=self.letters[contacts],
@@ -90,14 +91,19 @@ class Equations:
         A letter T in n .. T .. v turns n (everything up to T) = (a, .) and (everything behind T) v = p, so its rows
         are +(a, p x a); T^-1 stays on the side of v, and its rows are -(a, p x a). A T that occurs twice adds up.
         """
-        m, n, w = len(self), len(goals), self.letters.shape[1]
+        m = len(self)
+        n = len(goals)
+        w = self.letters.shape[1]
         F = self._matrices(goals)
-        points, forms = np.array(self._points(F)), np.array(self._forms(F))
+        points = np.array(self._points(F))
+        forms = np.array(self._forms(F))
         inverse = self.inverse[self.contact].T
         side = np.arange(w)[:, None] + ~inverse, np.arange(m)
-        a, p = forms[side][..., :3].reshape(-1, 3), points[side][..., :3].reshape(-1, 3)
+        a = forms[side][..., :3].reshape(-1, 3)
+        p = points[side][..., :3].reshape(-1, 3)
         rows = np.concatenate([a, _cross(p, a)], axis=1).reshape(w, m, 6) * np.where(inverse, -1.0, 1.0)[..., None]
-        J, columns = np.zeros((m, n + 1, 6)), self._columns(n)[self.contact]
+        J = np.zeros((m, n + 1, 6))
+        columns = self._columns(n)[self.contact]
         for j in range(w):
             J[np.arange(m), columns[:, j]] += rows[j]
         return np.einsum("mi,mi->m", self.plane, points[0]), J[:, :n].reshape(m, 6 * n)
@@ -141,7 +147,8 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
     """
     known = pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
-    stack, vertex = np.concatenate([constants, goals]), np.array(known.corners)
+    stack = np.concatenate([constants, goals])
+    vertex = np.array(known.corners)
     for c in np.flatnonzero(known.laid):
         rows = slice(known.begin[c], known.begin[c + 1])
         corners = pose.apply(pose.inverse(product(known.words[c], stack)), vertex[rows, :3])
@@ -188,7 +195,8 @@ def pattern(assembly: Assembly) -> Pattern:
         return pattern(low)
     parts = tuple(assembly.solids)
     chosen = _words(assembly, parts)
-    c, width = len(chosen), max((len(word) for _, _, word in chosen), default=0)
+    c = len(chosen)
+    width = max((len(word) for _, _, word in chosen), default=0)
     padding = (len(parts) + len(assembly), False)
     padded = [[*word, *[padding] * (width - len(word))] for _, _, word in chosen]
     table = np.array(padded, dtype=np.intp).reshape(c, width, 2)

@@ -77,7 +77,8 @@ def facing(
     """
     if _far(a, T_a, b, T_b, gap_m):
         return
-    posed_a, posed_b = _posed(a, T_a), _posed(b, T_b)
+    posed_a = _posed(a, T_a)
+    posed_b = _posed(b, T_b)
     for i, j in np.argwhere(posed_a.normals @ posed_b.normals.T < -np.cos(angle_rad)):
         if (posed_a.faces[i].name, posed_b.faces[j].name) in known:
             continue
@@ -107,7 +108,8 @@ def face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -
 
 def _far(a: Solid, T_a: Array, b: Solid, T_b: Array, gap_m: float) -> bool:
     """Whether the balls around two solids are farther apart than a gap."""
-    (middle_a, radius_a), (middle_b, radius_b) = _ball(a), _ball(b)
+    middle_a, radius_a = _ball(a)
+    middle_b, radius_b = _ball(b)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     return bool(np.sqrt(between @ between) > radius_a + radius_b + gap_m)
 
@@ -149,7 +151,10 @@ def _measured(face: Face) -> _Measured:
 
 def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> Facing | None:
     """What is measured of face i of one solid and face j of another; None if they cover too little of each other."""
-    face_a, face_b, n_a, n_b = a.faces[i], b.faces[j], a.normals[i], b.normals[j]
+    face_a = a.faces[i]
+    face_b = b.faces[j]
+    n_a = a.normals[i]
+    n_b = b.normals[j]
     common = overlap(face_a, T_a, face_b, T_b)
     covered = common.area / min(_measured(face_a).area, _measured(face_b).area)
     if covered < share or not len(common.corners):
@@ -160,7 +165,8 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
     lever, turn_u, turn_v = np.cross(np.array([middle, n_a, n_a]), np.array([n_a, u, v]))
     slope = np.zeros((3, 6))
     slope[0] = [*-n_a, *-lever]
-    slope[1, 3:], slope[2, 3:] = turn_u, turn_v
+    slope[1, 3:] = turn_u
+    slope[2, 3:] = turn_v
     half = np.ptp((common.corners - middle) @ np.array([u, v]).T, axis=0) / 2
     return Facing(
         a=face_a.name,

@@ -19,7 +19,8 @@ from apo_bench.geometry.mate import mate
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 
-_TIGHTEST_M, _LOOSEST_M = -0.1e-3, 0.6e-3
+_TIGHTEST_M = -0.1e-3
+_LOOSEST_M = 0.6e-3
 """A hole whose radius is less larger than that of a shaft, or more, is not the one that the shaft is for."""
 _SAME_M = 1e-9
 
@@ -70,8 +71,11 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     (shaft, T_shaft), (flat, T_flat) = ((b, T_b), (a, T_a)) if isinstance(a, Face) else ((a, T_a), (b, T_b))
     assert isinstance(shaft, RoundFace)
     assert isinstance(flat, Face)
-    n, u, found = T_flat[:3, :3] @ flat.normal, T_shaft[:3, :3] @ shaft.axis, mate(shaft, T_shaft, flat, T_flat)
-    middle, height = found.points.mean(axis=0), float(found.off.mean(axis=0) @ n)
+    n = T_flat[:3, :3] @ flat.normal
+    u = T_shaft[:3, :3] @ shaft.axis
+    found = mate(shaft, T_shaft, flat, T_flat)
+    middle = found.points.mean(axis=0)
+    height = float(found.off.mean(axis=0) @ n)
     slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
     whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
     return RoundMeasure(
@@ -87,9 +91,12 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
 
 def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
     """A cylinder in a cylinder."""
-    found, u, w = mate(a, T_a, b, T_b), T_a[:3, :3] @ a.axis, T_b[:3, :3] @ b.axis
+    found = mate(a, T_a, b, T_b)
+    u = T_a[:3, :3] @ a.axis
+    w = T_b[:3, :3] @ b.axis
     u = u if u @ w > 0.0 else -u
-    across, p = (T_b[:3, :3] @ b.frame[:3, :2]).T, found.points.mean(axis=0)
+    across = (T_b[:3, :3] @ b.frame[:3, :2]).T
+    p = found.points.mean(axis=0)
     off = across @ found.off.mean(axis=0)
     half = found.length_m / 2
     return RoundMeasure(
@@ -105,10 +112,13 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure
 
 def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
     """A cone in a cone, or on a rim, compared where both have one radius."""
-    u, w, across = _wider(a, T_a), _wider(b, T_b), (T_b[:3, :3] @ b.frame[:3, :2]).T
+    u = _wider(a, T_a)
+    w = _wider(b, T_b)
+    across = (T_b[:3, :3] @ b.frame[:3, :2]).T
     slope = abs(a.slope if a.kind == "cone" else b.slope)
     rows = np.array([*across, w * slope / np.hypot(1.0, slope)])
-    low, high = max(min(a.radii), min(b.radii)), min(max(a.radii), max(b.radii))
+    low = max(min(a.radii), min(b.radii))
+    high = min(max(a.radii), max(b.radii))
     p, q = (pose.apply(T, _where(face, (low + high) / 2)[None])[0] for face, T in ((a, T_a), (b, T_b)))
     tilts = np.zeros((0, 3)) if "rim" in (a.kind, b.kind) else across
     spans = [abs(float(np.subtract(*face.radii))) for face in (a, b) if face.kind == "cone"]

@@ -109,7 +109,8 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
 
 def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
     """The largest |e| of every arc, [m], at `goals` (n, 4, 4), world frame, [m] (Section 3.3)."""
-    done, reached = lowered(assembly.first(graph.step)), goals[: graph.step]
+    done = lowered(assembly.first(graph.step))
+    reached = goals[: graph.step]
     gaps = equations(done, start, reached).gaps(reached)
     named = [(relation.made, done.given(relation.contact)) for relation in done.relations()]
     mine = [[made == arc.made and contact in arc.contacts for made, contact in named] for arc in graph.arcs]

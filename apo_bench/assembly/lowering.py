@@ -57,7 +57,9 @@ def _lowered(assembly: Assembly) -> Assembly | None:
     """None of an assembly without round contacts: what is remembered of an object must not keep it alive."""
     if not any(assembly.is_round(contact) for operation in assembly.operations for contact in operation.contacts):
         return None
-    gaps, operations, made = dict(assembly.gaps), [], _Sheets(assembly)
+    gaps = dict(assembly.gaps)
+    operations = []
+    made = _Sheets(assembly)
     for operation in assembly.operations:
         lower = tuple(low for contact in operation.contacts for low in made.of(contact))
         operations.append(replace(operation, contacts=lower))
@@ -98,23 +100,27 @@ class _Sheets:
     def _on_plane(self, contact: Contact) -> Contact:
         """A shaft on a plane: its axis, in the plane a radius in front."""
         flat, wall = _first(contact, contact.environment.face in self._assembly.solids[contact.environment.part].rounds)
-        face, shaft = self._assembly.face(flat), self._assembly.round_face(wall)
+        face = self._assembly.face(flat)
+        shaft = self._assembly.round_face(wall)
         raised = face.outline + shaft.radius * face.normal
         plane = self._sheet(flat, f"{1e6 * shaft.radius:.3f}", raised, face.normal, face.fit, opposes=False)
         return Contact(plane, self._axis(wall, "1 of 1", 0.0))
 
     def _coaxial(self, planes_of: PartFace, points_of: PartFace, count: int) -> list[Contact]:
         """The axis of one face, or its point of a rim, in planes through the axis of another one, evenly turned."""
-        face, made = self._assembly.round_face(planes_of), []
+        face = self._assembly.round_face(planes_of)
+        made = []
         for i in range(count):
-            tail, n = f"{i + 1} of {count}", _across(face, np.pi * i / count)
+            tail = f"{i + 1} of {count}"
+            n = _across(face, np.pi * i / count)
             sheet = self._sheet(planes_of, tail, face.middle[None], n, face.fit, opposes=False)
             made.append(Contact(sheet, self._axis(points_of, tail, np.pi * i / count)))
         return made
 
     def _seated(self, cone_of: PartFace, other_of: PartFace) -> Contact:
         """The middle of a face in the plane across a cone where both are as wide."""
-        cone, other = self._assembly.round_face(cone_of), self._assembly.round_face(other_of)
+        cone = self._assembly.round_face(cone_of)
+        other = self._assembly.round_face(other_of)
         height = cone.span[0] + (other.radius - cone.radii[0]) / cone.slope
         at = (cone.point + height * cone.axis)[None]
         plane = self._sheet(cone_of, f"{1e6 * other.radius:.3f}", at, _outward(cone), cone.fit)

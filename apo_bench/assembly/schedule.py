@@ -34,10 +34,13 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
 
 def stages(plan: Plan) -> list[tuple[int, Array]]:
     """How many operations are done, and the goals in force, before each time something is undone and at the end."""
-    goals, done, found = np.array(plan.goals), 0, []
+    goals = np.array(plan.goals)
+    done = 0
+    found = []
     for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
         if not step.undo:
-            goals[step.operation], done = target, step.operation + 1
+            goals[step.operation] = target
+            done = step.operation + 1
         if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
             found.append((done, np.array(goals)))
     return found

@@ -76,7 +76,8 @@ def joint_covariance(goals: Array, covariance: Array, shared: Sequence[SharedErr
         covariance: (n, 6, 6), of each operation by itself.
     """
     n = len(goals)
-    joint, six = np.zeros((n, 6, n, 6)), np.arange(6)
+    joint = np.zeros((n, 6, n, 6))
+    six = np.arange(6)
     for one in shared:
         k = np.array(one.operations, dtype=np.intp)
         A = one.ways(goals)

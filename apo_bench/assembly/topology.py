@@ -166,7 +166,8 @@ class Assembly:
         fits = play_m if self.is_fit(whole) else 0.0
         if not self.is_round(whole):
             return fits
-        a, b = self.face_of(whole.manipulated), self.face_of(whole.environment)
+        a = self.face_of(whole.manipulated)
+        b = self.face_of(whole.environment)
         if contact in self.origin and self.face(contact.manipulated).opposes:
             slope = max(abs(one.slope) for one in (a, b) if isinstance(one, RoundFace))
             return fits * math.hypot(1.0, slope) / slope

@@ -39,7 +39,8 @@ def touched_contacts(
     assembly: Assembly, contacts: Iterable[Contact], moves: Iterable[str], poses: Poses
 ) -> list[TouchedContact]:
     """The contacts between a part that moves and a part that rests, round ones once for each normal."""
-    moving, found = set(moves), []
+    moving = set(moves)
+    found = []
     for contact in contacts:
         rests = [of for of in contact if of.part not in moving]
         if len(rests) == 1:
@@ -50,7 +51,8 @@ def touched_contacts(
 def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:
     """The points at which contacts touch, of flat ones the corners of their overlap, (k, 3), world, [m], and the normal
     at each, (k, 3)."""
-    points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    points = [np.zeros((0, 3))]
+    normals = [np.zeros((0, 3))]
     for (m, e), _, n, at in touched:
         if at is None:
             at = overlap(assembly.face(m), poses[m.part], assembly.face(e), poses[e.part]).corners
@@ -61,10 +63,12 @@ def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses)
 
 def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     """Points that a face reaches to, (k, 3), world, [m]: its corners, or rings at both ends of a round one."""
-    face, T = assembly.face_of(of), poses[of.part]
+    face = assembly.face_of(of)
+    T = poses[of.part]
     if isinstance(face, Face):
         return np.asarray(face.outline @ T[:3, :3].T + T[:3, 3])
-    x, y = face.frame[:3, 0], face.frame[:3, 1]
+    x = face.frame[:3, 0]
+    y = face.frame[:3, 1]
     ring = np.outer(np.cos(_RING), x) + np.outer(np.sin(_RING), y)
     return apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
 
@@ -78,8 +82,10 @@ def mouth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, wa
 def _touched(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses) -> Iterator[TouchedContact]:
     m, e = contact
     other = m if rests == e else e
-    still, moved = assembly.face_of(rests), assembly.face_of(other)
-    T, T_moved = poses[rests.part], poses[other.part]
+    still = assembly.face_of(rests)
+    moved = assembly.face_of(other)
+    T = poses[rests.part]
+    T_moved = poses[other.part]
     if isinstance(still, Face) and isinstance(moved, Face):
         yield TouchedContact(contact, rests.part, T[:3, :3] @ still.normal)
     elif isinstance(still, Face):
@@ -97,8 +103,10 @@ def _touched(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses
 def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:
     """The normals of two round faces, and where each acts: off the wall at both ends of what the faces have in common,
     and, where cones meet or a rim, out along the axis."""
-    kind, out = contact_kind(still, moved), -1.0 if still.hole else 1.0
-    axis, at = T[:3, :3] @ still.axis, apply(T, still.ends)
+    kind = contact_kind(still, moved)
+    out = -1.0 if still.hole else 1.0
+    axis = T[:3, :3] @ still.axis
+    at = apply(T, still.ends)
     if kind == "cone on rim":
         at = at.mean(axis=0)[None] if still.kind == "rim" else apply(T_moved, moved.ends[:1])
     else:
@@ -123,7 +131,8 @@ def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) ->
         y = np.cross(z, x)
         yield from (x, -x, y, -y)
         return
-    x, y = T[:3, :3] @ face.frame[:3, 0], T[:3, :3] @ face.frame[:3, 1]
+    x = T[:3, :3] @ face.frame[:3, 0]
+    y = T[:3, :3] @ face.frame[:3, 1]
     half = face.extent_rad / 2
     for turn in np.linspace(-half, half, 1 + int(np.ceil(face.extent_rad / _QUARTER - 1e-9))):
         yield np.cos(turn) * x + np.sin(turn) * y

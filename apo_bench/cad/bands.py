@@ -59,7 +59,8 @@ def _ends(mesh: Mesh, facets: Facets, of: Any, k: int, each: FoundWall, middle: 
     points = mesh.corners[facets.along[rows]]
     along = points[:, 1] - points[:, 0]
     across = np.abs(along @ each.surface.axis) < 0.5 * np.linalg.norm(along, axis=1)
-    rows, at = rows[across], points[across].mean(axis=1)
+    rows = rows[across]
+    at = points[across].mean(axis=1)
     beyond = np.where(mine[rows, 0], facets.smooth[rows, 1], facets.smooth[rows, 0])
     width = 2.0 * np.linalg.norm(facets.centers[beyond] - at, axis=1)
     low = each.surface.polar(at)[0] < middle

@@ -15,8 +15,10 @@ from apo_bench.cad.raw import Place
 from apo_bench.cad.step_tree import leaves_of, matrix_of, shapes_in
 from apo_bench.geometry.arrays import Array
 
-LIMIT_BYTES, LIMIT_S = 2_000_000_000, 20
-ANGLE_RAD, _SAGITTA = 0.2, 1e-2
+LIMIT_BYTES = 2_000_000_000
+LIMIT_S = 20
+ANGLE_RAD = 0.2
+_SAGITTA = 1e-2
 """Of triangles: angle between neighbours, the same on walls around one axis; distance from the surface at most, as part
 of the size of the solid."""
 _MOST_SAMPLES = 600
@@ -82,7 +84,8 @@ def _matter(shape: Any) -> tuple[float, Array, Array]:
 
     found = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, found)
-    at, J = found.CentreOfMass(), found.MatrixOfInertia()
+    at = found.CentreOfMass()
+    J = found.MatrixOfInertia()
     inertia = np.array([[J.Value(i, k) for k in range(1, 4)] for i in range(1, 4)])
     return found.Mass(), np.array([at.X(), at.Y(), at.Z()]), inertia
 
@@ -149,9 +152,12 @@ def _samples(surface: Any, mesh: Any, triangles: Any) -> tuple[Array, Array]:
     nodes = [mesh.UVNode(i) for i in range(1, mesh.NbNodes() + 1)]
     uv = np.array([(p.X(), p.Y()) for p in nodes])
     every = np.concatenate([uv, uv[triangles].mean(axis=1)])
-    points, normals = [], []
+    points = []
+    normals = []
     for u, v in every[:: -(-len(every) // _MOST_SAMPLES)]:
-        point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+        point = gp_Pnt()
+        along_u = gp_Vec()
+        along_v = gp_Vec()
         surface.D1(float(u), float(v), point, along_u, along_v)
         n = np.cross(_xyz(along_u), _xyz(along_v))
         if np.linalg.norm(n) > 1e-12:

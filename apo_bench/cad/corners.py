@@ -7,9 +7,12 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
 
-_MOST_CORNERS, _MOST_SIDES, _MOST_DIRECTIONS = 600, 300, 190
+_MOST_CORNERS = 600
+_MOST_SIDES = 300
+_MOST_DIRECTIONS = 190
 """Of a piece; of one that has more, the farthest corners are kept."""
-_FARTHEST, _IN_PLANE = (60, 40, 24, 12, 0), (16, 8, 4)
+_FARTHEST = (60, 40, 24, 12, 0)
+_IN_PLANE = (16, 8, 4)
 """In how many directions: in space; in each flat face."""
 _INSIDE_M = 5e-8
 """Corners so far inside of a piece are none of it."""
@@ -85,7 +88,8 @@ def _farthest(corners: Array, many: int) -> Any:
     if not many:
         return np.zeros(0, dtype=np.intp)
     k = np.arange(many) + 0.5
-    up, turn = 1.0 - 2.0 * k / many, np.pi * (1.0 + 5.0**0.5) * k
+    up = 1.0 - 2.0 * k / many
+    turn = np.pi * (1.0 + 5.0**0.5) * k
     flat = np.sqrt(1.0 - up**2)
     way = np.concatenate([np.column_stack([np.cos(turn) * flat, np.sin(turn) * flat, up]), np.eye(3), -np.eye(3)])
     return np.unique((corners @ way.T).argmax(axis=0))

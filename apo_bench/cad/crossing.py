@@ -36,12 +36,14 @@ def crossing(mesh: Mesh, off: Array | None = None) -> Array | None:
 def _near(mesh: Mesh) -> Iterator[Any]:
     """Pairs of triangles whose boxes overlap, (p, 2), some at a time."""
     points = mesh.corners[mesh.triangles]
-    low, high = points.min(axis=1), points.max(axis=1)
+    low = points.min(axis=1)
+    high = points.max(axis=1)
     order = _in_space((low + high) / 2.0)
     levels = int(np.ceil(np.log2(max(len(order), 2))))
     room = 1 << levels
     tree = [(np.full((room, 3), np.inf), np.full((room, 3), -np.inf))]
-    tree[0][0][: len(order)], tree[0][1][: len(order)] = low[order], high[order]
+    tree[0][0][: len(order)] = low[order]
+    tree[0][1][: len(order)] = high[order]
     for _ in range(levels):
         lows, highs = tree[-1]
         tree.append((np.minimum(lows[::2], lows[1::2]), np.maximum(highs[::2], highs[1::2])))
@@ -81,7 +83,12 @@ def _through(a: Array, b: Array, tolerance: Array) -> Array | None:
     n = n / np.maximum(size, 1e-300)[:, None]
     height = ((a - b[:, :1]) * n[:, None]).sum(axis=2)
     may = (height.max(axis=1) > tolerance) & (height.min(axis=1) < -tolerance) & (size > tolerance**2)
-    a, b, n, height, size, tolerance = a[may], b[may], n[may], height[may], size[may], tolerance[may]
+    a = a[may]
+    b = b[may]
+    n = n[may]
+    height = height[may]
+    size = size[may]
+    tolerance = tolerance[may]
     for i in range(3):
         k = (i + 1) % 3
         through = ((height[:, i] > tolerance) & (height[:, k] < -tolerance)) | (
@@ -89,19 +96,18 @@ def _through(a: Array, b: Array, tolerance: Array) -> Array | None:
         )
         if not through.any():
             continue
-        p, q, corners, m, area, near = (
-            a[through, i],
-            a[through, k],
-            b[through],
-            n[through],
-            size[through],
-            tolerance[through],
-        )
+        p = a[through, i]
+        q = a[through, k]
+        corners = b[through]
+        m = n[through]
+        area = size[through]
+        near = tolerance[through]
         share = height[through, i] / (height[through, i] - height[through, k])
         x = p + share[:, None] * (q - p)
         inside = np.ones(len(x), dtype=bool)
         for j in range(3):
-            start, end = corners[:, j], corners[:, (j + 1) % 3]
+            start = corners[:, j]
+            end = corners[:, (j + 1) % 3]
             inside &= (np.cross(end - start, x - start) * m).sum(axis=1) > _INSIDE * area + near * np.linalg.norm(
                 end - start, axis=1
             )

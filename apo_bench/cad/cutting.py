@@ -48,7 +48,8 @@ def cut(raw: RawSolid) -> Cut:
         whole = whole + filled(raw.mesh, bore)
     if whole.num_tri() > _MOST_TRIANGLES:
         whole = whole.simplify(1e-3 * size)
-    grown, hulls = 0.0, 0
+    grown = 0.0
+    hulls = 0
     flats = flat_planes(raw)
     pieces: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
@@ -61,7 +62,8 @@ def cut(raw: RawSolid) -> Cut:
         true = part.body.volume()
         more = volume_of(given) - true + volume_of(corners) - volume_of(fine)
         if abs(more) > _LOSS * true:
-            grown, hulls = grown + more, hulls + 1
+            grown = grown + more
+            hulls = hulls + 1
         pieces.append(corners)
     found: list[Hull] = []
     for corners in pieces:

@@ -9,7 +9,8 @@ from apo_bench.geometry.arrays import Array
 
 SMOOTH_RAD = np.radians(35.0)
 """Flat pieces of one round face meet at less: it has 11 of them in a turn, or more."""
-_SAME_RAD, _NEAR_RAD = 1e-3, 0.02
+_SAME_RAD = 1e-3
+_NEAR_RAD = 0.02
 FLAT = 1e-6
 """Of the size of a part: what is nearer to a plane lies in it."""
 
@@ -90,7 +91,8 @@ def _normals(mesh: Mesh) -> Array:
     needle = size < FLAT * mesh.extent * longest
     if needle.any():
         for column in (0, 1):
-            mine, other = mesh.neighbours[:, column], mesh.neighbours[:, 1 - column]
+            mine = mesh.neighbours[:, column]
+            other = mesh.neighbours[:, 1 - column]
             take = needle[mine] & ~needle[other] & (length > longest[mine] * (1.0 - 1e-9))
             normals[mine[take]] = normals[other[take]]
     return np.asarray(normals)

@@ -41,7 +41,8 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     x /= np.linalg.norm(x)
     y = np.cross(axis, x)
     middle = points.mean(axis=0)
-    u, v = (points - middle) @ x, (points - middle) @ y
+    u = (points - middle) @ x
+    v = (points - middle) @ y
     size = float(np.abs([u, v]).max())
     if size < 1e-12:
         return None
@@ -49,7 +50,9 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     found, _, rank, _ = np.linalg.lstsq(A, (u * u + v * v) / size**2, rcond=1e-9)
     if rank < 3 or not np.isfinite(found).all():
         return None
-    a, b, c = found[0] / 2.0, found[1] / 2.0, found[2]
+    a = found[0] / 2.0
+    b = found[1] / 2.0
+    c = found[2]
     return Round(middle + size * (a * x + b * y), axis, size * float(np.sqrt(max(c + a * a + b * b, 0.0))), 0.0)
 
 
@@ -69,7 +72,8 @@ def refined(start: Round, points: Array, cone: bool) -> Round | None:
     if cone:
         slope, radius = np.polyfit(height - (middle - start.point) @ start.axis, distance, 1)
     else:
-        slope, radius = 0.0, float(distance.mean())
+        slope = 0.0
+        radius = float(distance.mean())
 
     def moved(p: Array) -> Round:
         axis = start.axis + p[0] * x + p[1] * y

@@ -38,7 +38,8 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     check_uncrossed(path, mesh, _off(solid.faces, surfaces)[owner])
     said: tuple[str, ...] = ()
     if mesh.volume < 0.0:
-        mesh, said = Mesh(mesh.corners, mesh.triangles[:, ::-1]), ("it was inside out, and was turned",)
+        mesh = Mesh(mesh.corners, mesh.triangles[:, ::-1])
+        said = ("it was inside out, and was turned",)
     groups = _joined(mesh, owner, surfaces)
     mesh, owner = _in_strips(mesh, owner, groups, surfaces)
     regions = with_names(mesh, _regions(mesh, owner, groups, surfaces))
@@ -97,7 +98,8 @@ def _one_each(corners: Array) -> tuple[Any, Array]:
 def _in_strips(mesh: Mesh, owner: Any, groups: list[list[int]], surfaces: list[Flat | Wall | None]) -> tuple[Mesh, Any]:
     """With walls between two circles as strips from end to end."""
     kept = np.ones(len(owner), dtype=bool)
-    more, of = [mesh.triangles[:0]], [owner[:0]]
+    more = [mesh.triangles[:0]]
+    of = [owner[:0]]
     for members in groups:
         wall = surfaces[members[0]]
         triangles = np.flatnonzero(np.isin(owner, members))
@@ -162,7 +164,8 @@ def _turn(mesh: Mesh, triangles: Any, wall: Wall) -> float:
     off = np.where(sound, (angle - first[:, None] + np.pi) % WHOLE_TURN - np.pi, 0.0)
     low = (first + off.min(axis=1)) % WHOLE_TURN
     order = np.argsort(low)
-    low, high = low[order], (low + off.max(axis=1) - off.min(axis=1))[order]
+    high = (low + off.max(axis=1) - off.min(axis=1))[order]
+    low = low[order]
     reach = np.maximum.accumulate(high)
     gaps = np.append(low[1:], low[0] + WHOLE_TURN) - np.maximum(reach, reach[-1] - WHOLE_TURN)
     widest = float(gaps.max())

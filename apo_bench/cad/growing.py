@@ -11,7 +11,9 @@ from apo_bench.cad.round_region import TOLERANCE
 from apo_bench.geometry.arrays import Array
 
 _FEWEST = 3
-_MOST_WORK, _MOST_FAILED, _MOST_SEED = 3_000_000, 100, 100
+_MOST_WORK = 3_000_000
+_MOST_FAILED = 100
+_MOST_SEED = 100
 """How many flat pieces are asked, over all trials, in one part; trials in vain, one after the other, in one smooth part
 of its surface; flat pieces that a trial begins with."""
 _SAME_BEND = 0.15
@@ -65,7 +67,8 @@ def _from_edges(
             start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, around, taken)
             if start is None or len(on_it(mesh, facets, near, start, 3.0 * tolerance)[0]) < _FEWEST:
                 continue
-            left, open_ = group[~taken[group]], inside & ~taken[facets.smooth].any(axis=1)
+            left = group[~taken[group]]
+            open_ = inside & ~taken[facets.smooth].any(axis=1)
             best = _grown(mesh, facets, left, open_, [(start, cone)], tolerance, i)
             work -= 4 * len(left)
             if best is not None:
@@ -122,7 +125,9 @@ def _seed_cone(
 ) -> tuple[Round | None, Any]:
     """The cone of the pieces that meet at one angle, one after the other; and these pieces."""
     angle = facets.angle[row]
-    members, rows, open_ = {int(facets.smooth[row, 0])}, set(), [int(facets.smooth[row, 0])]
+    members = {int(facets.smooth[row, 0])}
+    rows = set()
+    open_ = [int(facets.smooth[row, 0])]
     while open_ and len(members) < _MOST_SEED:
         for r in around[open_.pop()]:
             if abs(facets.angle[r] - angle) < _SAME_BEND * abs(angle) and not taken[facets.smooth[r]].any():
@@ -152,7 +157,9 @@ def _grown(
         surface: Round | None = start
         if seed is None:
             surface = refined(start, mesh.corners[np.unique(facets.along[inside])], cone)
-        count, loose, best = 0, 3.0, None
+        count = 0
+        loose = 3.0
+        best = None
         for _ in range(8):
             if surface is None or not surface.radius < 50.0 * mesh.extent:
                 break
@@ -165,7 +172,8 @@ def _grown(
             best = FoundWall(surface, members, hole, spans)
             if len(members) == count and loose == 1.0:
                 break
-            count, loose = len(members), 1.0
+            count = len(members)
+            loose = 1.0
             both = inside & np.isin(facets.smooth, members).all(axis=1)
             points = mesh.corners[np.unique(facets.along[both])]
             surface = refined(surface, points, cone) if len(points) >= 6 else None

@@ -9,8 +9,13 @@ from apo_bench.cad.corners import SAME_MM, corners_of
 from apo_bench.cad.raw import Mesh, Region
 from apo_bench.geometry.arrays import Array
 
-_MOST_CUTS, _TRIES, _HAIR = 400, 6, 2e-6
-_MOST_FREE_PLANES, _MOST_BISECTED, _ROUGH, _FINE_TRIANGLES = 80, 40, 0.01, 4000
+_MOST_CUTS = 400
+_TRIES = 6
+_HAIR = 2e-6
+_MOST_FREE_PLANES = 80
+_MOST_BISECTED = 40
+_ROUGH = 0.01
+_FINE_TRIANGLES = 4000
 """Free shapes with more planes at reflex edges are halved instead, into so many pieces, until their hulls are so little
 larger; they need not have more triangles."""
 _NONE = np.zeros((0, 4))
@@ -47,7 +52,9 @@ def _cut(part: Part, size: float, flats: Array, only_flats: bool, cuts: list[int
 
     Both halves keep a hair's breadth off the plane: on it, rounding would leave flaps of no thickness.
     """
-    open_, least, hair = [part], 1e-7 * volume, _HAIR * size
+    open_ = [part]
+    least = 1e-7 * volume
+    hair = _HAIR * size
     while open_:
         found, along = open_.pop()
         for body in _without_cavities(found, least):
@@ -56,7 +63,8 @@ def _cut(part: Part, size: float, flats: Array, only_flats: bool, cuts: list[int
             halves = None
             planes = _planes_to_cut(body, size, flats, only_flats) if cuts[0] > 0 else []
             for n, d in [*planes[:_TRIES], *_through_cavity(body, least)]:
-                one, other = body.trim_by_plane(n, d + hair), body.trim_by_plane(-n, hair - d)
+                one = body.trim_by_plane(n, d + hair)
+                other = body.trim_by_plane(-n, hair - d)
                 if min(one.volume(), other.volume()) > least:
                     used = np.concatenate([along, [[*n, d]]])
                     halves = [Part(one, used), Part(other, used)]
@@ -124,7 +132,8 @@ def _best_halves(part: Part) -> list[Part]:
     low, high = np.array(part.body.bounding_box()).reshape(2, 3)
     best: tuple[float, list[Part]] = (np.inf, [part])
     for axis in np.argsort(low - high):
-        n, d = np.eye(3)[axis], float(low[axis] + high[axis]) / 2.0
+        n = np.eye(3)[axis]
+        d = float(low[axis] + high[axis]) / 2.0
         cut = (part.body.trim_by_plane(n, d), part.body.trim_by_plane(-n, -d))
         bodies = [each for half in cut for each in half.decompose()]
         hulls = float(sum(each.hull().volume() for each in bodies))

@@ -207,7 +207,8 @@ def _is_one_area(face: Face) -> bool:
 def _free_radius(solid: Solid, wall: RoundFace) -> float:
     """How far the pieces are from the axis of a hole, where it is narrowest, [m]."""
     angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
-    x, y = wall.frame[:3, 0], wall.frame[:3, 1]
+    x = wall.frame[:3, 0]
+    y = wall.frame[:3, 1]
     out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
     share = (0.5,) if wall.kind == "cylinder" else ((0.02,) if wall.radii[0] < wall.radii[1] else (0.98,))
     found = np.inf
@@ -222,7 +223,8 @@ def _free_radius(solid: Solid, wall: RoundFace) -> float:
 
 def _nearest(planes: Array, at: Array, out: Array) -> float:
     """Where rays from a point first enter a piece; infinite if none does."""
-    rate, room = planes[:, :3] @ out.T, (planes[:, 3] - planes[:, :3] @ at)[:, None]
+    rate = planes[:, :3] @ out.T
+    room = (planes[:, 3] - planes[:, :3] @ at)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         cross = room / rate
     enter = np.where(rate < -1e-12, cross, np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)).max(

@@ -65,9 +65,11 @@ def part_name(text: str) -> str:
 
 def free_name(name: str, used: Container[str]) -> str:
     """The name, or with a number behind it that makes it one that nothing else has."""
-    free, n = name, 2
+    free = name
+    n = 2
     while free in used:
-        free, n = f"{name}_{n}", n + 1
+        free = f"{name}_{n}"
+        n = n + 1
     return free
 
 

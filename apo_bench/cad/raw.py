@@ -62,7 +62,8 @@ class Mesh:
 
     @cached_property
     def _shared(self) -> tuple[Any, Any]:
-        low, high = self.sides.min(axis=1), self.sides.max(axis=1)
+        low = self.sides.min(axis=1)
+        high = self.sides.max(axis=1)
         order = np.lexsort((high, low))
         pairs = order.reshape(-1, 2)
         return pairs % len(self.triangles), self.sides[pairs[:, 0]]

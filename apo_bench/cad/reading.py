@@ -14,8 +14,11 @@ from apo_bench.io.reading import read_bytes
 
 KINDS = (".stl", ".obj", ".3mf")
 UNITS_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
-LARGEST_BYTES, MOST_TRIANGLES = 60_000_000, 400_000
-SMALLEST_MM, OPEN_BELOW_MM, LARGEST_MM = 1.0, 10.0, 2000.0
+LARGEST_BYTES = 60_000_000
+MOST_TRIANGLES = 400_000
+SMALLEST_MM = 1.0
+OPEN_BELOW_MM = 10.0
+LARGEST_MM = 2000.0
 """Of the longest side of what a file holds: smaller and larger ones are no parts; where a file states no unit, mm is
 taken between the last two."""
 
@@ -61,7 +64,8 @@ def read_meshes(path: Path, unit: str | None = None) -> CadFile:
     if ending == ".3mf":
         stated, found = read_3mf(path, raw, MOST_TRIANGLES)
     else:
-        stated, found = None, [(path.stem, _by_trimesh(path, raw, ending[1:]))]
+        stated = None
+        found = [(path.stem, _by_trimesh(path, raw, ending[1:]))]
     count = sum(len(mesh.triangles) for _, mesh in found)
     if not count:
         raise InputError(f"{path}: the file holds no triangles; save the part as a mesh.")

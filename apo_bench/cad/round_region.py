@@ -43,7 +43,8 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     kind: Kind = "cone" if slope else "cylinder"
     first = Region(kind, triangles, axis=axis, point=point, span=(foot, foot + 1.0), hole=hole)
     height, distance, _ = first.polar(points)
-    low, high = float(height.min()), float(height.max())
+    low = float(height.min())
+    high = float(height.max())
     radii = [max(surface.radius + slope * (h - foot), 0.0) for h in (low, high)]
     if slope:
         radii = [0.0 if r < TOLERANCE * mesh.extent else r for r in radii]

@@ -16,7 +16,8 @@ def rounded(corners: Array, shafts: Sequence[Region]) -> Array:
     """A piece with as many corners on a shaft as its wall needs: new ones on whole circles, more on other ones."""
     from scipy.spatial import ConvexHull
 
-    added, dropped = [corners], np.zeros(len(corners), dtype=bool)
+    added = [corners]
+    dropped = np.zeros(len(corners), dtype=bool)
     for shaft in sorted(shafts, key=lambda shaft: -int(_on_wall(corners, shaft).sum())):
         height, _, angle = shaft.polar(corners)
         on = _on_wall(corners, shaft) & ~dropped
@@ -76,7 +77,8 @@ def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]
             if shaft.kind != "cylinder" or not THINNEST_M <= 1e-3 * shaft.radii[0] <= WIDEST_M:
                 continue
             height, distance, _ = shaft.polar(corners)
-            low, high = float(height.min()), float(height.max())
+            low = float(height.min())
+            high = float(height.max())
             level = 5e-4 * (high - low) >= THINNEST_M and (np.minimum(height - low, high - height) < SAME_MM).all()
             if (
                 level

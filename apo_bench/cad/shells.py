@@ -11,7 +11,8 @@ from apo_bench.cad.reading import Shape
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-_SAME, _COPY = 1e-7, 2e-6
+_SAME = 1e-7
+_COPY = 2e-6
 """Corners are one, and solids the same, within this part of their size."""
 _MOST_SOLIDS = 200
 _ASKED = 12
@@ -170,7 +171,8 @@ def _contains(shell: Mesh, inner: Mesh) -> bool:
 
     At a corner on the surface, where solids touch, it is anything, so several are asked.
     """
-    low, high = shell.corners.min(axis=0), shell.corners.max(axis=0)
+    low = shell.corners.min(axis=0)
+    high = shell.corners.max(axis=0)
     if (inner.corners < low).any() or (inner.corners > high).any():
         return False
     return all(_is_inside(shell, point) for point in inner.corners[:: max(1, len(inner.corners) // _ASKED)])
@@ -200,13 +202,16 @@ def moved_onto(a: Mesh, b: Mesh) -> Array | None:
         return None
     if abs(a.volume - b.volume) > 1e-4 * abs(a.volume):
         return None
-    p, q = a.corners[a.triangles].reshape(-1, 3), b.corners[b.triangles].reshape(-1, 3)
-    P, Q = p - p.mean(axis=0), q - q.mean(axis=0)
+    p = a.corners[a.triangles].reshape(-1, 3)
+    q = b.corners[b.triangles].reshape(-1, 3)
+    P = p - p.mean(axis=0)
+    Q = q - q.mean(axis=0)
     U, _, V = np.linalg.svd(P.T @ Q)
     R = V.T @ np.diag([1.0, 1.0, np.linalg.det(V.T @ U.T)]) @ U.T
     if np.abs(P @ R.T - Q).max() > _COPY * max(a.extent, float(np.abs(q).max())):
         return None
     R = np.where(np.abs(R) < 1e-7, 0.0, R)
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, q.mean(axis=0) - R @ p.mean(axis=0)
+    T[:3, :3] = R
+    T[:3, 3] = q.mean(axis=0) - R @ p.mean(axis=0)
     return T

@@ -68,7 +68,8 @@ def _loops(raw: RawSolid, region: Region) -> Iterator[tuple[Any, set[int]]]:
     mine = np.zeros(len(mesh.triangles), dtype=bool)
     mine[region.triangles] = True
     i, k = mesh.neighbours.T
-    forth, back = mine[i] & ~mine[k], mine[k] & ~mine[i]
+    forth = mine[i] & ~mine[k]
+    back = mine[k] & ~mine[i]
     edges = np.concatenate([mesh.edges[forth], mesh.edges[back][:, ::-1]]).tolist()
     others = np.concatenate([of[k[forth]], of[i[back]]]).tolist()
     after: dict[int, list[tuple[int, int]]] = {}
@@ -76,7 +77,8 @@ def _loops(raw: RawSolid, region: Region) -> Iterator[tuple[Any, set[int]]]:
         after.setdefault(a, []).append((b, other))
     while after:
         start = at = min(after)
-        corners, beside = [], set()
+        corners = []
+        beside = set()
         while True:
             b, other = after[at].pop()
             if not after[at]:

@@ -20,7 +20,10 @@ from apo_bench.errors import InputError
 from apo_bench.io.reading import read_bytes
 
 KINDS = (".step", ".stp")
-_LARGEST_BYTES, _MOST_TRIANGLES, _MOST_SOLIDS, _WALL_S = 60_000_000, 400_000, 200, 120
+_LARGEST_BYTES = 60_000_000
+_MOST_TRIANGLES = 400_000
+_MOST_SOLIDS = 200
+_WALL_S = 120
 _START = "import sys; path, *sys.path = sys.argv[1:]; from apo_bench.cad.brep import serve; serve(path)"
 _ENDS_CPU = -24
 _PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}

@@ -73,7 +73,8 @@ def _below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterat
         true = TDF_Label()
         XCAFDoc_ShapeTool.GetReferredShape_s(label, true)
     own = _name(true)
-    product, name = own or product, _name(label) or own or name
+    product = own or product
+    name = _name(label) or own or name
     here = T @ matrix_of(XCAFDoc_ShapeTool.GetLocation_s(label).Transformation())
     if XCAFDoc_ShapeTool.IsAssembly_s(true):
         inside = Sequence_TDF_Label()

@@ -9,7 +9,9 @@ from apo_bench.cad.raw import Mesh
 from apo_bench.cad.round_region import border_of
 from apo_bench.geometry.arrays import Array
 
-_LEVEL, _SAME_RAD, _FEWEST = 1e-6, 1e-5, 6
+_LEVEL = 1e-6
+_SAME_RAD = 1e-5
+_FEWEST = 6
 """Corners of an end are level within this part of the size, and lie at one angle with those of the other end."""
 
 

@@ -12,8 +12,10 @@ _SPLINE_MM = 5e-4
 """A spline whose points are this near to a plane, a cylinder or a cone is one."""
 _SPLINE_RAD = 0.02
 """... and its normals."""
-_FEWEST, _LEAST_SLOPE = 6, 1e-6
-_SAME, _SAME_RAD = 1e-6, 1e-6
+_FEWEST = 6
+_LEAST_SLOPE = 1e-6
+_SAME = 1e-6
+_SAME_RAD = 1e-6
 """Faces on surfaces that differ by less, in parts of the size of the solid, are on one."""
 _FLATTEST = 1e3
 """No round face of a spline is this many times as wide as the face."""
@@ -79,7 +81,8 @@ def same(a: Flat | Wall | None, b: Flat | Wall | None, size: float) -> bool:
         return bool(abs((b.point - a.point) @ a.normal) < near)
     if not (isinstance(a, Wall) and isinstance(b, Wall)):
         return False
-    one, other = a.surface, b.surface
+    one = a.surface
+    other = b.surface
     if np.linalg.norm(np.cross(one.axis, other.axis)) > _SAME_RAD + near / size:
         return False
     height, distance, _ = one.polar(other.point[None])

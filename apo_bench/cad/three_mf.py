@@ -12,7 +12,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
 _UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
-_DEEPEST, _MOST_PLACES = 8, 2000
+_DEEPEST = 8
+_MOST_PLACES = 2000
 _TOO_DEEP = f"its objects are nested deeper than {_DEEPEST}"
 
 

@@ -13,8 +13,13 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 from apo_bench.errors import InputError
 
-_LARGEST_BYTES, _LONGEST_TOKEN, _PIECE = 60_000_000, 1_000_000, 1 << 16
-_MOST_FILES, _MOST_NAMES, _MOST_OBJECTS, _DEEPEST = 10_000, 10_000, 10_000, 100
+_LARGEST_BYTES = 60_000_000
+_LONGEST_TOKEN = 1_000_000
+_PIECE = 1 << 16
+_MOST_FILES = 10_000
+_MOST_NAMES = 10_000
+_MOST_OBJECTS = 10_000
+_DEEPEST = 100
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """All that 3MF allows; the others are unpacked without a limit."""
 _OBJECT = ("model", "resources", "object")

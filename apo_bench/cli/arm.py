@@ -57,7 +57,8 @@ def check(
 
     if out is not None:
         check_writable(out, "--out", (".png",))
-    loaded, found = load_scenario(scenario), find_arm(name)
+    loaded = load_scenario(scenario)
+    found = find_arm(name)
     typer.echo(f"{name} at the table of {loaded.name}:")
     for line in check_lines(check_arm(found, loaded, layouts)):
         typer.echo(f"  {line}")

@@ -52,7 +52,8 @@ def explain(
     if observation is None:
         loaded = load_scenario(scenario)
         seen = as_planned(loaded, deviation_mm, deviation_deg)
-        goals, where = seen.goals, f"at the nominal goals, {_stated(deviation_mm, deviation_deg)}"
+        goals = seen.goals
+        where = f"at the nominal goals, {_stated(deviation_mm, deviation_deg)}"
     else:
         seen, loaded, assumed = read_observation_file(
             observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
@@ -60,7 +61,8 @@ def explain(
         made = corrected(seen, "contact")
         if not made.ok:
             raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {made.sentence}.")
-        goals, where = made.goals, f"at the corrected goals of {observation}"
+        goals = made.goals
+        where = f"at the corrected goals of {observation}"
         where += f", {_stated(deviation_mm, deviation_deg)} where it states none" * assumed
     found = explained(seen, goals)
     if as_json:
@@ -120,7 +122,8 @@ def correct(
         from apo_bench.observation.noise_file import read_noise
         from apo_bench.observation.restated import restated
 
-        seen, assumed = restated(seen, *read_noise(camera_noise)), False
+        seen = restated(seen, *read_noise(camera_noise))
+        assumed = False
     with redirect_output(as_json):
         correction = correct_named(seen, with_simulated(corrector))
     found = _explained(seen, correction)

@@ -62,8 +62,10 @@ def plan(
             raise InputError("a standard deviation was given without --observation, whose it would be; leave it out.")
         if robot is not None:
             raise InputError("--robot was given without --observation, which says where things are; give both.")
-        loaded, notes = load_scenario(scenario), list[str]()
-        asked, where = Plan(loaded.assembly, loaded.start, loaded.goals), "at the nominal goals"
+        loaded = load_scenario(scenario)
+        notes = list[str]()
+        asked = Plan(loaded.assembly, loaded.start, loaded.goals)
+        where = "at the nominal goals"
         axes = "directions and until in the frame of the assembly"
     else:
         method = CORRECTOR if method is None else method

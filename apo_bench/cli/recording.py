@@ -62,7 +62,8 @@ def import_log(
         raise InputError(
             "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone."
         )
-    stated, named = read_camera(camera), read_objects(objects)
+    stated = read_camera(camera)
+    named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
     tracks = part_tracks(read, named)
     _print(reading_lines(read, named))
@@ -102,7 +103,8 @@ def _import(
         raise
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [one.rest for one in found.operations]
-    X, times = found.camera.T_world_camera, {part: track.t for part, track in tracks.items()}
+    X = found.camera.T_world_camera
+    times = {part: track.t for part, track in tracks.items()}
     _print(camera_lines(found.camera))
     typer.echo("\n" + "\n".join(rest_lines(list(zip(mains, rests, strict=True)), X, times)) + "\n")
     _print(imported_lines(found))
@@ -130,8 +132,10 @@ def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, pi
     from apo_bench.recording.show.text import camera_lines, observation_table, put_lines, rest_lines
 
     found = bare_recording(tracks, camera, log.file)
-    parts, rests = [put.part for put in found.puts], [put.rest for put in found.puts]
-    X, times = found.camera.T_world_camera, {part: track.t for part, track in tracks.items()}
+    parts = [put.part for put in found.puts]
+    rests = [put.rest for put in found.puts]
+    X = found.camera.T_world_camera
+    times = {part: track.t for part, track in tracks.items()}
     _print(camera_lines(found.camera))
     typer.echo("\n" + "\n".join([*rest_lines(list(zip(parts, rests, strict=True)), X, times), *put_lines(found)]))
     _write(

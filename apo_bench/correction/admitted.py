@@ -70,7 +70,8 @@ def _check_lengths(one: Observation, name: str) -> None:
 
 def _check_poses(T: Array, name: Callable[[int], str]) -> None:
     """Poses (p, 4, 4); `name` says which one is number j."""
-    rigid, far = is_rigid(T), (np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1)
+    rigid = is_rigid(T)
+    far = (np.abs(T[:, :3, 3]) > FARTHEST_M).any(axis=1)
     if rigid.all() and not far.any():
         return
     for j in map(int, np.flatnonzero(~rigid)):

@@ -56,7 +56,8 @@ def contact_suspects(
     assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, relation: str
 ) -> tuple[Suspect, ...]:
     """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
-    contacts, together = assembly.relations(), dict[Contact, list[int]]()
+    contacts = assembly.relations()
+    together = dict[Contact, list[int]]()
     for j in assembly.arcs()[int(relation.removeprefix("R")) - 1]:
         if among[j]:
             together.setdefault(assembly.given(contacts[j].contact), []).append(j)
@@ -67,7 +68,8 @@ def _ranked(
     assembly: Assembly, among: NDArray[np.bool_], measure: _Measure, groups: Sequence[tuple[str, tuple[int, ...]]]
 ) -> tuple[Suspect, ...]:
     """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
-    relations, found = assembly.relations(), list[Suspect]()
+    relations = assembly.relations()
+    found = list[Suspect]()
     for name, group in groups:
         kept = among.copy()
         kept[list(group)] = False
@@ -105,7 +107,8 @@ def softened_length(z: Array, Jt: Array, S: Array) -> Array:
     equations are off by is r^t (J J^t + S)^-1 r, with r = J z what the observation was off by.
     """
     J = np.swapaxes(Jt, 1, 2)
-    A, r = J @ Jt + S, J @ z[..., None]
+    A = J @ Jt + S
+    r = J @ z[..., None]
     diagonal = A.reshape(len(A), -1)[:, :: A.shape[1] + 1]
     diagonal += ROUNDING * diagonal.max(axis=1, initial=SMALLEST)[:, None]
     return np.asarray((r * np.linalg.solve(A, r)).sum(axis=(1, 2)))

@@ -107,11 +107,15 @@ class ContactCorrector:
         """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
         if self.elsewhere:
             asked, first = best_start(asked, first)
-        solved, test, gap_m = first, first.test, asked.observation.gap_m
+        solved = first
+        test = first.test
+        gap_m = asked.observation.gap_m
         lost = not first.found.at_rest and largest(first.gaps) <= gap_m
         if not test.passes and self.doubt != "apply" and first.found.finite and not lost:
             test = replace(test, suspects=asked.suspects(every))
-        kept, dropped, after = every, tuple[str, ...](), test
+        kept = every
+        dropped = tuple[str, ...]()
+        after = test
         while self.doubt == "drop" and not after.passes and solved.found.finite and len(dropped) < DROPS:
             worst = asked.suspects(kept) if dropped else test.suspects
             if not worst:
@@ -120,7 +124,8 @@ class ContactCorrector:
             kept = asked.without(dropped)
             solved = asked.solve(kept)[0]
             after = solved.test
-        turned, last = turned_words(asked, solved.found.goals), after if dropped else None
+        turned = turned_words(asked, solved.found.goals)
+        last = after if dropped else None
         report = self._report(asked.observation, solved, kept, test, last, dropped, before_m, turned)
         return opposing(asked.observation, report)
 
@@ -140,7 +145,8 @@ class ContactCorrector:
         before_m: float,
         turned: str = "",
     ) -> Correction:
-        found, rank = solved.found, solved.rank
+        found = solved.found
+        rank = solved.rank
         status = _status(found, largest(solved.gaps[kept]), observation.gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not (after or test).passes:
             status = "doubtful"

@@ -97,7 +97,8 @@ def _admitted(found: Any, observation: Observation, chosen: Any, name: str) -> C
     goals = _bare(found.goals, len(observation.goals), name)
     found = check_correction(found, observation.assembly, name)
     if found.ok and not _ours(chosen):
-        before, after = gap_of(observation, observation.goals), gap_of(observation, goals)
+        before = gap_of(observation, observation.goals)
+        after = gap_of(observation, goals)
         found = replace(found, gap_before_m=before, gap_after_m=after)
     return found
 

@@ -98,7 +98,8 @@ def _span(columns: Array) -> Array:
 
 def _aligned(basis: Array) -> list[Array]:
     """An orthonormal basis, (3,) each, of a space of vectors (3, d), the nearest axis first each time."""
-    P, found = basis @ basis.T, list[Array]()
+    P = basis @ basis.T
+    found = list[Array]()
     for _ in range(basis.shape[1]):
         i = int(np.argmax(np.diag(P).round(6)))
         b = P[:, i] / np.linalg.norm(P[:, i])

@@ -124,8 +124,10 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
     """
-    given, observation = observation.assembly, lowered_observation(observation)
-    n, assembly = len(goals), observation.assembly
+    given = observation.assembly
+    observation = lowered_observation(observation)
+    n = len(goals)
+    assembly = observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
     asked = problem((replace(observation, goals=goals, shared=()),))
@@ -135,11 +137,13 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     Jr = right_jacobian(xi)
     B = Jr @ asked.L[0]
     _, Jt = linearised_by(system, goals, B)
-    every, relations = relation_holds(assembly), by_relation(assembly, system, Jt, kept)
+    every = relation_holds(assembly)
+    relations = by_relation(assembly, system, Jt, kept)
     known = freedom(relations.Jt)
     if known is None:
         raise _too_many(n)
-    spans, shared = spread(B, known.free), tuple[SharedEstimate, ...]()
+    spans = spread(B, known.free)
+    shared = tuple[SharedEstimate, ...]()
     if observation.shared:
         shared, spans = estimate_shared(observation, xi, Jr, system.among(kept))
     found = []
@@ -218,7 +222,9 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
     """Every part that was moved, at the end; its pose is a product of goals, so errors go through all of them."""
     if not len(assembly):
         return ()
-    final, last, words = placements(assembly, start, goals)[-1], assembly.odls()[-1], _rooted(assembly)
+    final = placements(assembly, start, goals)[-1]
+    last = assembly.odls()[-1]
+    words = _rooted(assembly)
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
     found = []
     for part in last:
@@ -245,7 +251,8 @@ def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:
 
     T exp(xi) M = T M exp(Ad(M^-1) xi), and (T exp(xi))^-1 M = T^-1 M exp(-Ad(M^-1 T) xi).
     """
-    behind, found = np.eye(4), np.zeros((n, 6, 6))
+    behind = np.eye(4)
+    found = np.zeros((n, 6, 6))
     for k, inverse in reversed(word):
         behind = pose.inverse(stack[k]) @ behind if inverse else behind
         if k >= constants:

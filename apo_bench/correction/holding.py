@@ -39,7 +39,8 @@ class Hold:
 
 def relation_holds(assembly: Assembly) -> tuple[Hold, ...]:
     """Every relation of an assembly."""
-    relations, history = assembly.relations(), assembly.odls()
+    relations = assembly.relations()
+    history = assembly.odls()
     found = []
     for i, arc in enumerate(assembly.arcs(), start=1):
         contact, made, lost = relations[arc[0]]
@@ -89,7 +90,9 @@ class RelationEquations:
 
     def _rings(self, k: int) -> list[list[int]]:
         """Relations by their distance from operation k, through operations that are not earlier."""
-        reached, left, rings = {k}, set(range(len(self.arcs))), list[list[int]]()
+        reached = {k}
+        left = set(range(len(self.arcs)))
+        rings = list[list[int]]()
         while ring := sorted(i for i in left if self.operations[i] & reached):
             rings.append(ring)
             left.difference_update(ring)

@@ -56,7 +56,8 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     Only the first row of each contact, its centre, goes with others: what turns parts within their play turns each in
     its own way.
     """
-    (shifts, _), (count, unit_m) = _shifts(assembly, play_m), plays(assembly, play_m)
+    shifts, _ = _shifts(assembly, play_m)
+    count, unit_m = plays(assembly, play_m)
     if not count.any() or len(shifts) > LARGEST_CORRELATED:
         return None
     every = {shift: 3 * i for i, shift in enumerate(dict.fromkeys(shift for own in shifts for shift in own))}
@@ -78,7 +79,8 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
     A face comes nearer if its part moves along the normal; where a part is thought to be is off by how much it has
     moved within its carrier since. The second number is the unit of displacements, the largest play, [m].
     """
-    relations, found = assembly.relations(), []
+    relations = assembly.relations()
+    found = []
     unit_m = max((assembly.play(relation.contact, play_m) for relation in relations), default=0.0)
     loose = {one.contact: _looseness(assembly, one.contact, play_m, unit_m) for one in relations}
     for contact, made, _ in relations:

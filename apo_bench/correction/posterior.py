@@ -92,7 +92,8 @@ def projections(Jt: Any) -> tuple[NDArray[np.intp], Array | None]:
     unknowns = Jt[0].shape[0]
     if unknowns > LARGEST_POSTERIOR:
         return np.array([jacobian_rank(one) for one in Jt]), None
-    one, rank = np.eye(unknowns), np.zeros(len(Jt), dtype=np.intp)
+    one = np.eye(unknowns)
+    rank = np.zeros(len(Jt), dtype=np.intp)
     P = np.empty((len(Jt), unknowns, unknowns))
     for i, each in enumerate(Jt):
         matrix = each if isinstance(each, np.ndarray) else each.toarray()

@@ -180,7 +180,8 @@ class Problem:
 
     def _tested(self, chosen: NDArray[np.bool_], found: NearestGoals, chi_square: float, freedom: int) -> Consistency:
         """The test of one squared length: by the chi-square distribution, or by draws where errors have tails."""
-        p, tails = p_value(chi_square, freedom), self.observation.tails
+        p = p_value(chi_square, freedom)
+        tails = self.observation.tails
         if tails is not None and freedom and np.isfinite(chi_square) and isinstance(found.Jt, np.ndarray):
             p = drawn_p_value(drawn_lengths(self.observation, self.L[0], found.Jt[0], self._play(chosen)), chi_square)
         return Consistency(chi_square, freedom, p, self.level)
@@ -254,7 +255,8 @@ def problem(
         InputError: A covariance is not positive definite; several operations share errors.
     """
     first = observations[0]
-    assembly, shared = first.assembly, any(one.shared for one in observations)
+    assembly = first.assembly
+    shared = any(one.shared for one in observations)
     goals = np.array([one.goals for one in observations])
     start = np.array([first.start[part] for part in assembly.solids]).reshape(-1, 4, 4)
     exact, low, high, plane = _demands(assembly, first.play_m)
@@ -275,7 +277,8 @@ def _demands(assembly: Assembly, play_m: float) -> tuple[NDArray[np.bool_], Arra
     equations are asked to be.
     """
     low, high = assembly.intervals(play_m).T
-    exact, plane = low == high, np.array(pattern(assembly).plane)
+    exact = low == high
+    plane = np.array(pattern(assembly).plane)
     plane[:, 3] -= np.where(exact, low, 0.0)
     return exact, low, high, frozen(plane)
 

@@ -54,16 +54,19 @@ def estimate_shared(
     Raises:
         InputError: Too many operations.
     """
-    L, seen = noise_factor(observation), observation.goals
+    L = noise_factor(observation)
+    seen = observation.goals
     known = freedom(linearised_by(system, seen @ pose.exp(xi), Jr @ L)[1])
     if known is None:
         raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")
     joint = joint_covariance(seen, observation.covariance, observation.shared)
-    free, found = L.reshape(xi.size, xi.size) @ known.free, []
+    free = L.reshape(xi.size, xi.size) @ known.free
+    found = []
     for one in observation.shared:
         if one.correlation is not None:
             continue
-        A, rows = np.zeros((len(seen), 6, 6)), list(one.operations)
+        A = np.zeros((len(seen), 6, 6))
+        rows = list(one.operations)
         A[rows] = one.ways(seen)
         AC = A.reshape(xi.size, 6) @ one.covariance
         K = np.linalg.solve(joint, AC).T

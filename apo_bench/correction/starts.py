@@ -51,8 +51,10 @@ def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
     Args:
         first: What comes of beginning with what was seen.
     """
-    observed, every = asked.goals[0], np.ones(len(asked.exact), dtype=np.bool_)
-    usable, far = _holds(asked, first), bool(turned_far(observed, first.found.goals))
+    observed = asked.goals[0]
+    every = np.ones(len(asked.exact), dtype=np.bool_)
+    usable = _holds(asked, first)
+    far = bool(turned_far(observed, first.found.goals))
     if not far and (usable or _faces_oppose(asked, observed, first.found.goals)):
         return asked, first
     if 6 * len(observed) > LARGEST_POSTERIOR:
@@ -104,8 +106,10 @@ def _begun_at(asked: Problem, goals: Array) -> Problem:
 
 def _starts(asked: Problem, first: Solved) -> Array:
     """Goals to begin with, (b, n, 4, 4)."""
-    observation, doubted = asked.observation, _doubted(asked, first)
-    n, solids = len(observation.goals), observation.assembly.solids
+    observation = asked.observation
+    doubted = _doubted(asked, first)
+    n = len(observation.goals)
+    solids = observation.assembly.solids
     found = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.goals]
     for k in doubted:
@@ -119,7 +123,8 @@ def _starts(asked: Problem, first: Solved) -> Array:
 
 def _doubted(asked: Problem, first: Solved) -> Collection[int]:
     """The operations of which one may be seen far off: all, or those with a part in most contacts that do not hold."""
-    observation, n = asked.observation, len(asked.observation.goals)
+    observation = asked.observation
+    n = len(asked.observation.goals)
     if n <= _MOST:
         return range(n)
     bad = looking_away(observation.assembly, observation.start, first.found.goals)
@@ -132,7 +137,8 @@ def _doubted(asked: Problem, first: Solved) -> Collection[int]:
 
 def _solutions(asked: Problem, starts: Array) -> Iterator[Array]:
     """Goals, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
-    observation, (b, n, *_) = asked.observation, starts.shape
+    observation = asked.observation
+    (b, n, *_) = starts.shape
     L = scales(observation.covariance)
     every = asked.compact
     laid = laid_contacts(observation.assembly, every.start, every.plane, starts)

@@ -32,7 +32,8 @@ def drawn_lengths(observation: Observation, L: Array, Jt: Array, S: Array | None
     if S is not None:
         w, V = np.linalg.eigh(S)
         play = np.random.default_rng(DRAWS).standard_normal(r.shape)
-        r, A = r + play @ (V * np.sqrt(np.maximum(w, 0.0))).T, A + S
+        r = r + play @ (V * np.sqrt(np.maximum(w, 0.0))).T
+        A = A + S
     A = A + ROUNDING * A.diagonal().max(initial=1e-300) * np.eye(len(A))
     return np.sort((r * np.linalg.solve(A, r.T).T).sum(axis=1))
 

@@ -53,7 +53,8 @@ def convex_distance(convex: Convex, points: Array) -> tuple[Array, Array]:
     """Distance of points, (n, 3), from the surface, (n,), negative inside, and its gradient, (n, 3), [m]."""
     if convex.cylinder is not None:
         return _cylinder_distance(convex.cylinder, points)
-    n, d = convex.planes[:, :3], convex.planes[:, 3]
+    n = convex.planes[:, :3]
+    d = convex.planes[:, 3]
     room = points @ n.T - d
     first = room.argmax(axis=1)
     distance = room[np.arange(len(points)), first]
@@ -73,7 +74,8 @@ def _nearest_on_edges(edges: Array, points: Array) -> Array:
     The nearest point of a convex piece lies on an edge, or over the side whose plane is the farthest, which is looked
     at before.
     """
-    start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    start = edges[:, 0]
+    along = edges[:, 1] - edges[:, 0]
     part = np.clip(((points[:, None] - start) * along).sum(axis=-1) / (along * along).sum(axis=-1), 0.0, 1.0)
     at = start + part[..., None] * along
     off = points[:, None] - at
@@ -97,7 +99,8 @@ def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]
 
 def convex_passage(convex: Convex, start: Array, ways: Array) -> tuple[Array, Array]:
     """Where rays, (n, 3), from a point enter a piece, and where they leave it, (n,) each; sooner if they miss."""
-    rate, room = ways @ convex.planes[:, :3].T, convex.planes[:, 3] - convex.planes[:, :3] @ start
+    rate = ways @ convex.planes[:, :3].T
+    room = convex.planes[:, 3] - convex.planes[:, :3] @ start
     with np.errstate(divide="ignore", invalid="ignore"):
         at = room / rate
     enter = np.where(rate < 0.0, at, -np.inf).max(axis=1)

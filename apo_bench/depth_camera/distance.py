@@ -35,7 +35,8 @@ class Shape(NamedTuple):
 def shape_of(pieces: Iterable[Piece], T: Array | None = None) -> Shape:
     """The union of pieces whose frame is at T, (4, 4), of the shape's (none: the same)."""
     kept = tuple(pieces)
-    center, half = np.array([box.center for box in kept]), np.array([box.half for box in kept])
+    center = np.array([box.center for box in kept])
+    half = np.array([box.half for box in kept])
     T = np.eye(4) if T is None else T
     inside = tuple(convex_of(piece) if isinstance(piece, Hull) else None for piece in kept)
     inside = inside if any(inside) else ()
@@ -60,15 +61,18 @@ def signed_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
     boxes = np.array([k for k, each in enumerate(shape.inside) if each is None], dtype=np.intp)
     hulls = [(k, each) for k, each in enumerate(shape.inside) if each is not None]
     flat = np.ascontiguousarray(points.reshape(-1, 3))
-    d, gradient = np.full(len(flat), np.inf), np.zeros_like(flat)
+    d = np.full(len(flat), np.inf)
+    gradient = np.zeros_like(flat)
     if len(boxes):
         d, gradient = _box_distance(shape.only(boxes), flat)
     least = np.array([least_distance(each, (flat - shape.center[k]) @ shape.turn[k]) for k, each in hulls])
     for i in _first_of_all(least):
-        (k, each), near = hulls[i], np.flatnonzero(least[i] < d)
+        k, each = hulls[i]
+        near = np.flatnonzero(least[i] < d)
         own, way = convex_distance(each, (flat[near] - shape.center[k]) @ shape.turn[k])
         closer = own < d[near]
-        d[near[closer]], gradient[near[closer]] = own[closer], way[closer] @ shape.turn[k].T
+        d[near[closer]] = own[closer]
+        gradient[near[closer]] = way[closer] @ shape.turn[k].T
     return d.reshape(points.shape[:-1]), gradient.reshape(points.shape)
 
 
@@ -104,19 +108,24 @@ def strike_distances(shape: Shape, origin: Array, rays: Array) -> tuple[Array, N
         origin: (3,), frame of the shape, outside of it, [m].
         rays: (n, 3), unit vectors.
     """
-    best, which = np.full(len(rays), np.inf), np.full(len(rays), -1, dtype=np.int64)
+    best = np.full(len(rays), np.inf)
+    which = np.full(len(rays), -1, dtype=np.int64)
     for k, (center, half, turn) in enumerate(zip(*shape[:3], strict=True)):
         inside = shape.inside[k] if shape.inside else None
         near = _in_cone(center - origin, float(np.linalg.norm(half)), rays)
-        start, way = (origin - center) @ turn, rays[near] @ turn
+        start = (origin - center) @ turn
+        way = rays[near] @ turn
         if inside is None:
             with np.errstate(divide="ignore", invalid="ignore"):
-                a, b = (-half - start) / way, (half - start) / way
-            enter, leave = np.fmin(a, b).max(axis=1), np.fmax(a, b).min(axis=1)
+                a = (-half - start) / way
+                b = (half - start) / way
+            enter = np.fmin(a, b).max(axis=1)
+            leave = np.fmax(a, b).min(axis=1)
         else:
             enter, leave = convex_passage(inside, start, way)
         hit = (enter <= leave) & (enter > 0.0) & (enter < best[near])
-        best[near[hit]], which[near[hit]] = enter[hit], k
+        best[near[hit]] = enter[hit]
+        which[near[hit]] = k
     return best, which
 
 

@@ -33,8 +33,10 @@ def share_explained(
     for view, image, mask in zip(views, images, appeared, strict=True):
         pixels = _around(mask)
         measured = image.ravel()[pixels]
-        pixels, measured = pixels[np.isfinite(measured)], measured[np.isfinite(measured)]
-        origin, rays = pose.apply(to, view.origin[None])[0], view.rays[pixels] @ T[:3, :3]
+        pixels = pixels[np.isfinite(measured)]
+        measured = measured[np.isfinite(measured)]
+        origin = pose.apply(to, view.origin[None])[0]
+        rays = view.rays[pixels] @ T[:3, :3]
         expected, _ = strike_distances(shape, origin, rays)
         new = mask.ravel()[pixels]
         agrees = np.abs(expected - measured) < close
@@ -46,7 +48,8 @@ def share_explained(
 def _around(mask: Mask) -> NDArray[np.int64]:
     """Every second pixel of every second row in the rectangle around a region, by number."""
     height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows = np.flatnonzero(mask.any(axis=1))
+    columns = np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return np.zeros(0, dtype=np.int64)
     v = np.arange(max(0, rows[0] - _AROUND), min(height, rows[-1] + 1 + _AROUND), 2)

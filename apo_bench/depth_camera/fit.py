@@ -67,7 +67,8 @@ def refine(shape: Shape, points: Points, starts: Array, width_m: float, turns: i
     The loss of a distance d is that of Geman and McClure, d^2 / (d^2 + w^2): points that are farther away than some
     widths w belong to something else and hardly count.
     """
-    T, damping = np.array(starts), np.full(len(starts), 1e-3)
+    T = np.array(starts)
+    damping = np.full(len(starts), 1e-3)
     scale = np.array([1.0] * 3 + [1.0 / _ARM_M] * 3)
     d, J = _rows(shape, points, T)
     cost = _loss(d, width_m)
@@ -83,7 +84,10 @@ def refine(shape: Shape, points: Points, starts: Array, width_m: float, turns: i
         d_new, J_new = _rows(shape, points, tried)
         cost_new = _loss(d_new, width_m)
         better = cost_new < cost
-        T[better], d[better], J[better], cost[better] = tried[better], d_new[better], J_new[better], cost_new[better]
+        T[better] = tried[better]
+        d[better] = d_new[better]
+        J[better] = J_new[better]
+        cost[better] = cost_new[better]
         damping = np.where(better, np.maximum(damping / 5.0, 1e-7), np.minimum(damping * 5.0, 1e3))
         if (length[:, 0] < 1e-8).all():
             break

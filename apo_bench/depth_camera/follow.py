@@ -73,10 +73,13 @@ def follow_demonstration(
     this sensor where it was. Of operations in a row that move the same parts only where the last one ended is known: a
     pause of the hand looks the same as the end of an operation, so the others are not seen.
     """
-    assembly, believed = expected.assembly, dict(expected.start)
+    assembly = expected.assembly
+    believed = dict(expected.start)
     shapes = {p: shape_of(physical_pieces(s, expected.play_m)) for p, s in assembly.solids.items()}
     events: list[Event] = []
-    frame, k, first = np.eye(3), 0, 0
+    frame = np.eye(3)
+    k = 0
+    first = 0
     while first + 1 < len(images) and k < len(assembly):
         owners = [_owners(view, shapes, believed) for view in finder.views]
         spell = _spell(images, first, level_m, assembly, k, owners, tuple(shapes))
@@ -90,7 +93,8 @@ def follow_demonstration(
         shares, found = _recognised(expected, shapes, group, which, appearance)
         if which is not None and found is not None:
             operation = assembly.operations[which]
-            solid, turn = assembly.solids[operation.main], frame @ expected.turns[which]
+            solid = assembly.solids[operation.main]
+            turn = frame @ expected.turns[which]
             T = nearest_symmetric_pose(found.T, symmetries(solid), turn)
             T = turned_alike(solid, T, turn)
             C = _turned(found, T)
@@ -137,7 +141,8 @@ def _spell(
 
 def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared: Sequence[Regions]) -> frozenset[str]:
     """The parts of whose visible surface most has vanished."""
-    seen, gone = np.zeros(len(parts)), np.zeros(len(parts))
+    seen = np.zeros(len(parts))
+    gone = np.zeros(len(parts))
     for owner, region in zip(owners, compared, strict=True):
         seen += np.bincount(owner[owner >= 0], minlength=len(parts))
         gone += np.bincount(owner[(owner >= 0) & region.vanished[::_GRID, ::_GRID]], minlength=len(parts))
@@ -161,7 +166,8 @@ def _recognised(
     expected: Expected, shapes: Mapping[str, Shape], group: Model | None, which: int | None, appearance: Appearance
 ) -> tuple[Mapping[str, float], LocatedModel | None]:
     """How much each model explains, and where the one that moved is, if none explains more."""
-    assembly, points = expected.assembly, appearance.points()
+    assembly = expected.assembly
+    points = appearance.points()
     shares: dict[str, float] = {}
     found = None
     if which is not None and group is not None:

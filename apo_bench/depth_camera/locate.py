@@ -15,7 +15,9 @@ from apo_bench.depth_camera.starts import starts
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry.arrays import Array
 
-_COARSE, _MIDDLE, _FINE = 150, 500, 3000
+_COARSE = 150
+_MIDDLE = 500
+_FINE = 3000
 """Points of a first fit from every start, of the best of these, and of the last fit."""
 _BEST = 4
 """Starts that are followed further: one fit in some ends beside the true place, so never only one."""
@@ -62,7 +64,9 @@ class Appearance:
         """The measured points; the outermost pixels of the regions are left out."""
         from scipy.ndimage import binary_erosion
 
-        at, rays, number = [], [], []
+        at = []
+        rays = []
+        number = []
         for v, (view, image, mask) in enumerate(zip(self.views, self.images, self.masks, strict=True)):
             pixels = np.flatnonzero(binary_erosion(mask) & np.isfinite(image))
             ray = view.rays[pixels]

@@ -29,7 +29,8 @@ def _two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
     One view is not enough: of a stick that lies in a tower only its ends can be seen, and only one of them from
     either side. At 0.95 m a pixel is 3 mm wide.
     """
-    reach, height_m = 0.67, 0.67
+    reach = 0.67
+    height_m = 0.67
     at = np.array(VIEWED_POINT_M)
     ways = (np.array([side * 0.707 * reach, side * 0.707 * reach, height_m]) for side in (1.0, -1.0))
     return tuple(View(look_at(at + way, at), width, height, 48.0) for way in ways)

@@ -41,11 +41,14 @@ class RangeSensor:
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         events = self.events(demonstration, self.sensed(rng))
         goals = np.array([demonstration.start[operation.main] for operation in assembly.operations])
-        covariance, seen = np.repeat(_UNSEEN[None], len(assembly), axis=0), np.zeros(len(assembly), dtype=np.bool_)
+        covariance = np.repeat(_UNSEEN[None], len(assembly), axis=0)
+        seen = np.zeros(len(assembly), dtype=np.bool_)
         for event in events:
             if event.found is not None and event.operation is not None:
                 k = event.operation
-                goals[k], covariance[k], seen[k] = event.found.T, event.found.covariance, True
+                goals[k] = event.found.T
+                covariance[k] = event.found.covariance
+                seen[k] = True
         return Observation(assembly, demonstration.start, goals, floored(covariance + demonstration.careless), seen)
 
     def sensed(self, rng: np.random.Generator) -> list[Array]:

@@ -15,7 +15,8 @@ _DEVIATIONS = 6.0
 """Standard deviations of the smoothed difference that are no change either."""
 _SMOOTHED = 0.46
 """Standard deviation of the median of three medians of three numbers over that of one."""
-_LEAST_PIXELS, _LEAST_WIDTH = 40, 5
+_LEAST_PIXELS = 40
+_LEAST_WIDTH = 5
 """Regions that are smaller, or hold no square of so many pixels, 14 mm, are edges of something that moved a little."""
 
 

@@ -23,7 +23,8 @@ def starts(shape: Shape, points: Array, same: Array) -> Array:
         same: (m, 4, 4), displacements after which the shape looks the same.
     """
     turn = _sides(points[:, :2])
-    c, s = np.cos(turn), np.sin(turn)
+    c = np.cos(turn)
+    s = np.sin(turn)
     Z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     low, high = _extent(points @ Z)
     found = []
@@ -31,7 +32,8 @@ def starts(shape: Shape, points: Array, same: Array) -> Array:
         a, b = turned_bounds(shape, R)
         at = np.array([*((low + high) / 2 - (a + b) / 2)[:2], high[2] - b[2]])
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = Z @ R, Z @ at
+        T[:3, :3] = Z @ R
+        T[:3, 3] = Z @ at
         found.append(T)
     return np.array(found)
 
@@ -47,7 +49,8 @@ def distinct(turns: Array, same: Array) -> Array:
 
 def turned_bounds(shape: Shape, R: Array) -> tuple[Array, Array]:
     """The lowest and the highest corner of the turned shape, (3,) each, [m]."""
-    centers, reach = shape.center @ R.T, np.einsum("kij,kj->ki", np.abs(R @ shape.turn), shape.half)
+    centers = shape.center @ R.T
+    reach = np.einsum("kij,kj->ki", np.abs(R @ shape.turn), shape.half)
     return (centers - reach).min(axis=0), (centers + reach).max(axis=0)
 
 

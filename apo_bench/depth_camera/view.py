@@ -35,7 +35,8 @@ class View:
         """Unit vectors through the middles of the pixels, row by row, (height * width, 3), world."""
         focal = self.height / 2 / np.tan(np.radians(self.fov_deg) / 2)
         v, u = np.mgrid[: self.height, : self.width]
-        x, y = (u + 0.5 - self.width / 2) / focal, (v + 0.5 - self.height / 2) / focal
+        x = (u + 0.5 - self.width / 2) / focal
+        y = (v + 0.5 - self.height / 2) / focal
         rays = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ self.T_world_view[:3, :3].T
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         rays.flags.writeable = False
@@ -44,7 +45,8 @@ class View:
 
 def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
     """The pose (4, 4) of a camera that stands at a point, looks at another and holds its picture upright, [m]."""
-    origin, at = np.asarray(from_m, dtype=np.float64), np.asarray(at_m, dtype=np.float64)
+    origin = np.asarray(from_m, dtype=np.float64)
+    at = np.asarray(at_m, dtype=np.float64)
     z = (at - origin) / np.linalg.norm(at - origin)
     x = np.cross(z, (0.0, 0.0, 1.0))
     x /= np.linalg.norm(x)

@@ -39,7 +39,8 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
     if sum(len(raw.places) for raw in raws) < fewest:
         raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
     folder.mkdir(parents=True, exist_ok=True)
-    places, said = dict[str, list[Place]](), list[str]()
+    places = dict[str, list[Place]]()
+    said = list[str]()
     for raw in raws:
         called = free_name(part_name(raw.name), places)
         foot = _foot(raw)
@@ -55,7 +56,8 @@ def _foot(raw: RawSolid) -> Array:
 
     An upright axis that goes by near there takes its place: the box around facets is off by a part of their sagitta.
     """
-    low, high = raw.mesh.corners.min(axis=0), raw.mesh.corners.max(axis=0)
+    low = raw.mesh.corners.min(axis=0)
+    high = raw.mesh.corners.max(axis=0)
     middle = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
     for region in raw.regions:
         if region.point is not None and region.axis is not None and abs(region.axis[2]) > _UPRIGHT:

@@ -164,14 +164,17 @@ def _grasp_named(sentence: str) -> str:
 
 def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     """In the middle of the site and at its corners, turned to either end."""
-    site, asked = scenario.site, set[str]()
+    site = scenario.site
+    asked = set[str]()
     low, high = site.yaw_rad
     places = {(0, 0, (low + high) / 2), *((i, j, low if i == j else high) for i, j in product((-1, 1), (-1, 1)))}
     for i, j, yaw in sorted(places):
-        x, y = site.center_m[0] + i * site.spread_m[0], site.center_m[1] + j * site.spread_m[1]
+        x = site.center_m[0] + i * site.spread_m[0]
+        y = site.center_m[1] + j * site.spread_m[1]
         layout = layout_at(scenario, x, y, yaw, None, scene.clearance_mm)
         for move in moves(Plan(scenario.assembly, layout.start, layout.goals), scene, False):
-            code, part = unreachable(scene, move.transfer), move.transfer.part
+            code = unreachable(scene, move.transfer)
+            part = move.transfer.part
             if code and code + part not in asked:
                 asked.add(code + part)
                 where = f"with the site at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
@@ -197,7 +200,8 @@ def _trials(path: Path, scenario: Scenario, scene: Scene, seeds: int, fidelity: 
 
 def _failed(row: object, scenario: Scenario) -> str:
     assert isinstance(row, dict)
-    k, code = row["failure_operation"], str(row["failure_code"])
+    k = row["failure_operation"]
+    code = str(row["failure_code"])
     part = scenario.assembly.operations[k - 1].main if k else ""
     remedy = _REMEDIES.get(code, "").format(k=k, part=part)
     who = "the human" if row["failure_stage"] == "demonstrate" else "the robot"

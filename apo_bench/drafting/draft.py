@@ -24,7 +24,8 @@ _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
-_FINGER_M, _MOST_HOLDS = (0.013, 0.018, 0.035), 300
+_FINGER_M = (0.013, 0.018, 0.035)
+_MOST_HOLDS = 300
 """Half the size of a finger with room to open and to go down, from 10 mm below its tip up; so many places are looked
 at."""
 _ROOM_M = 0.002
@@ -159,7 +160,8 @@ def _struck(
 ) -> bool:
     """Whether a finger beside a part at T would be in one of the others, or so far below it."""
     up = T[2, :3]
-    out, high = hold.half_width + _FINGER_M[0] - _ROOM_M, 0.025 - below_m / 2
+    out = hold.half_width + _FINGER_M[0] - _ROOM_M
+    high = 0.025 - below_m / 2
     half = np.add(_FINGER_M, (0.0, 0.0, below_m / 2))
     fingers = tuple(Box("", np.array([sign * out, 0.0, high]), half) for sign in (-1.0, 1.0))
     R = T[:3, :3] @ np.column_stack([hold.across, np.cross(up, hold.across), up])

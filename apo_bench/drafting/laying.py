@@ -12,13 +12,16 @@ from apo_bench.geometry.solid import Solid, extent
 
 _BASE_M = (-0.42, 0.0)
 """Where the arm that comes with the benchmark stands; it reaches the table between two distances."""
-_NEAREST_M, _FARTHEST_M = 0.27, 0.66
+_NEAREST_M = 0.27
+_FARTHEST_M = 0.66
 _LIKED_M = (0.05, 0.27)
 """Parts wait as near as can be to here, on either side."""
 _ROOMS_M = (0.055, 0.04, 0.03)
 """Between what waits, for fingers: as much as there is."""
 _GRID_M = 0.01
-_SPREAD_M, _LEAST_M, _YAW_DEG = (0.04, 0.06), 0.005, 28.0
+_SPREAD_M = (0.04, 0.06)
+_LEAST_M = 0.005
+_YAW_DEG = 28.0
 _LARGE_M = (0.13, 0.16)
 """An assembly that reaches so far from its middle is moved by no more than the least."""
 
@@ -91,7 +94,8 @@ def _tried(
     for part in sorted(turns, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
         low, high = boxes[part]
         for middle in _grid():
-            a, b = middle - (high - low) / 2, middle + (high - low) / 2
+            a = middle - (high - low) / 2
+            b = middle + (high - low) / 2
             if all(_apart(a, b, *other, room) for other in taken) and all(
                 np.linalg.norm(np.clip(c, a, b) - c) > r + room for c, r in kept_free
             ):

@@ -11,7 +11,8 @@ from apo_bench.geometry.solid import Solid, extent
 
 _LOW_M = 2e-5
 """Corners so near to the lowest one carry."""
-_LEAST_M, _SLOPE = 5e-4, 0.04
+_LEAST_M = 5e-4
+_SLOPE = 0.04
 """The centre of mass lies at least so far inside of what carries, and so much of its height."""
 _LEVEL = 1e-6
 

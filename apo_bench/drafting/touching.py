@@ -23,9 +23,12 @@ from apo_bench.geometry.mate import mate
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 
-NEAR_M, NEAR_RAD, _SHARE = 5e-5, 2e-3, 0.02
+NEAR_M = 5e-5
+NEAR_RAD = 2e-3
+_SHARE = 0.02
 """A contact at the poses that were given."""
-_CLOSED_M, _CLOSED_RAD = 5e-7, 1e-4
+_CLOSED_M = 5e-7
+_CLOSED_RAD = 1e-4
 """A contact of a scenario."""
 _ROUNDS = 8
 _ARM_M = 0.05
@@ -33,7 +36,8 @@ _ARM_M = 0.05
 _DEEP_M = 2e-5
 """Parts that are deeper in each other do not only touch."""
 _NO_PLAY_MM = 1e-3
-_COAXIAL_M, _THREAD_M = 1e-4, 2.5e-3
+_COAXIAL_M = 1e-4
+_THREAD_M = 2.5e-3
 """A shaft that is so much thicker than the hole around it is pressed in, or has a thread."""
 
 
@@ -57,7 +61,8 @@ def closed(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact], fixed: Iterable[str]
 ) -> tuple[Poses, tuple[Contact, ...], tuple[Contact, ...]]:
     """Poses at which contacts are closed, those contacts, and those that no poses close together with the others."""
-    kept, dropped = list(contacts), list[Contact]()
+    kept = list(contacts)
+    dropped = list[Contact]()
     free = [part for part in solids if part not in set(fixed)]
     while True:
         solved = _solved(solids, poses, kept, free)
@@ -137,14 +142,16 @@ def _solved(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], 
     now = {part: np.array(T) for part, T in poses.items()}
     place = {part: 6 * i for i, part in enumerate(free)}
     for _ in range(_ROUNDS):
-        rows, values = list[Array](), list[float]()
+        rows = list[Array]()
+        values = list[float]()
         for contact in contacts:
             a, b = contact
             each = _facing(solids, now, contact)
             if each is None:
                 continue
             for i, (e, slope) in enumerate(zip(each.residual, each.slope, strict=True)):
-                row, scale = np.zeros(6 * len(free)), 1.0 if i < each.lengths else _ARM_M
+                row = np.zeros(6 * len(free))
+                scale = 1.0 if i < each.lengths else _ARM_M
                 for part, sign in ((a.part, 1.0), (b.part, -1.0)):
                     if part in place:
                         row[place[part] : place[part] + 6] += sign * scale * slope
@@ -161,7 +168,8 @@ def _solved(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], 
 
 def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Facing | None:
     a, b = contact
-    one, other = _only(solids[a.part], a.face), _only(solids[b.part], b.face)
+    one = _only(solids[a.part], a.face)
+    other = _only(solids[b.part], b.face)
     pairs = facing(
         one, poses[a.part], other, poses[b.part], gap_m=10 * NEAR_M, angle_rad=10 * NEAR_RAD, share=_SHARE / 2
     )

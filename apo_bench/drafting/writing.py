@@ -148,9 +148,11 @@ def turn_deg(R: Array) -> Array:
     down = float(np.hypot(R[0, 0], R[1, 0]))
     y = np.arctan2(-R[2, 0], down)
     if down > 1e-9:
-        x, z = np.arctan2(R[2, 1], R[2, 2]), np.arctan2(R[1, 0], R[0, 0])
+        x = np.arctan2(R[2, 1], R[2, 2])
+        z = np.arctan2(R[1, 0], R[0, 0])
     else:
-        x, z = np.arctan2(-R[1, 2], R[1, 1]), 0.0
+        x = np.arctan2(-R[1, 2], R[1, 1])
+        z = 0.0
     found = np.degrees([x, y, z])
     near = 90.0 * np.round(found / 90.0)
     return np.where(np.abs(found - near) < 1e-7, near, found) + 0.0

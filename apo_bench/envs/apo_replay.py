@@ -153,7 +153,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
-        self._eye, self._model, self._allowed = eye, USUAL if noise is None else noise, looks
+        self._eye = eye
+        self._model = USUAL if noise is None else noise
+        self._allowed = looks
         self._usual = self._now = Settings(Level(*level_pair(level, eye)), careless, clearance_mm)
         self._noise = self._usual_noise = make_noise(self._model, self._usual.level)
         self._scene = build_scene(
@@ -244,8 +246,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._look = looks_at(recording, noise, self._trial, self._allowed) if self._allowed else None
         self._recording = replace(recording, images=None)
         self.aim(self._seen.goals)
-        self._refused, self._over = observation_failure(self._seen), False
-        self._poses, self._state = recording.layout.start, None
+        self._refused = observation_failure(self._seen)
+        self._over = False
+        self._poses = recording.layout.start
+        self._state = None
         return self._observation(), {"demonstration": recording.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
@@ -323,7 +327,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         same = now.level == self._usual.level
         noise = self._usual_noise if same else make_noise(self._model, now.level)
         self._scene = self._scenes.of(now.clearance_mm)
-        self._now, self._noise = now, noise
+        self._now = now
+        self._noise = noise
 
     def _watch_human(self, seed: int | None) -> tuple[int, Recording]:
         """Trial `seed`, or the next one whose demonstration is right."""

@@ -19,8 +19,10 @@ from apo_bench.io.strict_csv import check_separator
 
 _COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 _WANTED = "needed are, in this order, " + ",".join(_COLUMNS)
-_LONGEST_LINE, MOST_ROWS = 4096, 1_000_000
-LARGEST_ID, LARGEST_MM = 2**31 - 1, 1e6
+_LONGEST_LINE = 4096
+MOST_ROWS = 1_000_000
+LARGEST_ID = 2**31 - 1
+LARGEST_MM = 1e6
 _NOT_A_ROTATION = 0.02
 """R R^t may be so far from the identity: published truth is rounded, that of LM-O by 0.0096."""
 _METRES = 20.0
@@ -56,7 +58,10 @@ def read_results(path: str | Path) -> PoseRows:
     Raises:
         InputError: Anything that is not as described, with the line where it stands.
     """
-    ids, numbers, scores, lines = array("q"), array("d"), array("d"), array("q")
+    ids = array("q")
+    numbers = array("d")
+    scores = array("d")
+    lines = array("q")
     for line, text in _lines(path):
         place = f"{path}, line {line}"
         if len(lines) == MOST_ROWS:
@@ -70,7 +75,8 @@ def read_results(path: str | Path) -> PoseRows:
         raise InputError(f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 12)
     where = np.frombuffer(ids, dtype=np.int64).reshape(-1, 3)
-    R, t = cells[:, :9].reshape(-1, 3, 3), cells[:, 9:]
+    R = cells[:, :9].reshape(-1, 3, 3)
+    t = cells[:, 9:]
     stated = np.frombuffer(scores, dtype=np.float64)
     return check_rows(PoseRows(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64), stated))
 
@@ -104,7 +110,8 @@ def _refuse_twice(rows: PoseRows) -> None:
     same = np.flatnonzero((cells[order[1:]] == cells[order[:-1]]).all(axis=1))
     if same.size:
         i = same[np.argmin(order[same + 1])]
-        first, again = int(order[i]), int(order[i + 1])
+        first = int(order[i])
+        again = int(order[i + 1])
         earlier = rows.place[first]
         earlier = earlier if isinstance(earlier, str) else f"line {earlier}"
         raise InputError(f"{rows.said(again)}: the row of {earlier} stands there once more; keep one of the two.")

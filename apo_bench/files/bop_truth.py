@@ -103,7 +103,8 @@ def _entries(root: JsonNode, scene: int) -> Iterator[tuple[tuple[int, int, int],
             part = _member(node, "obj_id").integer()
             if not 0 <= part <= LARGEST_ID:
                 _member(node, "obj_id").fail("a whole number from 0 is needed")
-            R, t = _member(node, "cam_R_m2c").numbers(9).reshape(3, 3), _member(node, "cam_t_m2c").numbers(3)
+            R = _member(node, "cam_R_m2c").numbers(9).reshape(3, 3)
+            t = _member(node, "cam_t_m2c").numbers(3)
             if max(np.abs(R).max(), np.abs(t).max()) > LARGEST_MM:
                 node.fail(f"numbers of at most {LARGEST_MM:g} are needed")
             yield (scene, int(image), part), R, t, place

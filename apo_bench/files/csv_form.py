@@ -27,8 +27,10 @@ from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
-_POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
-_LENGTHS, _ANGLES = {"mm": 1e-3, "m": 1.0}, {"deg": math.pi / 180.0, "rad": 1.0}
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_LENGTHS = {"mm": 1e-3, "m": 1.0}
+_ANGLES = {"deg": math.pi / 180.0, "rad": 1.0}
 _COLUMNS: Columns = {
     **{name: (name, 1.0) for name in ("operation", "part")},
     **{f"{name}_{unit}": (name, size) for name in _POSITION for unit, size in _LENGTHS.items()},
@@ -57,7 +59,8 @@ def read_table(
     Raises:
         InputError: Anything in the file that is not as described, naming line and column.
     """
-    assembly, rows = scenario.assembly, dict[int, CsvRow]()
+    assembly = scenario.assembly
+    rows = dict[int, CsvRow]()
     for row in read_csv(path, _COLUMNS, _REQUIRED):
         k = _operation(row, assembly)
         if k in rows:
@@ -131,7 +134,8 @@ def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, f
     """A standard deviation; the assumed one if the cell is empty."""
     if not row.text(meaning):
         return assumed
-    x, unit = row.number(meaning, math.inf), row.cells[meaning][2]
+    x = row.number(meaning, math.inf)
+    unit = row.cells[meaning][2]
     if not is_within(x, limits):
         low, high = (limit / unit for limit in limits)
         row.fail(meaning, f"a standard deviation from {low:g} to {high:g} is needed")

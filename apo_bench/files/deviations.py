@@ -7,9 +7,11 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-DEVIATION_MM, DEVIATION_DEG = 1.0, 1.0
+DEVIATION_MM = 1.0
+DEVIATION_DEG = 1.0
 """What is assumed where a file states no standard deviations."""
-SHIFT_M, TURN_RAD = (1e-7, 10.0), (1e-4 * pi / 180.0, pi)
+SHIFT_M = (1e-7, 10.0)
+TURN_RAD = (1e-4 * pi / 180.0, pi)
 """Least and greatest standard deviation, [m] and [rad]: within, ranks and gaps are told from rounding."""
 ALLOWED_DEVIATIONS = "standard deviations from 0.0001 to 10000 mm and from 0.0001 to 180 deg are allowed"
 _ROUNDING = 1e-9

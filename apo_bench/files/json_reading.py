@@ -108,7 +108,8 @@ def _shared(node: JsonNode, n: int) -> SharedError:
         given["operations"].fail(f"operations from 1 to {n}, each once, are needed")
     if "local" in given and "frame" not in given:
         given["local"].fail("a frame is needed with it", "state the frame, or leave this out")
-    m, correlation = len(operations), None
+    m = len(operations)
+    correlation = None
     if "correlation" in given:
         correlation = given["correlation"].numbers(m, m)
         if np.abs(correlation - correlation.T).max() > 1e-9 or np.abs(np.diag(correlation) - 1.0).max() > 1e-9:
@@ -174,7 +175,8 @@ def _operations(
 
 
 def _pose(fields: Mapping[str, JsonNode]) -> Array:
-    position, q = fields["position_mm"].numbers(3), fields["quaternion_wxyz"].quaternion()
+    position = fields["position_mm"].numbers(3)
+    q = fields["quaternion_wxyz"].quaternion()
     return pose.unpack(np.concatenate([position * 1e-3, q]))
 
 

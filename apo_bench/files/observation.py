@@ -90,7 +90,8 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
 def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) -> Observation:
     """The nominal goals of a scenario, as if they had been seen with these standard deviations."""
     check_deviations(deviation_mm, deviation_deg)
-    layout, n = layout_at(scenario, 0.0, 0.0, 0.0), len(scenario.assembly)
+    layout = layout_at(scenario, 0.0, 0.0, 0.0)
+    n = len(scenario.assembly)
     covariance = np.diag([deviation_mm * 1e-3] * 3 + [radians(deviation_deg)] * 3) ** 2
     return Observation(
         assembly=scenario.assembly,

@@ -100,7 +100,8 @@ def _carries_fit(solid: Solid, box: Box, sides: Sequence[_Side], axis: int, sign
     if not any(side.fit for side in near):
         return False
     on = [side for side in near if side.shape.intersection(_rectangle(box, axis)).area > SLIVER_M2]
-    fit, other = [side.name for side in on if side.fit], [side.name for side in on if not side.fit]
+    fit = [side.name for side in on if side.fit]
+    other = [side.name for side in on if not side.fit]
     if fit and other:
         raise InputError(
             f"box '{box.name}' of part '{solid.name}' has the fit face '{fit[0]}' and the face '{other[0]}' on one "

@@ -27,7 +27,8 @@ def shadow(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
     own = axes @ R
     if isinstance(piece, Hull):
         ends = own @ piece.corners.T
-        low, high = ends.min(axis=1), ends.max(axis=1)
+        low = ends.min(axis=1)
+        high = ends.max(axis=1)
         return (low + high) / 2, (high - low) / 2
     return own @ piece.center, np.abs(own) @ piece.half
 
@@ -44,7 +45,8 @@ def across_sides(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
 
 def across_edges(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     """Those across an edge of each, (k, 3)."""
-    u, v = (_sides(a)[1] @ R_a.T)[:, None], (_sides(b)[1] @ R_b.T)[None]
+    u = (_sides(a)[1] @ R_a.T)[:, None]
+    v = (_sides(b)[1] @ R_b.T)[None]
     pairs = np.empty((len(u), v.shape[1], 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         pairs[..., i] = u[..., j] * v[..., k] - u[..., k] * v[..., j]

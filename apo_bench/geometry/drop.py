@@ -10,7 +10,8 @@ TOUCH_M = 1e-6
 """Deeper than this a solid is in another one, and no longer beside it."""
 _STEP_M = 5e-4
 """Places along a fall are so far apart: two boxes that together are thinner could pass each other unseen."""
-_MOST_PLACES, _AT_ONCE = 10_000, 100_000
+_MOST_PLACES = 10_000
+_AT_ONCE = 100_000
 """At most so many places, the farther apart; so many pairs of boxes are looked at together, which bounds the memory."""
 
 
@@ -24,7 +25,8 @@ def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
         met = _first_met(a, T_a, ways, b, T_b)
         if met is None:
             return np.inf
-        low, high = float(ways[max(0, met - 1)]), float(ways[met])
+        low = float(ways[max(0, met - 1)])
+        high = float(ways[met])
     return low
 
 

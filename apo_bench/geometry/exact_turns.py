@@ -36,7 +36,8 @@ class _Marks(NamedTuple):
 
 def exact_turns(solid: Solid) -> Array:
     """The displacements that leave a solid as it is, (m, 4, 4), the identity first; not of a part of revolution."""
-    marks, found = _marks(solid), [np.eye(3)]
+    marks = _marks(solid)
+    found = [np.eye(3)]
     for R in _candidates(marks):
         new = all(np.abs(R - known).max() > 1e-6 for known in found)
         if new and _carries(marks, R) and fills_the_same(solid, _about(solid, R), _doubt(solid)):
@@ -91,7 +92,8 @@ def _doubt(solid: Solid) -> float:
 
 def _about(solid: Solid, R: Array) -> Array:
     g = np.eye(4)
-    g[:3, :3], g[:3, 3] = R, solid.centroid - R @ solid.centroid
+    g[:3, :3] = R
+    g[:3, 3] = solid.centroid - R @ solid.centroid
     return g
 
 
@@ -100,7 +102,8 @@ def _marks(solid: Solid) -> _Marks:
 
     Names do not count, nor do rims, which other faces end in; marks of fit, sizes and kinds do.
     """
-    points, tags = list[Array](), list[tuple[object, ...]]()
+    points = list[Array]()
+    tags = list[tuple[object, ...]]()
     rounds = [one for one in solid.rounds.values() if one.kind != "rim"]
     for face in solid.faces.values():
         corners = np.concatenate([face.outline, *face.holes])
@@ -128,12 +131,15 @@ def _key(length: float) -> int:
 
 def _middle(face: Face) -> Array:
     """The centre of area of a flat face, (3,), [m]."""
-    whole, moment, origin = 0.0, np.zeros(3), face.outline[0]
+    whole = 0.0
+    moment = np.zeros(3)
+    origin = face.outline[0]
     for loop in (face.outline, *face.holes):
         a = loop - origin
         b = np.concatenate([a[1:], a[:1]])
         twice = np.cross(a, b) @ face.normal
-        whole, moment = whole + twice.sum(), moment + ((a + b) * twice[:, None]).sum(axis=0)
+        whole = whole + twice.sum()
+        moment = moment + ((a + b) * twice[:, None]).sum(axis=0)
     return np.asarray(origin + moment / (3.0 * whole))
 
 
@@ -161,7 +167,8 @@ def _candidates(marks: _Marks) -> list[Array]:
     second = next((i for i in order if _sine(p, marks.points[i]) > _APART), None)
     if second is None:
         return []
-    q, found = marks.points[second], list[Array]()
+    q = marks.points[second]
+    found = list[Array]()
     base = _frame(p, q)
     for a in marks.points[_like(marks, far, first)]:
         for b in marks.points[_like(marks, far, second)]:
@@ -180,7 +187,8 @@ def _sine(p: Array, q: Array) -> float:
 
 def _frame(p: Array, q: Array) -> Array:
     """The rotation whose x axis is along p, with q in the plane of x and y."""
-    x, z = p / np.linalg.norm(p), np.cross(p, q)
+    x = p / np.linalg.norm(p)
+    z = np.cross(p, q)
     z = z / np.linalg.norm(z)
     return np.column_stack([x, np.cross(z, x), z])
 

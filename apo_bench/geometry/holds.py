@@ -18,11 +18,16 @@ from apo_bench.geometry.solid import Piece, Solid, extent
 
 PAD_M = (0.016, 0.010, 0.026)
 """How far pads reach from between their tips: to each side, down and up, [m]."""
-_FINGER_M, ROOM_M = 0.012, 0.012
+_FINGER_M = 0.012
+ROOM_M = 0.012
 """How thick a finger is; how far it stands off before it closes."""
-_PALM_M, _OVER_M = 0.060, 0.0115
+_PALM_M = 0.060
+_OVER_M = 0.0115
 """A part reaches at most so far up beside the tips, which are at least so high above what it stands on."""
-_RAY_M, _FINE_M, _FLAT_M, _LINE_M = 0.003, 0.001, 1e-4, 0.003
+_RAY_M = 0.003
+_FINE_M = 0.001
+_FLAT_M = 1e-4
+_LINE_M = 0.003
 """Rays are so far apart, and rows of them so where that finds nothing, as on a thin flange; surfaces so deep behind the
 outermost one are pressed, too; and so long at least."""
 _ROUNDING_M = 1e-6
@@ -69,13 +74,15 @@ def held_span(pieces: tuple[Piece, ...], point: Array, across: Array, up: Array)
     """
     along = np.cross(up, across)
     side, down, over = PAD_M
-    t, h = float(point @ along), float(point @ up)
+    t = float(point @ along)
+    h = float(point @ up)
     columns = _lines(t - side, t + side, _axes_within(pieces, along, t - side, t + side))
     rows = _lines(h - down, h + over, _axes_within(pieces, up, h - down, h + over))
     rays = _cast(pieces, across, up, columns, rows)
     here = float(point @ across)
     spans = _clusters(rays, np.ones(len(rays.t), dtype=np.bool_))
-    begins, ends = [low for low, _ in spans if low < here], [high for _, high in spans if high > here]
+    begins = [low for low, _ in spans if low < here]
+    ends = [high for _, high in spans if high > here]
     return (begins[-1] - here, ends[0] - here) if begins and ends else None
 
 
@@ -168,7 +175,8 @@ def _level_axes(up: Array) -> tuple[Array, Array]:
 
 def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M) -> Array:
     """Places from one end to the other, the middle among them, just inside, and some more."""
-    middle, reach = (low + high) / 2, (high - low) / 2 - 1e-6
+    middle = (low + high) / 2
+    reach = (high - low) / 2 - 1e-6
     n = max(4, int(np.ceil(reach / ray_m)))
     return np.unique(np.round(np.append(middle + np.linspace(-reach, reach, 2 * n + 1), also), 9))
 
@@ -181,7 +189,8 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
     met = np.flatnonzero((t0 < t1) & (h0 < h1))
     T, H = np.meshgrid(t, h)
     start = T[..., None] * along + H[..., None] * up
-    low, high = np.full((*T.shape, len(met)), np.inf), np.full((*T.shape, len(met)), -np.inf)
+    low = np.full((*T.shape, len(met)), np.inf)
+    high = np.full((*T.shape, len(met)), -np.inf)
     for k, i in enumerate(met):
         here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
         ends = _ends(pieces[i], across, start[here].reshape(-1, 3))
@@ -198,14 +207,16 @@ def _corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
 
 def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Of rising places, the first in the shadow of each piece and the one behind its last."""
-    low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
+    low = np.minimum.reduceat(at, first)
+    high = np.maximum.reduceat(at, first)
     return np.searchsorted(places, low - _ROUNDING_M), np.searchsorted(places, high + _ROUNDING_M)
 
 
 def _ends(piece: Piece, across: Array, start: Array) -> tuple[Array, Array]:
     """Where rays from (r, 3) enter and leave a piece, (r,) each; infinite where they miss it."""
     planes = _sides(piece)
-    rate, room = planes[:, :3] @ across, planes[:, 3] - start @ planes[:, :3].T
+    rate = planes[:, :3] @ across
+    room = planes[:, 3] - start @ planes[:, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
         at = room / rate
     flat = np.abs(rate) < 1e-12
@@ -225,14 +236,17 @@ def _sides(piece: Piece) -> Array:
 
 def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """From where to where there is something, [m], one after the other; gaps that no finger fits into do not count."""
-    low, high = rays.low[within], rays.high[within]
+    low = rays.low[within]
+    high = rays.high[within]
     there = np.isfinite(low)
     if not there.any():
         return []
     order = np.argsort(low[there])
-    low, reached = low[there][order], np.maximum.accumulate(high[there][order])
+    low = low[there][order]
+    reached = np.maximum.accumulate(high[there][order])
     apart = low[1:] >= reached[:-1] + _FINGER_M + ROOM_M
-    begins, ends = np.append(low[0], low[1:][apart]), np.append(reached[:-1][apart], reached[-1])
+    begins = np.append(low[0], low[1:][apart])
+    ends = np.append(reached[:-1][apart], reached[-1])
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
@@ -258,7 +272,8 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple
 
 def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) -> bool:
     """Whether a finger, open or on its way down, would strike the part itself."""
-    a, b = rays.low[above], rays.high[above]
+    a = rays.low[above]
+    b = rays.high[above]
     room = _FINGER_M + ROOM_M
     struck = [(a < end) & (b > begin) for begin, end in ((low - room, low - 1e-6), (high + 1e-6, high + room))]
     return bool((struck[0] | struck[1]).any())

@@ -73,7 +73,8 @@ class Hull:
     @cached_property
     def edges(self) -> Array:
         """Directions of its edges, (e, 3), each once up to its sign."""
-        n, d = self.planes[:, :3], self.planes[:, 3]
+        n = self.planes[:, :3]
+        d = self.planes[:, 3]
         on = np.abs(n @ self.corners.T - d[:, None]) < 1e-7 * (1.0 + np.abs(d[:, None]))
         both = on.astype(np.int64) @ on.T.astype(np.int64)
         pairs = np.argwhere(np.triu(both >= 2, k=1))

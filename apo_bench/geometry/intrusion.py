@@ -33,7 +33,8 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     Separating axes: two pieces are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
-    (middle_a, reach_a), (middle_b, reach_b) = _ball(a.pieces), _ball(b.pieces)
+    middle_a, reach_a = _ball(a.pieces)
+    middle_b, reach_b = _ball(b.pieces)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     if between @ between > (reach_a + reach_b + _TOUCHING_M) ** 2:
         return 0.0
@@ -52,7 +53,8 @@ def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece
     """
     if not (_all_boxes(a) and _all_boxes(b)):
         return _piece_by_piece(a, R_a, at, b, T_b)
-    (centers_a, halves_a), (centers_b, halves_b) = _boxes(a), _boxes(b)
+    centers_a, halves_a = _boxes(a)
+    centers_b, halves_b = _boxes(b)
     axes = _axes(R_a, T_b[:3, :3])
     reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
     between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
@@ -62,10 +64,12 @@ def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece
 
 def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Iterator[WaysOut]:
     """Of each pair of pieces of two posed solids that are deeper in each other, how they may be taken apart."""
-    R_a, R_b = T_a[:3, :3], T_b[:3, :3]
+    R_a = T_a[:3, :3]
+    R_b = T_b[:3, :3]
     if _all_boxes(a.pieces) and _all_boxes(b.pieces):
         axes = _axes(R_a, R_b)
-        (centers_a, halves_a), (centers_b, halves_b) = _boxes(a.pieces), _boxes(b.pieces)
+        centers_a, halves_a = _boxes(a.pieces)
+        centers_b, halves_b = _boxes(b.pieces)
         reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ R_b).T)[None]
         between = pose.apply(T_a, centers_a)[:, None] - pose.apply(T_b, centers_b)[None]
         along = between @ axes.T
@@ -73,12 +77,14 @@ def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Itera
         for i, j in np.argwhere(depths.min(axis=-1) > deep_m):
             yield _ways(a.pieces[i], T_a, b.pieces[j], T_b, axes, along[i, j], depths[i, j])
         return
-    (balls_a, radii_a), (balls_b, radii_b) = _balls(a.pieces), _balls(b.pieces)
+    balls_a, radii_a = _balls(a.pieces)
+    balls_b, radii_b = _balls(b.pieces)
     between = pose.apply(T_a, balls_a)[:, None] - pose.apply(T_b, balls_b)[None]
     near = np.sqrt((between * between).sum(axis=-1)) < radii_a[:, None] + radii_b
     for own, other in ((a.pieces[i], b.pieces[j]) for i, j in np.argwhere(near)):
         axes = separating_axes(own, R_a, other, R_b)
-        (middle_a, half_a), (middle_b, half_b) = shadow(own, R_a, axes), shadow(other, R_b, axes)
+        middle_a, half_a = shadow(own, R_a, axes)
+        middle_b, half_b = shadow(other, R_b, axes)
         along = axes @ (T_a[:3, 3] - T_b[:3, 3]) + middle_a - middle_b
         depths = half_a + half_b - np.abs(along)
         if depths.min() > deep_m:
@@ -97,7 +103,8 @@ def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece,
     No pair is deeper than its balls and boxes are in each other, nor than it is across its sides alone, so most need
     not be looked at.
     """
-    R_b, rooms = T_b[:3, :3], _rooms(a, R_a, at, b, T_b)
+    R_b = T_b[:3, :3]
+    rooms = _rooms(a, R_a, at, b, T_b)
     deepest = np.where(rooms > 0.0, -rooms, -np.inf).max(axis=(1, 2))
     closest = rooms.min(axis=0)
     pairs = np.argwhere(closest <= 0.0)
@@ -117,8 +124,10 @@ def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece,
 
 def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
     """How far apart pieces are at least, at k places, (k, a, b), [m]: by balls, and by upright boxes, around them."""
-    (balls_a, radii_a), (balls_b, radii_b) = _balls(a), _balls(b)
-    (boxes_a, halves_a), (boxes_b, halves_b) = _upright(a, R_a), _upright(b, T_b[:3, :3])
+    balls_a, radii_a = _balls(a)
+    balls_b, radii_b = _balls(b)
+    boxes_a, halves_a = _upright(a, R_a)
+    boxes_b, halves_b = _upright(b, T_b[:3, :3])
     shift = (at - T_b[:3, 3])[:, None, None]
     between = shift + (balls_a @ R_a.T)[:, None] - (balls_b @ T_b[:3, :3].T)[None]
     rooms = np.sqrt((between * between).sum(axis=-1)) - (radii_a[:, None] + radii_b[None])
@@ -128,8 +137,10 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
     """Middles and half sizes, (k, 3) each, of the boxes around turned pieces whose sides are those of the world."""
-    corners, begin = _corners(pieces) @ R.T, _begins(pieces)
-    low, high = np.minimum.reduceat(corners, begin), np.maximum.reduceat(corners, begin)
+    corners = _corners(pieces) @ R.T
+    begin = _begins(pieces)
+    low = np.minimum.reduceat(corners, begin)
+    high = np.maximum.reduceat(corners, begin)
     return (low + high) / 2, (high - low) / 2
 
 
@@ -141,7 +152,8 @@ def _begins(pieces: tuple[Piece, ...]) -> NDArray[np.intp]:
 
 def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:
     """How deep one piece is in another one along some axes, at k places, (k,), [m]; infinite along none."""
-    (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, T_b[:3, :3], axes)
+    middle_a, half_a = shadow(a, R_a, axes)
+    middle_b, half_b = shadow(b, T_b[:3, :3], axes)
     apart = np.abs((at - T_b[:3, 3]) @ axes.T + (middle_a - middle_b))
     return np.asarray((half_a + half_b - apart).min(axis=-1, initial=np.inf))
 
@@ -175,13 +187,15 @@ def _boxes(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
 def _ball(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
     """Middle, (3,), and radius of a ball around pieces, in the frame of their solid."""
     centers, halves = _boxes(pieces)
-    low, high = (centers - halves).min(axis=0), (centers + halves).max(axis=0)
+    low = (centers - halves).min(axis=0)
+    high = (centers + halves).max(axis=0)
     return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
 
 
 def _axes(R_a: Array, R_b: Array) -> Array:
     """The directions along which two boxes may be apart, (k, 3), unit length; parallel edges give no cross product."""
-    a, b = R_a[:, :, None], R_b[:, None, :]
+    a = R_a[:, :, None]
+    b = R_b[:, None, :]
     crossed = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
     crossed = crossed.reshape(3, -1).T
     length = np.sqrt((crossed * crossed).sum(axis=1))
@@ -200,5 +214,6 @@ def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Arra
         corners = _corners(pieces) @ R.T + at
         return corners.min(axis=0), corners.max(axis=0)
     centers, halves = _boxes(pieces)
-    middle, reach = centers @ R.T + at, halves @ np.abs(R).T
+    middle = centers @ R.T + at
+    reach = halves @ np.abs(R).T
     return (middle - reach).min(axis=0), (middle + reach).max(axis=0)

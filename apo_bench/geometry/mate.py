@@ -71,11 +71,16 @@ def mate(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Ma
 
 def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     """A shaft in a hole, in either order: both cylinders, or both cones."""
-    ends, origin, u, v = pose.apply(T_a, a.ends), pose.apply(T_b, b.point[None])[0], _wider(a, T_a), _wider(b, T_b)
+    ends = pose.apply(T_a, a.ends)
+    origin = pose.apply(T_b, b.point[None])[0]
+    u = _wider(a, T_a)
+    v = _wider(b, T_b)
     along = T_b[:3, :3] @ b.axis
     at = (ends - origin) @ along
-    low, high = max(at.min(), b.span[0]), min(at.max(), b.span[1])
-    common, points = NOTHING, ends
+    low = max(at.min(), b.span[0])
+    high = min(at.max(), b.span[1])
+    common = NOTHING
+    points = ends
     if high > low and abs(at[1] - at[0]) > _EDGE_ON * a.length:
         points = ends[0] + np.outer((np.array([low, high]) - at[0]) / (at[1] - at[0]), ends[1] - ends[0])
         common = _unrolled([(low, high)], b.radius * min(a.extent_rad, b.extent_rad), points)
@@ -88,8 +93,10 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
 def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     """A cone on the rim of a hole, or the rim of a shaft in a countersink, in either order."""
     (cone, T_cone), (rim, T_rim) = ((a, T_a), (b, T_b)) if b.kind == "rim" else ((b, T_b), (a, T_a))
-    u, v = _wider(a, T_a), _wider(b, T_b)
-    middle, on_cone = pose.apply(T_rim, rim.middle[None]), pose.apply(T_cone, cone.point[None])
+    u = _wider(a, T_a)
+    v = _wider(b, T_b)
+    middle = pose.apply(T_rim, rim.middle[None])
+    on_cone = pose.apply(T_cone, cone.point[None])
     points = middle if a.kind == "rim" else middle - _across(middle - on_cone, _wider(cone, T_cone))
     off = _across(middle - on_cone, _wider(cone, T_cone)) * (1.0 if a.kind == "rim" else -1.0)
     rise, sine = _rise(cone, T_cone, rim, T_rim)
@@ -105,7 +112,8 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
     Args:
         of_plane: Whether places are compared on the plane, else along the shaft.
     """
-    ends, n = pose.apply(T_shaft, shaft.ends), T_flat[:3, :3] @ flat.normal
+    ends = pose.apply(T_shaft, shaft.ends)
+    n = T_flat[:3, :3] @ flat.normal
     axis = T_shaft[:3, :3] @ shaft.axis
     frame = T_flat @ plane_frame(flat)
     lines = _lines(pose.apply(pose.inverse(frame), ends)[:, :2], flat) if _reaches(shaft, T_shaft, n) else []

@@ -112,7 +112,8 @@ def plane_frame(face: Face) -> Array:
     """A frame on the plane of the face, z along its normal, (4, 4), in the frame of its solid."""
     edges = np.roll(face.outline, -1, axis=0) - face.outline
     longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]
-    z, x = face.normal, longest / np.linalg.norm(longest)
+    z = face.normal
+    x = longest / np.linalg.norm(longest)
     frame = np.eye(4)
     frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
     frame[:3, 3] = face.outline[0]

@@ -13,7 +13,8 @@ def straightened(ring: Array) -> Array:
 
     A sliver, such as a disc seen nearly edge-on, keeps its points where no three corners would be left.
     """
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    before = ring - np.roll(ring, 1, axis=0)
+    after = np.roll(ring, -1, axis=0) - ring
     across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     chord = np.maximum(np.linalg.norm(before + after, axis=1), _STRAIGHT_M)
     corners = ring[np.abs(across) > _STRAIGHT_M * chord]

@@ -59,7 +59,9 @@ def hat(w: ArrayLike) -> Array:
     """The cross-product matrix, (*, 3) -> (*, 3, 3)."""
     w = np.asarray(w, dtype=np.float64)
     out = np.zeros((*w.shape[:-1], 3, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -w[..., 2], w[..., 1], -w[..., 0]
+    out[..., 0, 1] = -w[..., 2]
+    out[..., 0, 2] = w[..., 1]
+    out[..., 1, 2] = -w[..., 0]
     return out - np.swapaxes(out, -1, -2)
 
 
@@ -137,9 +139,12 @@ def _turn(axis: int, degrees: float) -> Array:
     if degrees == 90.0 * quarter:
         c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
     else:
-        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
+        c = np.cos(np.radians(degrees))
+        s = np.sin(np.radians(degrees))
+    i = (axis + 1) % 3
+    j = (axis + 2) % 3
     R = np.eye(3)
     R[i, i] = R[j, j] = c
-    R[i, j], R[j, i] = -s, s
+    R[i, j] = -s
+    R[j, i] = s
     return R

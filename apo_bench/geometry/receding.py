@@ -10,7 +10,8 @@ from apo_bench.geometry.hull import Hull, cylinder_hull
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 
-_ON_M, _PARALLEL = 1e-7, 1e-7
+_ON_M = 1e-7
+_PARALLEL = 1e-7
 """A side lies on a face if it is this near to its plane, [m], or touches its cylinder or cone so nearly."""
 _SLIVER = 1e-6
 """A side that covers less than this part of itself of a flat face only borders on it."""
@@ -92,7 +93,8 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
         return False
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
     r = face.radii[0] - face.slope * face.span[0]
-    n, d = side[:3], side[3]
+    n = side[:3]
+    d = side[3]
     if abs(n @ face.axis - face.slope * w) > _PARALLEL or abs(n @ face.point - d - r * w) > _ON_M:
         return False
     at = (_corners_on(hull, side) - face.point) @ face.axis
@@ -101,7 +103,8 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
 
 def _on_flat(face: Face, hull: Hull, side: Array) -> bool:
     """Whether a side lies in the plane of a face and covers some of it."""
-    n, d = side[:3], side[3]
+    n = side[:3]
+    d = side[3]
     if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - d) > _ON_M:
         return False
     u = np.eye(3)[int(np.abs(n).argmin())]

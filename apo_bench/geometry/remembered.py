@@ -21,7 +21,8 @@ def remembered(function: Callable[Given, Found]) -> Callable[Given, Found]:
 
     @wraps(function)
     def found(*given: Given.args, **named: Given.kwargs) -> Found:
-        answers, asked = known.setdefault(given[0], {}), (given[1:], *sorted(named.items()))
+        answers = known.setdefault(given[0], {})
+        asked = (given[1:], *sorted(named.items()))
         if asked in answers:
             return answers[asked]
         made = function(*given, **named)

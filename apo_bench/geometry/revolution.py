@@ -11,7 +11,8 @@ from apo_bench.geometry.exact_turns import carries_faces, fills_the_same
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid
 
-_SAME_M, _SAME = 1e-5, 1e-10
+_SAME_M = 1e-5
+_SAME = 1e-10
 """Lines that are nearer are one line, [m]; cosines nearer to 1 are of one direction."""
 _FEWEST = 8
 """Sides of a polygon that may stand for a circle; coarse walls, that no contact needs, have so many."""
@@ -51,7 +52,8 @@ def revolution(solid: Solid) -> Revolution | None:
         if not across or not all(_is_circle(found, loop) for loop in (face.outline, *face.holes)):
             return None
     turns = [turn_about(found.point, found.axis, angle) for angle in _TURNS]
-    J, R = solid.inertia, turns[0][:3, :3]
+    J = solid.inertia
+    R = turns[0][:3, :3]
     if J is not None and np.abs(R @ J @ R.T - J).max() > _EVEN * np.trace(J):
         return None
     coarse = _COARSE * max(max(one.radii) for one in rounds)
@@ -75,7 +77,8 @@ def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
     found = revolution(solid)
     if found is None:
         return T
-    M, a = true[:3, :3].T @ T[:3, :3], found.axis
+    M = true[:3, :3].T @ T[:3, :3]
+    a = found.axis
     across = across_axis(a)
     flips = [np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)] if found.reversible else [np.eye(3)]
     turns = [flip @ _least_turn(M @ flip, a) for flip in flips]

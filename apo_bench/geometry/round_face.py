@@ -83,5 +83,6 @@ class RoundFace:
         x = x - (x @ z) * z
         x = x / np.sqrt(x @ x)
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), self.point
+        T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+        T[:3, 3] = self.point
         return frozen(T, 4, 4)

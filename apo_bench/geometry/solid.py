@@ -82,7 +82,8 @@ def _ends(piece: Piece, along: Array) -> tuple[float, float]:
     if isinstance(piece, Hull):
         found = piece.corners @ along
         return float(found.min()), float(found.max())
-    at, reach = along @ piece.center, np.abs(along) @ piece.half
+    at = along @ piece.center
+    reach = np.abs(along) @ piece.half
     return float(at - reach), float(at + reach)
 
 

@@ -61,18 +61,23 @@ def _boxed(moving: Posed, way: Array, resting: Posed, slack_m: float) -> tuple[N
 def _exactly(moving: Posed, way: Array, resting: Posed, slack_m: float, pair: int) -> Array:
     """Where the pieces of a pair meet, (1, 2), or nowhere, (0, 2): across their sides, then across edges."""
     a, b = (of.pieces[i] for of, i in zip((moving, resting), divmod(pair, len(resting.pieces)), strict=True))
-    R_a, R_b, between = moving.T[:3, :3], resting.T[:3, :3], moving.T[:3, 3] - resting.T[:3, 3]
+    R_a = moving.T[:3, :3]
+    R_b = resting.T[:3, :3]
+    between = moving.T[:3, 3] - resting.T[:3, 3]
 
     def meet(axes: Array) -> Array:
-        (middle_a, half_a), (middle_b, half_b) = shadow(a, R_a, axes), shadow(b, R_b, axes)
-        at, reach = middle_a - middle_b + axes @ between, half_a + half_b - slack_m
+        middle_a, half_a = shadow(a, R_a, axes)
+        middle_b, half_b = shadow(b, R_b, axes)
+        at = middle_a - middle_b + axes @ between
+        reach = half_a + half_b - slack_m
         return _intervals(at[None], axes @ way, reach[None])[1]
 
     sides = meet(across_sides(a, R_a, b, R_b))
     edges = meet(across_edges(a, R_a, b, R_b)) if len(sides) else sides
     if not len(edges):
         return edges
-    low, high = max(sides[0, 0], edges[0, 0]), min(sides[0, 1], edges[0, 1])
+    low = max(sides[0, 0], edges[0, 0])
+    high = min(sides[0, 1], edges[0, 1])
     return np.array([[low, high]]) if low < high else np.zeros((0, 2))
 
 
@@ -91,19 +96,23 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
 
     Pieces that are no boxes are compared by the boxes around them first, those that go on the longest before others.
     """
-    spans, exact, asked = list[Array](), list[bool](), list[tuple[Posed, Posed, int]]()
+    spans = list[Array]()
+    exact = list[bool]()
+    asked = list[tuple[Posed, Posed, int]]()
     for m, r in product(moving, resting):
         pairs, found = _boxed(m, way, r, -_SLACK_M)
         spans += list(found)
         exact += [all_boxes(m.pieces) and all_boxes(r.pieces)] * len(found)
         asked += [(m, r, int(k)) for k in pairs]
-    at, last = 0.0, np.array([span[1] for span in spans])
+    at = 0.0
+    last = np.array([span[1] for span in spans])
     order = np.argsort(-last, kind="stable")
     while (i := next((i for i in order if spans[i][0] <= at < spans[i][1]), None)) is not None:
         if not exact[i]:
             m, r, k = asked[i]
             met = _exactly(m, way, r, -_SLACK_M, k)
-            spans[i], exact[i] = met[0] if len(met) else np.array([np.inf, -np.inf]), True
+            spans[i] = met[0] if len(met) else np.array([np.inf, -np.inf])
+            exact[i] = True
         if spans[i][0] <= at < spans[i][1]:
             at = float(spans[i][1])
     return max(0.0, at - _SLACK_M)
@@ -111,7 +120,8 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
 
 def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:
     """Whether balls around two parts come near each other on the way; most parts are far away."""
-    (a, r_a), (b, r_b) = _ball(moving), _ball(resting)
+    a, r_a = _ball(moving)
+    b, r_b = _ball(resting)
     passed = float(np.clip((b - a) @ way, 0.0, length_m))
     return bool(np.linalg.norm(a + passed * way - b) < r_a + r_b)
 

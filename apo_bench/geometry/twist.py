@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array
 
-_TERMS, _SHORT = 24, 9
+_TERMS = 24
+_SHORT = 9
 """Terms of the series in the squared angle: for up to two turns, and for up to one radian, the rest is rounding."""
 
 
@@ -18,7 +19,8 @@ def _generators() -> Array:
     G = np.zeros((6, 4, 4))
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         G[i, i, 3] = 1.0
-        G[3 + i, j, k], G[3 + i, k, j] = -1.0, 1.0
+        G[3 + i, j, k] = -1.0
+        G[3 + i, k, j] = 1.0
     return G
 
 
@@ -28,9 +30,11 @@ def _adjoints() -> Array:
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         for block in (slice(0, 3), slice(3, 6)):
             turn = G[3 + i, block, block]
-            turn[j, k], turn[k, j] = -1.0, 1.0
+            turn[j, k] = -1.0
+            turn[k, j] = 1.0
         shift = G[i, :3, 3:]
-        shift[j, k], shift[k, j] = -1.0, 1.0
+        shift[j, k] = -1.0
+        shift[k, j] = 1.0
     return G
 
 
@@ -41,7 +45,9 @@ def _series() -> Array:
     """
     C = np.zeros((_TERMS, 6))
     for k in range(_TERMS):
-        sign, even, odd = (-1.0) ** k, 1.0 / factorial(2 * k + 2), 1.0 / factorial(2 * k + 3)
+        sign = (-1.0) ** k
+        even = 1.0 / factorial(2 * k + 2)
+        odd = 1.0 / factorial(2 * k + 3)
         C[k, :2] = sign * even, sign * odd
         C[k, 2:4] = (k - 1) * sign * even, -(k - 1) * sign * odd
         if k > 0:
@@ -56,7 +62,10 @@ ADJOINTS = _adjoints()
 """The adjoint matrix of a twist xi is sum_i xi_i ADJOINTS[i], (6, 6, 6)."""
 _TO_ADJOINT = ADJOINTS.reshape(6, 36)
 SERIES = _series()
-_ONE4, _ONE6, _SUM, _POWERS = np.eye(4), np.eye(6), np.ones(3), np.arange(float(_TERMS))
+_ONE4 = np.eye(4)
+_ONE6 = np.eye(6)
+_SUM = np.ones(3)
+_POWERS = np.arange(float(_TERMS))
 
 
 def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
@@ -72,7 +81,8 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     series = SERIES[: _SHORT if (q < 1.0).all() else _TERMS]
     f = ((q[..., None] ** _POWERS[: len(series)]) @ series[:, 2:])[..., None, None]
     a, b, c, d = (f[..., i, :, :] for i in range(4))
-    X, ad = (xi @ _TO_MATRIX).reshape(*lead, 3, 4), (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
+    X = (xi @ _TO_MATRIX).reshape(*lead, 3, 4)
+    ad = (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
     ad2 = ad @ ad
     J = a * ad + (b * _ONE6 + c * ad + d * ad2) @ ad2
     J += _ONE6

@@ -127,13 +127,15 @@ def arrive(
 
     found = chain(normals, out, float(np.sin(angle_rad)))
     if found.way is not None:
-        line, is_free = Attach(_own(-found.way.direction, T), reach(found.way.length_m)), found.way.free
+        line = Attach(_own(-found.way.direction, T), reach(found.way.length_m))
+        is_free = found.way.free
     else:
         there = list(_admissible(found, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
         over = [resting[part] for part in dict.fromkeys(each.rests for each in touched if each.normal @ UP < -_LIFTED)]
         tried = [(way, reach(far)) for way in there for far in dict.fromkeys((0.0, _past(moving, way, over)))]
         found_free = next((each for each in tried if clear(*each)), None)
-        (way, length_m), is_free = found_free or tried[0], found_free is not None
+        way, length_m = found_free or tried[0]
+        is_free = found_free is not None
         line = Attach(_own(-way, T), length_m)
     if direction is not None:
         line = Attach(direction, line.travel_m)

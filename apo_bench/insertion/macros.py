@@ -113,7 +113,8 @@ def departure(found: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     """
     back: list[Macro] = []
     for macro in reversed(found.macros):
-        d, length = -macro.direction, macro.length_m
+        d = -macro.direction
+        length = macro.length_m
         last = back[-1] if back else None
         if last is not None and last.direction @ d > 1.0 - _SMALL:
             length = max((x for x in (last.length_m, length) if x is not None), default=None)
@@ -136,7 +137,8 @@ def _insertion(layer: Layer, layers: Sequence[Layer], way: Way) -> Macro:
 def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
     """The guarded motions that close what can be opened: down onto what carries first, then sideways, one by one."""
     macros: list[Macro] = []
-    left, made = layer.breaks, layer.keeps
+    left = layer.breaks
+    made = layer.keeps
     while left:
         along = null_space(normals[list(made)]) if made else np.eye(3)
         off, closed = _next(normals, left, along, slack)
@@ -146,14 +148,16 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
         if layer.cone.state.constraining == 2:
             name = "move-to-bottom"
         macros.append(Macro(name, -off, closed, made))
-        made, left = (*made, *closed), tuple(i for i in left if i not in closed)
+        made = (*made, *closed)
+        left = tuple(i for i in left if i not in closed)
     return macros
 
 
 def _together(normals: Array, layer: Layer, macros: list[Macro], left: tuple[int, ...]) -> list[Macro]:
     """Motions of which the last closes what is left, too: turned where that would leave a wall, else one for all."""
     last = macros[-1]
-    makes, off = (*last.makes, *left), -last.direction
+    makes = (*last.makes, *left)
+    off = -last.direction
     if (normals[list(left)] @ off <= 0.0).any():
         off = _evenly_off(normals, makes, last.keeps)
         if not off.any():

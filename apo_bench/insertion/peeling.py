@@ -32,7 +32,8 @@ def peel(rows: Array) -> tuple[Layer, ...]:
 
     What can be opened is opened first, along walls that stay; walls on all sides are left at their end.
     """
-    left, layers = np.arange(len(rows)), []
+    left = np.arange(len(rows))
+    layers = []
     while len(left):
         cone = classify(rows[left])
         off = cone.detachable if cone.state.detaching else np.ones(len(left), dtype=np.bool_)

@@ -86,7 +86,8 @@ def classify(rows: Array) -> Cone:
     different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
     opens, x = _opened(different.tobytes(), *different.shape)
     detachable = opens[which.ravel()]
-    maintaining, constraining = n - row_rank(rows), row_rank(rows[~detachable])
+    maintaining = n - row_rank(rows)
+    constraining = row_rank(rows[~detachable])
     return Cone(rows, detachable, x, State(maintaining, n - maintaining - constraining, constraining))
 
 

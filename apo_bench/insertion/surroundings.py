@@ -33,7 +33,8 @@ def slide_directions(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[
 
 def _now(assembly: Assembly, found: Arrival, i: int, poses: Poses) -> Array:
     """A normal of what is touched, (3,), world, where the parts are believed to be."""
-    contact, rests = found.touched[i].contact, found.touched[i].rests
+    contact = found.touched[i].contact
+    rests = found.touched[i].rests
     place = sum(each.contact == contact for each in found.touched[:i])
     moves = [of.part for of in contact if of.part != rests]
     return touched_contacts(assembly, [contact], moves, poses)[place].normal

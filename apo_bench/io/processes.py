@@ -31,7 +31,8 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def descendants(pid: int) -> list[int]:
     """Children, their children and so on, those that have ended and are not waited for too; empty without /proc."""
-    found, todo = [], [pid]
+    found = []
+    todo = [pid]
     while todo:
         below = _children(todo.pop())
         found += below

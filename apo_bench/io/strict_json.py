@@ -45,7 +45,8 @@ class JsonNode:
 
     def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
         """The members of an object: every required key, no unknown one."""
-        required, optional = tuple(required), tuple(optional)
+        required = tuple(required)
+        optional = tuple(optional)
         if not isinstance(self.value, dict):
             self.fail("an object with named keys is needed", f"its keys are {', '.join((*required, *optional))}")
         known = (*required, *optional)

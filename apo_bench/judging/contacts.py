@@ -178,9 +178,11 @@ def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps 
         between = _mate(assembly, contact, poses)
         off = 1e3 * between.gap_m
         return Gaps(off, off) if between.common else None, float(np.degrees(between.angle_rad)), between.common
-    plane, normal = assembly.face(contact.manipulated).plane, assembly.face(contact.environment).normal
+    plane = assembly.face(contact.manipulated).plane
+    normal = assembly.face(contact.environment).normal
     found = face_overlap(assembly, contact, poses)
-    T_m, T_e = poses[contact.manipulated.part], poses[contact.environment.part]
+    T_m = poses[contact.manipulated.part]
+    T_e = poses[contact.environment.part]
     n = T_m[:3, :3] @ plane[:3]
     angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
     if not found:

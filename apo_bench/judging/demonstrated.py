@@ -33,7 +33,8 @@ def judge_demonstrated(
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
     """
-    after, final = reached.after, reached.final
+    after = reached.after
+    final = reached.final
     asked = ContactJudge(assembly, thresholds, clearance_mm)
     states = [snapshot for snapshot in (*after, final) if snapshot is not None]
     return judgement(

@@ -62,7 +62,8 @@ def faults_of_place(
         away: Parts that are not looked at.
         seen: The final poses, each part turned by the symmetry by which its contacts are judged.
     """
-    last, room = last_moves(assembly), dict(displacements(assembly, after, final, away))
+    last = last_moves(assembly)
+    room = dict(displacements(assembly, after, final, away))
     for parts, contacts in _standing(assembly, away).items():
         a, b = parts
         if a in assembly.fixed:
@@ -121,7 +122,8 @@ def _held(assembly: Assembly, contacts: Sequence[Contact], parts: tuple[str, str
         T: The pose of the first part, in whose frame the twists are.
     """
     points, normals = corners(assembly, touched_contacts(assembly, contacts, [parts[1]], seen), seen)
-    p, n = pose.apply(pose.inverse(T), points), normals @ T[:3, :3]
+    p = pose.apply(pose.inverse(T), points)
+    n = normals @ T[:3, :3]
     return np.concatenate([n, np.cross(p, n)], axis=1)
 
 

@@ -31,7 +31,8 @@ def judge_finished(
         reached: Sound snapshots.
         reference: (n, 4, 4), the true goals, world frame, [m].
     """
-    final, made = reached.final, all(snapshot is not None for snapshot in (*reached.after, reached.final))
+    final = reached.final
+    made = all(snapshot is not None for snapshot in (*reached.after, reached.final))
     if final is None:
         return judgement((), (), (), thresholds, all_made=False)
     away = fixtures(assembly)

@@ -42,7 +42,9 @@ class Looks:
         self.left = allowed
         self.seen_again = 0
         """Operations that were looked at again, each as often as that was."""
-        self._demonstration, self._noise, self._rng = demonstration, noise, rng
+        self._demonstration = demonstration
+        self._noise = noise
+        self._rng = rng
         self._assembly = assembly or demonstration.assembly
 
     def __call__(self, operations: Collection[int]) -> Observation:

@@ -21,7 +21,8 @@ from apo_bench.scenario.keys import read_pose
 _SCHEMA = "apo-bench/noise/2"
 """Without errors of the whole view."""
 _FARTHEST_MM = 1e5
-_LARGEST_VIEW_MM, _LARGEST_VIEW_DEG = 200.0, 45.0
+_LARGEST_VIEW_MM = 200.0
+_LARGEST_VIEW_DEG = 45.0
 _HUGE = 1e300
 """Degrees of freedom beyond are infinitely many."""
 
@@ -45,7 +46,8 @@ def read_noise(path: str | Path) -> tuple[MeasuredNoise, Camera]:
     """What a noise file states, and the camera it names, else the default one."""
     required = ("source", "missed_rate", "outlier_rate", "outlier_farthest_mm", "shift", "turn")
     top = read_toml(path, "noise file").fields_of(_SCHEMA, required, ("camera", "view", "constant"))
-    shift, turn = _split(top["shift"], "mm", 1000.0), _split(top["turn"], "deg", 180.0)
+    shift = _split(top["shift"], "mm", 1000.0)
+    turn = _split(top["turn"], "deg", 180.0)
     measured = MeasuredNoise(
         source=top["source"].text(),
         shift_mm=shift,
@@ -102,7 +104,8 @@ def _view_lines(view: ViewNoise) -> list[str]:
 
 def _constant_lines(constant: ConstantError) -> list[str]:
     packed = pose.pack(constant.frame)
-    shift, turn = constant.twist[:3] * 1e3, np.degrees(constant.twist[3:])
+    shift = constant.twist[:3] * 1e3
+    turn = np.degrees(constant.twist[3:])
     return [
         *("", "[constant]  # what is seen is displaced by this, in this frame"),
         *(f"shift_mm = {_listed(shift)}", f"turn_deg = {_listed(turn)}"),
@@ -123,7 +126,9 @@ def _view(node: JsonNode) -> ViewNoise:
 
 def _constant(node: JsonNode) -> ConstantError:
     keys = node.fields(("shift_mm", "turn_deg", "position_mm", "quaternion_wxyz"))
-    shift, turn, q = keys["shift_mm"].numbers(3), keys["turn_deg"].numbers(3), keys["quaternion_wxyz"].quaternion()
+    shift = keys["shift_mm"].numbers(3)
+    turn = keys["turn_deg"].numbers(3)
+    q = keys["quaternion_wxyz"].quaternion()
     if np.abs(shift).max() > _LARGEST_VIEW_MM:
         keys["shift_mm"].fail(f"numbers from {-_LARGEST_VIEW_MM:g} to {_LARGEST_VIEW_MM:g} are needed")
     if np.abs(turn).max() > _LARGEST_VIEW_DEG:

@@ -35,7 +35,8 @@ Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 
 _OPPOSED_RAD = math.radians(10.0)
 """Faces look at each other if one normal is this near to the opposite of the other."""
-TOUCHING_M, NEAR_M = 0.5e-3, 15e-3
+TOUCHING_M = 0.5e-3
+NEAR_M = 15e-3
 """Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
 _COVERED_M2 = 25e-6
 """Faces that cover less of each other do not meet, (5 mm)^2."""
@@ -147,7 +148,8 @@ class Shifted:
     def __call__(self, assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
         k, contact = _any(assembly, rng)
         part, old = contact.environment
-        sign, face = (1.0, -1.0)[int(rng.integers(2))], assembly.face_of(contact.environment)
+        sign = (1.0, -1.0)[int(rng.integers(2))]
+        face = assembly.face_of(contact.environment)
         new = _moved(face, f"{old}_shifted", _across(face, rng) * self.size_m * sign)
         instead = Contact(contact.manipulated, PartFace(part, new.name))
         solids = {**assembly.solids, part: _with_face(assembly.solids[part], new)}

@@ -15,7 +15,8 @@ from apo_bench.geometry.hull import SAGITTA_M, Hull
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
 
-_IN_PLANE_M, _PARALLEL = 1e-6, 1e-7
+_IN_PLANE_M = 1e-6
+_PARALLEL = 1e-7
 _ROUNDED_M = 1e-6
 """What coordinates in files are rounded by at most, and so walls."""
 _BESIDE_M = SAGITTA_M + _ROUNDED_M
@@ -29,7 +30,8 @@ _COARSE = 0.09
 """Sides of a wall that no contact uses may be this part of its radius away from it: eight of them are."""
 _TRIED_M = 5e-5
 """A clearance that any part can have; receded pieces are remembered."""
-_RAYS, _SHARES = 73, np.array([0.02, 0.25, 0.5, 0.75, 0.98])
+_RAYS = 73
+_SHARES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])
 """A prime number of rays: were it that of the sides of a wall, all could meet corners, which are nearest to it."""
 _LEAST_WALL = 0.5
 """So much of a round face must be there; bores may cross it."""
@@ -90,7 +92,8 @@ def _check_flat(face: Face, sides: _Sides, place: str) -> None:
     """A face is made of sides of pieces that look its way, and lies bare."""
     import shapely
 
-    n, to_plane = face.normal, _plane(face.normal)
+    n = face.normal
+    to_plane = _plane(face.normal)
     margin = np.full(3, _ABOVE_M)
     sides = _near(sides, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
     stated = shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes])
@@ -199,14 +202,17 @@ def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
     heights, radii = _samples(wall)
     middle = wall.toward is None
     angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if middle else 0.5))
-    x, y = wall.frame[:3, 0], wall.frame[:3, 1]
+    x = wall.frame[:3, 0]
+    y = wall.frame[:3, 1]
     out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
     reach = max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M
-    low, high = wall.ends.min(axis=0) - reach, wall.ends.max(axis=0) + reach
+    low = wall.ends.min(axis=0) - reach
+    high = wall.ends.max(axis=0) + reach
     sides = _near(sides, low, high)
     if not sides.pieces:
         _fail(place, "no piece is near the face")
-    found, off = 0, 0.0
+    found = 0
+    off = 0.0
     allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
     for height, radius in zip(heights, radii, strict=True):
         enter, leave = _crossed(sides, wall.point + height * wall.axis, out)

@@ -117,12 +117,18 @@ _DOT: Mapping[str, Rule] = {
     "group": WordsRule(tuple("012345")),
     "rgba": _COLOR,
 }
-MOST_BOXES, MOST_PIECES, MOST_CORNERS, MOST_FACES = 100, 2000, 640, 1000
+MOST_BOXES = 100
+MOST_PIECES = 2000
+MOST_CORNERS = 640
+MOST_FACES = 1000
 """Boxes of a part of boxes alone, pieces of any other, corners of a piece, faces of any part."""
-MOST_CORNERS_IN_ALL, WIDEST_M = 40_000, 0.1
+MOST_CORNERS_IN_ALL = 40_000
+WIDEST_M = 0.1
 """Corners of all pieces of a part; radius of a cylinder, which is cut into sides."""
-LIGHTEST_KG, HEAVIEST_KG = 1e-4, 1e6
-MOST_SITES, MOST_CLASSES = 600, 20
+LIGHTEST_KG = 1e-4
+HEAVIEST_KG = 1e6
+MOST_SITES = 600
+MOST_CLASSES = 20
 LARGEST_BYTES = 4_000_000
 """Of a part file."""
 _DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}

@@ -113,7 +113,8 @@ def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_
     """Which cells of the grid lie in a box."""
     full = np.zeros([len(planes) - 1 for planes in grid], dtype=np.bool_)
     for box in boxes:
-        low, high = box.center - box.half, box.center + box.half
+        low = box.center - box.half
+        high = box.center + box.half
         span = [
             slice(int(np.abs(p - a).argmin()), int(np.abs(p - b).argmin()))
             for p, a, b in zip(grid, low, high, strict=True)
@@ -131,7 +132,9 @@ def _rectangles(bare: NDArray[np.bool_]) -> NDArray[np.int64]:
     row, low = np.nonzero(ends == 1)
     high = np.nonzero(ends == -1)[1]
     order = np.lexsort((row, high, low))
-    row, low, high = row[order], low[order], high[order]
+    row = row[order]
+    low = low[order]
+    high = high[order]
     same = (np.diff(row) == 1) & (np.diff(low) == 0) & (np.diff(high) == 0)
     first = np.flatnonzero(np.concatenate([[True], ~same])[: len(row)])
     last = np.append(first[1:], len(row))[: len(first)] - 1
@@ -143,8 +146,10 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surfac
     import shapely
 
     for side in range(len(SIDES)):
-        axis, forward = side // 2, side % 2 == 0
-        u, v = grid[(axis + 1) % 3], grid[(axis + 2) % 3]
+        axis = side // 2
+        forward = side % 2 == 0
+        u = grid[(axis + 1) % 3]
+        v = grid[(axis + 2) % 3]
         layers = np.moveaxis(full, [axis, (axis + 1) % 3, (axis + 2) % 3], [0, 1, 2])
         for k, layer in enumerate(layers):
             beyond = k + 1 if forward else k - 1

@@ -12,7 +12,8 @@ _SAME_M = 1e-7
 """Corners nearer to each other are one; a corner this far inside of the piece is none."""
 _THINNEST_M = 1e-5
 """A piece is thicker than this across each of its sides."""
-_MOST_SIDES, _MOST_DIRECTIONS = 330, 200
+_MOST_SIDES = 330
+_MOST_DIRECTIONS = 200
 """Of one piece, and of its edges: how deep two of them are in each other is asked along each pair of directions."""
 
 

@@ -199,7 +199,8 @@ _OF_TYPE: Mapping[str, tuple[str, ...]] = {
 
 def _piece(path: Path, element: Element, said: Mapping[str, str], meshes: dict[str, Array]) -> Piece:
     """The piece of a geom; its mesh is taken out of those that are left."""
-    name, kind = element.attrib["name"], said.get("type")
+    name = element.attrib["name"]
+    kind = said.get("type")
     if kind is None:
         raise InputError(
             f'{path}: {_called(element)} has no type=, which MuJoCo takes for a sphere; say type="box", or another one.'
@@ -210,7 +211,8 @@ def _piece(path: Path, element: Element, said: Mapping[str, str], meshes: dict[s
     for key in ("pos", "size", "zaxis", "mesh"):
         if key in said and key not in _OF_TYPE[kind]:
             raise InputError(f"{path}: {_called(element)} has {key}=, which a {kind} has not; remove it.")
-    at, size = _numbers(said.get("pos", "0 0 0")), _numbers(said.get("size", ""))
+    at = _numbers(said.get("pos", "0 0 0"))
+    size = _numbers(said.get("size", ""))
     if kind == "mesh":
         if said["mesh"] not in meshes:
             raise InputError(

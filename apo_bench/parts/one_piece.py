@@ -17,12 +17,14 @@ _MOST_TESTS = 10_000
 
 def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
     """Raise an `InputError` unless every piece touches the others, over some of them."""
-    owner, tests = list(range(len(pieces))), 0
+    owner = list(range(len(pieces)))
+    tests = 0
     low = np.array([piece.center - piece.half for piece in pieces]) - _TOUCHING_M
     high = np.array([piece.center + piece.half for piece in pieces]) + _TOUCHING_M
     for i in range(len(pieces)):
         for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
-            a, b = _root(owner, i), _root(owner, int(k))
+            a = _root(owner, i)
+            b = _root(owner, int(k))
             if a == b:
                 continue
             tests += 1
@@ -45,5 +47,6 @@ def _root(owner: list[int], i: int) -> int:
 def _gap(a: Piece, b: Piece) -> float:
     """How far two pieces are apart along the direction in which it is most, [m]; negative if they overlap."""
     axes = separating_axes(a, np.eye(3), b, np.eye(3))
-    (at, reach), (on, room) = shadow(a, np.eye(3), axes), shadow(b, np.eye(3), axes)
+    at, reach = shadow(a, np.eye(3), axes)
+    on, room = shadow(b, np.eye(3), axes)
     return float((np.abs(at - on) - reach - room).max())

@@ -13,7 +13,8 @@ from apo_bench.io.reading import read_bytes
 NEVER_COLLIDES: Mapping[str, str] = {"contype": "0", "conaffinity": "0", "group": "1"}
 """What a geom must say to be the picture."""
 MOST_TRIANGLES = 20_000
-_HEADER, _TRIANGLE = 84, 50
+_HEADER = 84
+_TRIANGLE = 50
 """Bytes of a binary STL file."""
 _LARGEST_M = 10.0
 _HIDDEN_GROUP = "3"

@@ -161,7 +161,8 @@ def predict(
         attach: The way in of each operation; without it every fit contact counts, and nothing but the goals.
         arm: What an arm makes of each operation; without it any arm will do.
     """
-    worst_mm, refused = 0.0, next((move for move in arm if move.refused is not None), None)
+    worst_mm = 0.0
+    refused = next((move for move in arm if move.refused is not None), None)
     found = measures(plan, clearance_mm, thresholds, attach, arm=arm)
     for _, alike in groupby(found, lambda one: (one.operation, one.kind)):
         worst = max(alike, key=lambda one: one.size)
@@ -180,7 +181,8 @@ def predict(
 
 def _out_of_reach(plan: Plan, move: ArmMove) -> Prediction:
     assert move.refused is not None
-    main, why = plan.assembly.operations[move.operation].main, _OUT_OF_REACH[move.refused]
+    main = plan.assembly.operations[move.operation].main
+    why = _OUT_OF_REACH[move.refused]
     limit = f": its joint '{move.at_limit}' is at its limit" if move.at_limit else ""
     sentence = f"operation {move.operation + 1} ({main}) will fail: {why}{limit}"
     return Prediction(True, move.operation, move.refused, sentence, None, mendable=True)
@@ -207,7 +209,8 @@ def measures(
     physical = physical_solids(plan.assembly, clearance_mm)
     for doing in doings:
         how = attach[doing.operation] if attach else None
-        k, operation = doing.operation, _operation(doing)
+        k = doing.operation
+        operation = _operation(doing)
         deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.pushed_mm
         yield _fit(doing, how, clearance_mm, thresholds)
         yield Measure(k, "side", _side_mm(doing), thresholds.support_mm)
@@ -237,9 +240,11 @@ def _doings(plan: Plan) -> Iterator[_Doing]:
 
 def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Poses]]:
     """Each operation alone, and all poses before and after; what it carries goes along, also when it is undone."""
-    now, origin = plan.start, dict[int, Array]()
+    now = plan.start
+    origin = dict[int, Array]()
     for (k, undo), target in zip(plan.schedule, plan.targets, strict=True):
-        operation, before = plan.assembly.operations[k], now
+        operation = plan.assembly.operations[k]
+        before = now
         alone = replace(plan.assembly, operations=(operation,))
         if undo:
             (now,) = placements(alone, before, origin[k][None])
@@ -252,7 +257,8 @@ def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Po
 
 def _fit(doing: _Doing, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> Measure:
     """The |e| across the way in, nominal faces as planned, of the contact that enters and exceeds its play the most."""
-    k, found = doing.operation, [(0.0, clearance_mm + thresholds.fit_margin_mm)]
+    k = doing.operation
+    found = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
     for contact in _operation(doing).contacts:
         if enters(doing.alone, contact):
             a, b = map(doing.alone.face_of, contact)

@@ -72,7 +72,8 @@ def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
 def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float:
     """The deepest intrusion over all displacements (k, 3) of a, [m]; far off ones are skipped."""
     low, high = a.bounds
-    centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
+    centre = (low + high) / 2
+    radius = np.linalg.norm(high - low) / 2
     seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, centre[None]) + shifts)
     near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
     if not near.any():

@@ -35,7 +35,8 @@ def with_friction(found: Iterable[Pushes]) -> tuple[Array, Array]:
     every = list(found)
     points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))
     carrying = np.abs(n[:, 2]) >= _WALL
-    held, m = points[carrying], n[carrying]
+    held = points[carrying]
+    m = n[carrying]
     level = np.column_stack([-m[:, 1], m[:, 0], np.zeros(len(m))])
     size = np.linalg.norm(level, axis=1)[:, None]
     level = np.where(size > 1e-9, level / np.maximum(size, 1e-9), np.array([1.0, 0.0, 0.0]))
@@ -45,8 +46,12 @@ def with_friction(found: Iterable[Pushes]) -> tuple[Array, Array]:
 
 def pushes(assembly: Assembly, contact: Contact, poses: Poses) -> Pushes:
     """What the second part of a contact, which rests, can push the first one with."""
-    (m, e), nothing = contact, np.zeros((0, 3))
-    moved, rests, T, T_rests = assembly.face_of(m), assembly.face_of(e), poses[m.part], poses[e.part]
+    m, e = contact
+    nothing = np.zeros((0, 3))
+    moved = assembly.face_of(m)
+    rests = assembly.face_of(e)
+    T = poses[m.part]
+    T_rests = poses[e.part]
     if isinstance(moved, Face) and isinstance(rests, Face):
         n = (T_rests[:3, :3] @ rests.normal)[None]
         points = overlap(moved, T, rests, T_rests).corners

@@ -59,7 +59,8 @@ def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array,
     shaft on a plane the ends of the line of contact.
     """
     m, e = contact
-    T_m, T_e = poses[m.part], poses[e.part]
+    T_m = poses[m.part]
+    T_e = poses[e.part]
     if assembly.is_round(contact):
         up = _up(assembly, contact, poses)
         return between(assembly, contact, poses).off @ up, up * (
@@ -100,8 +101,10 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
-    found, up = between(assembly, contact, poses), _up(assembly, contact, poses)
-    middle, off = found.points.mean(axis=0), found.off.mean(axis=0)
+    found = between(assembly, contact, poses)
+    up = _up(assembly, contact, poses)
+    middle = found.points.mean(axis=0)
+    off = found.off.mean(axis=0)
     if isinstance(assembly.face_of(contact.manipulated), RoundFace):
         turned = _turn(found.axis, _across(found.axis, up))
         return np.asarray(_shift(middle - off) @ turned @ _shift(-middle))

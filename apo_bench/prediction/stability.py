@@ -83,7 +83,8 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     carrying = forces[:, 2] > (-np.inf if ceilings else -_LEFT)
     if not carrying.any():
         return 1.0
-    points, forces = points[carrying], forces[carrying]
+    points = points[carrying]
+    forces = forces[carrying]
     wrenches = [np.concatenate([forces, np.cross((points - c) / _ARM_M, forces)], axis=1).T for c in at]
     return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in wrenches)
 
@@ -93,7 +94,9 @@ def _forces(assembly: Assembly, operation: Operation, poses: Poses) -> tuple[Arr
 
     And the same of each contact that could carry weight, also of one that covers nothing.
     """
-    points, signs, ups = [np.zeros((0, 3))], [np.zeros(0)], list[float]()
+    points = [np.zeros((0, 3))]
+    signs = [np.zeros(0)]
+    ups = list[float]()
     for m, e in operation.contacts:
         up = (poses[e.part][:3, :3] @ assembly.face(e).normal)[2]
         if abs(up) >= _LEVEL:

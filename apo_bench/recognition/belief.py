@@ -54,7 +54,8 @@ class Belief:
             for part in operation.carries:
                 poses[part] = by @ poses[part]
                 reach[part] = own + pose.adjoint(by) @ (reach[part] - reach[operation.main])
-            poses[operation.main], reach[operation.main] = T, own
+            poses[operation.main] = T
+            reach[operation.main] = own
         return PartBeliefs(poses, reach)
 
     def given(self, e: Array, J: Array, noise: Array) -> Belief:

@@ -82,8 +82,10 @@ def recognise(
         InputError: Something else was given.
     """
     observation = without_contacts(observation, rules, "recognise")
-    assembly, bare = observation.assembly, observation.assembly.operations
-    belief, evidence = initial_belief(observation), list[Evidence]()
+    assembly = observation.assembly
+    bare = observation.assembly.operations
+    belief = initial_belief(observation)
+    evidence = list[Evidence]()
     as_seen = belief if first_seen is None else replace(belief, goals=first_seen)
     known = set(assembly.fixed)
     for k, operation in enumerate(bare):
@@ -184,7 +186,8 @@ class _Around:
     def _followed(self, belief: Belief, first: Contact | None) -> _Found:
         """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
         at_first = at_hand = self.candidates(belief)
-        taken, total = list[_Candidate](), 0.0
+        taken = list[_Candidate]()
+        total = 0.0
         while at_hand:
             chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
             if chosen.distance > self.rules.most_of(len(chosen.pair.residual)):
@@ -198,7 +201,8 @@ class _Around:
 
     def _pairs(self, now: PartBeliefs, taken: Collection[Contact]) -> Iterator[tuple[str, str, Facing]]:
         """Faces of moved parts and of those that stand there, within the bounds, with the names of the parts."""
-        solids, rules = self.seen.assembly.solids, self.rules
+        solids = self.seen.assembly.solids
+        rules = self.rules
         bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
         for a in self.seen.assembly.operations[self.k].moves:
             for b in self.others:
@@ -213,7 +217,8 @@ class _Around:
             return
         contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
         play_m = self.seen.assembly.play(contact, self.seen.play_m)
-        C, noise = slope @ belief.covariance @ slope.T, reality(pair, play_m)
+        C = slope @ belief.covariance @ slope.T
+        noise = reality(pair, play_m)
         most = pair_thresholds(self.rules, C, slack(pair, play_m), pair.lengths)
         if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:
             e = pair.residual
@@ -233,7 +238,8 @@ class _Around:
     def _gap(self, contact: Contact, now: PartBeliefs) -> float:
         """The gap of a contact at given poses: at the middle of the environment face where nothing overlaps."""
         a, b = contact
-        face_a, face_b = self.seen.assembly.face_of(a), self.seen.assembly.face_of(b)
+        face_a = self.seen.assembly.face_of(a)
+        face_b = self.seen.assembly.face_of(b)
         return face_gap(face_a, now.poses[a.part], face_b, now.poses[b.part])
 
 

@@ -32,7 +32,8 @@ _ROOM = np.repeat([40e-3, radians(23.0)], 3)
 """(6,): standard deviation of where a part may lie by chance, near others that it does not touch, [m, rad]."""
 _CARRIED = 3.0
 """So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
-_TURNS, _SMALL = 6, 1e-5
+_TURNS = 6
+_SMALL = 1e-5
 """Steps of Gauss and Newton at most; they end when no goal moves by more, [m, rad]."""
 
 
@@ -64,17 +65,21 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> Estimate:
     n = len(begin)
     C = joint_covariance(seen.goals, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
     room = C + np.diag(np.tile(_ROOM**2, n))
-    back, goals = pose.inverse(seen.goals[:n]), begin
-    system, S = equations(assembly, seen.start, begin), _softness(assembly, seen.play_m)
+    back = pose.inverse(seen.goals[:n])
+    goals = begin
+    system = equations(assembly, seen.start, begin)
+    S = _softness(assembly, seen.play_m)
     xi = pose.log(back @ goals)
     for _ in range(_TURNS):
         e, J = system.linearised(goals)
         Jr = right_jacobian(xi)
         J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
-        CJ, r = C @ J.T, J @ xi.ravel() - e
+        CJ = C @ J.T
+        r = J @ xi.ravel() - e
         A = J @ CJ + S
         new = (CJ @ np.linalg.solve(A, r)).reshape(n, 6)
-        step, xi = np.abs(new - xi).max(initial=0.0), new
+        step = np.abs(new - xi).max(initial=0.0)
+        xi = new
         goals = seen.goals[:n] @ pose.exp(xi)
         if step < _SMALL:
             break
@@ -86,7 +91,8 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> Estimate:
 
 def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
     """What is uncertain of goals once equations hold, as body twists at these goals."""
-    n, JC = len(Jr), J @ C
+    n = len(Jr)
+    JC = J @ C
     left = C - JC.T @ np.linalg.solve(A, JC)
     turned = np.einsum("kab,kblc,ldc->kald", Jr, left.reshape(n, 6, n, 6), Jr).reshape(6 * n, 6 * n)
     return np.asarray((turned + turned.T) / 2)

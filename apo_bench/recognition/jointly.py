@@ -32,9 +32,12 @@ GENEROUS_RULES = Rules(gap_m=50e-3, angle_rad=radians(45.0))
 """What is looked at; what is a contact the score says."""
 _RELATION = 2.4
 """-2 log of how often faces that may touch do, beyond the relation by which a part rests: three in ten."""
-_KEPT, _ENDINGS, _SITUATIONS = 3, 6, 50
+_KEPT = 3
+_ENDINGS = 6
+_SITUATIONS = 50
 """Sets that go on to the next operation; sets of one operation that are followed to the end, and steps of that."""
-_HOPELESS, _LOST = 12.0, 16.0
+_HOPELESS = 12.0
+_LOST = 16.0
 """A set is given up that is worse than the best by so much, in twice the logarithm; and one that throws so much
 evidence away, beyond what physics says against the best."""
 
@@ -49,7 +52,8 @@ def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -
         InputError: Something else was given.
     """
     seen = without_contacts(observation, rules, "recognise_jointly")
-    kept, known = [_History()], set(seen.assembly.fixed)
+    kept = [_History()]
+    known = set(seen.assembly.fixed)
     for k, operation in enumerate(seen.assembly.operations):
         others = tuple(p for p in seen.assembly.solids if p in known - set(operation.moves))
         ended: dict[tuple[frozenset[Contact], ...], _History] = {}
@@ -114,7 +118,9 @@ class _Search:
         """Sets to which nothing can be added, first where least evidence is thrown away; none at the worst."""
         beginning = self._with((), np.concatenate([*self._before(), self.seen.goals[self.k : self.k + 1]]))
         waiting: list[tuple[float, int, _Partial]] = [(0.0, 0, beginning)]
-        ended, steps, offence = 0, 0, IMPOSSIBLE
+        ended = 0
+        steps = 0
+        offence = IMPOSSIBLE
         while waiting and ended < _ENDINGS and steps < _SITUATIONS:
             lost, _, partial = heappop(waiting)
             if lost > _LOST + offence:
@@ -223,7 +229,8 @@ def _evidence(seen: Observation, sets: tuple[tuple[Candidate, ...], ...]) -> tup
     found = list[Evidence]()
     for k, (taken, as_seen) in enumerate(zip(sets, placements(seen.assembly, seen.start, seen.goals), strict=True)):
         for c in taken:
-            (a, b), pair = c.contact, c.pair
+            a, b = c.contact
+            pair = c.pair
             seen_gap_m = face_gap(seen.assembly.face_of(a), as_seen[a.part], seen.assembly.face_of(b), as_seen[b.part])
             found.append(Evidence(c.contact, k, pair.gap_m, pair.angle_rad, pair.share, c.most, seen_gap_m))
     return tuple(found)

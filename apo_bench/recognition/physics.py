@@ -68,7 +68,8 @@ def refusal(c: Candidate, near: Collection[Candidate]) -> float:
 
 def inside(at: Situation, rules: Rules, taken: Collection[Candidate], a: str, b: str) -> float:
     """Of two parts that are inside each other, the least unlikely way out on which those that touch still do so."""
-    solids, worst = at.seen.assembly.solids, 0.0
+    solids = at.seen.assembly.solids
+    worst = 0.0
     mine = [c for c in taken if c.parts == (a, b)]
     for directions, lengths, middle in ways_out(solids[a], at.now.poses[a], solids[b], at.now.poses[b], _SOFT_M):
         deviations = np.sqrt(at.variances(a, b, directions, middle) + _SOFT_M**2 + at.seen.play_m**2)

@@ -20,7 +20,8 @@ from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresho
 
 _IMPLIED = 1.0
 """A contact that gains less by closing, in twice the logarithm, closes anyway if those before do."""
-_FLAT_M, _FLAT_RAD = 0.2e-3, radians(0.3)
+_FLAT_M = 0.2e-3
+_FLAT_RAD = radians(0.3)
 """Gaps and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
 
 
@@ -97,7 +98,8 @@ class Situation:
         found = list[Candidate]()
         for a, b in self.pairs():
             known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
-            of_a, of_b = self.seen.assembly.solids[a], self.seen.assembly.solids[b]
+            of_a = self.seen.assembly.solids[a]
+            of_b = self.seen.assembly.solids[b]
             most = self._bounds(rules, a, b)
             bounds = {"gap_m": most.gap_m, "angle_rad": most.angle_rad, "share": rules.share}
             for pair in facing(of_a, self.now.poses[a], of_b, self.now.poses[b], **bounds, known=known):
@@ -108,8 +110,11 @@ class Situation:
         """The pair as a candidate, if it is one."""
         contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
         play_m = self.seen.assembly.play(contact, self.seen.play_m)
-        J, noise, e = pair.slope @ self._reach(a, b), reality(pair, play_m), pair.residual
-        C, room = J @ self.estimate.covariance @ J.T, J @ self.estimate.room @ J.T
+        J = pair.slope @ self._reach(a, b)
+        noise = reality(pair, play_m)
+        e = pair.residual
+        C = J @ self.estimate.covariance @ J.T
+        room = J @ self.estimate.room @ J.T
         most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
         distance = float(e @ np.linalg.solve(C + noise, e))
         if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
@@ -123,7 +128,8 @@ class Situation:
 
     def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:
         """No pair of faces of two parts has wider thresholds: those of the worst point in the worst direction."""
-        at, reach = self.middle(a), self._reach(a, b)
+        at = self.middle(a)
+        reach = self._reach(a, b)
         shifted = np.concatenate([reach[:3] + np.cross(reach[3:].T, at).T, reach[3:]])
         C = shifted @ self.estimate.covariance @ shifted.T
         shift, turn = (max(float(np.linalg.eigvalsh(block)[-1]), 0.0) for block in (C[:3, :3], C[3:, 3:]))

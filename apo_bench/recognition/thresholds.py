@@ -11,7 +11,8 @@ from apo_bench.assembly.facing import Facing
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-_SOFT_M, _SOFT_RAD = 0.1e-3, math.radians(0.1)
+_SOFT_M = 0.1e-3
+_SOFT_RAD = math.radians(0.1)
 """Standard deviation of a contact that is there: parts sink in a little, and the filter is linear."""
 
 

@@ -64,16 +64,19 @@ def pooled(mean: Mean, others: Array) -> Mean:
     Args:
         others: (6, 6), covariance of one frame there, in the axes of the camera, as few frames say little.
     """
-    n, A = float(mean.inlier.sum()), _axes(mean.T)
+    n = float(mean.inlier.sum())
+    A = _axes(mean.T)
     scatter = ((n - 1.0) * mean.scatter + _PRIOR * A.T @ others @ A) / (n - 1.0 + _PRIOR)
     return Mean(mean.T, scatter + np.diag(FLOOR**2), mean.inlier, mean.independent)
 
 
 def common_scatter(means: list[Mean]) -> Array:
     """The covariance of one frame over many rests, (6, 6), in the axes of the camera."""
-    total, frames = np.zeros((6, 6)), 0.0
+    total = np.zeros((6, 6))
+    frames = 0.0
     for mean in means:
-        n, A = float(mean.inlier.sum()) - 1.0, _axes(mean.T)
+        n = float(mean.inlier.sum()) - 1.0
+        A = _axes(mean.T)
         total += n * A @ mean.scatter @ A.T
         frames += n
     return total / max(frames, 1.0) + np.diag(FLOOR**2)

@@ -51,7 +51,8 @@ def solve_camera(known: Mapping[str, Array], seen: Mapping[str, Mean], stays: Ar
         stays: (6, 6), covariance of an error of the estimator that stays, [m, rad].
     """
     parts = tuple(known)
-    K, M = np.array([known[p] for p in parts]), np.array([seen[p].T for p in parts])
+    K = np.array([known[p] for p in parts])
+    M = np.array([seen[p].T for p in parts])
     W = np.array([np.linalg.inv(seen[p].covariance + stays + np.diag(_PLACED**2)) for p in parts])
     A = pose.adjoint(pose.inverse(M))
     normal = np.einsum("kji,kjl,klm->im", A, W, A)

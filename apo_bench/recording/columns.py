@@ -51,7 +51,8 @@ def column(name: str) -> Column | None:
     name = name.strip().lower()
     stem, _, unit = name.rpartition("_")
     if not stem or unit not in _UNITS:
-        stem, unit = name, ""
+        stem = name
+        unit = ""
     meaning = _SAME.get(stem, stem)
     return Column(meaning, unit) if meaning in KNOWN else None
 
@@ -118,9 +119,11 @@ def oriented(T: Array, how: Conventions) -> tuple[Array, list[str]]:
     if how.mirror:
         flip = np.ones(4)
         flip["xyz".index(how.mirror)] = -1.0
-        T, notes = T * np.outer(flip, flip), [f"mirrored along {how.mirror}, as stated"]
+        T = T * np.outer(flip, flip)
+        notes = [f"mirrored along {how.mirror}, as stated"]
     if how.inverted:
-        T, notes = pose.inverse(T), [*notes, "poses of the camera in the model, as stated, inverted"]
+        T = pose.inverse(T)
+        notes = [*notes, "poses of the camera in the model, as stated, inverted"]
     return T, notes
 
 

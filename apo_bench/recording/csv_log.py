@@ -59,7 +59,9 @@ def read_numbers(path: Path, meaning: Callable[[str], Column | None], renamed: M
             )
     numeric = [(i, one) for i, one in used if one.meaning != "id"]
     of_id = next((i for i, one in used if one.meaning == "id"), None)
-    cells, ids, at = [array("d") for _ in numeric], list[str](), array("q")
+    cells = [array("d") for _ in numeric]
+    ids = list[str]()
+    at = array("q")
     for line, texts in lines:
         if len(texts) != len(names):
             raise InputError(f"{path}, line {line}: {len(names)} cells are needed, {len(texts)} were given.")
@@ -93,7 +95,8 @@ def number(text: str, place: str) -> float:
 
 def text_lines(path: Path, separator: str | None = ",") -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not empty; None separates by spaces."""
-    size, line = 0, 0
+    size = 0
+    line = 0
     with opened(path, "log") as stream:
         for line, raw in enumerate(iter(lambda: stream.readline(_LONGEST_LINE + 1), b""), start=1):
             size += len(raw)

@@ -37,14 +37,16 @@ def check_arrangement(
     """
     if found.wrong_mm <= _FITS_MM:
         return
-    best, said = found.wrong_mm * _MENDS, ""
+    best = found.wrong_mm * _MENDS
+    said = ""
     for sentence, other in mistakes(stays, models, camera):
         try:
             wrong = arrange(other).wrong_mm
         except (NoOrder, np.linalg.LinAlgError):
             continue
         if wrong < min(best, _FITS_MM):
-            best, said = wrong, f"{sentence}; then all is within {wrong:.1f} mm"
+            best = wrong
+            said = f"{sentence}; then all is within {wrong:.1f} mm"
     raise InputError(f"{file}: no contact fits as it is stated ({_wrong(found)}); {said or _HELPLESS}.")
 
 

@@ -54,7 +54,8 @@ def _bop(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
     at = at[np.concatenate([[True], ~same])]
     U, _, Vt = np.linalg.svd(found.R[at])
     T = np.tile(np.eye(4), (len(at), 1, 1))
-    T[:, :3, :3], T[:, :3, 3] = U @ Vt, found.t_mm[at] * 1e-3
+    T[:, :3, :3] = U @ Vt
+    T[:, :3, 3] = found.t_mm[at] * 1e-3
     ids = [str(k) for k in found.where[at, 2]]
     left = f"; {int(same.sum())} estimates of lower score left out" if same.any() else ""
     notes = ["lengths in mm, as in BOP", f"rotation matrices, row by row, at {how.rate_hz:g} images a second{left}"]
@@ -63,7 +64,8 @@ def _bop(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
 
 def _tum(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
     """`timestamp tx ty tz qx qy qz qw` with spaces between, m; the name of the file is the id."""
-    numbers, places = list[list[float]](), list[str]()
+    numbers = list[list[float]]()
+    places = list[str]()
     for line, words in text_lines(path, separator=None):
         if words[0].startswith("#"):
             continue

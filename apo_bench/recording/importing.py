@@ -123,8 +123,10 @@ def _check_parts(tracks: Mapping[str, Track], assembly: Assembly, file: str) -> 
 def _made(
     tracks: Mapping[str, Track], stays: Stays, arranged: Arrangement, camera: CameraFile, scenario: Scenario
 ) -> Imported:
-    assembly, found = scenario.assembly, arranged.camera
-    X, start = found.T_world_camera, arranged.start
+    assembly = scenario.assembly
+    found = arranged.camera
+    X = found.T_world_camera
+    start = arranged.start
     chosen = arranged.order.stays
     operations = tuple(seen_operation(tracks, stays, chosen, assembly, X, k) for k in range(len(assembly)))
     seen = np.array([one.rest is not None for one in operations])

@@ -13,9 +13,11 @@ from apo_bench.geometry.arrays import Array
 
 MOST_ROWS = 1_000_000
 LARGEST_BYTES = 200_000_000
-_NEAR_M, _FAR_M = 0.02, 20.0
+_NEAR_M = 0.02
+_FAR_M = 20.0
 """Models whose median distance to the camera is less or more were given in another unit."""
-_FAST_S, _SLOW_S = 2e-4, 2.0
+_FAST_S = 2e-4
+_SLOW_S = 2.0
 """Frames whose median distance in time is less or more have times in another unit."""
 
 

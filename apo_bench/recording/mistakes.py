@@ -14,7 +14,8 @@ from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.rests import Rest
 from apo_bench.recording.stays import Stay, Stays
 
-_GL, _SAME = np.diag([1.0, -1.0, -1.0, 1.0]), np.eye(4)
+_GL = np.diag([1.0, -1.0, -1.0, 1.0])
+_SAME = np.eye(4)
 _AXES = tuple("".join(axes) for each in ("xyz", "XYZ") for axes in permutations(each))
 """About three different axes, fixed or moving."""
 
@@ -28,7 +29,8 @@ def mistakes(stays: Stays, models: Mapping[str, Array], camera: CameraFile) -> I
     def log(change: Callable[[Array], Array]) -> Stays:
         return _changed(stays, lambda part, T: change(T @ pose.inverse(M(part))) @ M(part))
 
-    euler, X = camera.conventions.euler, camera.T_world_camera
+    euler = camera.conventions.euler
+    X = camera.T_world_camera
 
     def M(part: str) -> Array:
         return models.get(part, _SAME)

@@ -75,9 +75,11 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
     known = {one.id for one in objects.parts.values()} | objects.ignored
     strange = [name for name in log.tracks if name not in known]
     if strange:
-        are, them = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part", "it"
+        are = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part"
+        them = "it"
         if len(strange) > 1:
-            are, them = f"the ids {_quoted(strange)} are no parts; name their parts", "them"
+            are = f"the ids {_quoted(strange)} are no parts; name their parts"
+            them = "them"
         raise InputError(
             f"{log.file}: {are} in {objects.file}, or add {them} to its key `ignore`. Known: "
             f"{', '.join(sorted(known))}."

@@ -47,16 +47,19 @@ def seen_operation(
         tracks: Of parts, camera from part.
         chosen: The stay with which each operation ends.
     """
-    operation, stay = assembly.operations[k], chosen[k]
+    operation = assembly.operations[k]
+    stay = chosen[k]
     if stay is None:
         return Seen(None, None, None, {}, {})
     over = quiet(assembly, stays, chosen, k)
     rest = stay.at(over)
     begins = taken(assembly, stays, chosen[:k], stay)
     path = path_of(tracks[operation.main], begins, rest.begins, T_world_camera)
-    before, after = poses_at(stays, begins), poses_at(stays, over)
+    before = poses_at(stays, begins)
+    after = poses_at(stays, over)
     moved = pose.inverse(before[operation.main]) @ after[operation.main]
-    carried, adjusted = {}, {}
+    carried = {}
+    adjusted = {}
     for part in stays:
         if part == operation.main:
             continue

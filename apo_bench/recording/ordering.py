@@ -18,7 +18,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.recording.contact_fit import contact_fit
 from apo_bench.recording.stays import Stay, poses_at
 
-_LONG_S, _WIDE_MM = 1.0, 50.0
+_LONG_S = 1.0
+_WIDE_MM = 50.0
 """A stay counts its seconds, up to 1; an open contact counts against it, 1 for each 10 mm or degrees, up to 5."""
 _LEFT_OVER = 5.0
 """What a stay counts against a choice in which no operation leads to it."""

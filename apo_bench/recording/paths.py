@@ -55,7 +55,8 @@ def last_straight(path: Path, goal: Array) -> Straight | None:
         return None
     jerks = np.diff(points, 3, axis=0)
     noise = max(2e-4, 1.4826 * float(np.median(np.abs(jerks))) / np.sqrt(20.0)) if len(jerks) else 2e-4
-    end, found = np.zeros(3), None
+    end = np.zeros(3)
+    found = None
     for first in range(len(points) - _FEWEST, -1, -1):
         piece = points[first:]
         away = np.linalg.norm(piece[:1] - end)

@@ -31,7 +31,8 @@ _MEDIAN = 1.77
 """Standard deviation of the difference of two medians of m numbers, times sqrt(m)."""
 _SHIFTED = 60.0
 """Chi-square with 6 degrees of freedom beyond which a rest is two: no chance, over all frames of a log."""
-_SAME_M, _SAME_RAD = 3e-4, 5e-3
+_SAME_M = 3e-4
+_SAME_RAD = 5e-3
 """Rests that differ by less are one."""
 _EDGE = 16.8
 """The 99 % quantile of chi-square with 6 degrees of freedom: frames at the ends of a rest that are farther off move."""
@@ -62,7 +63,8 @@ class Rest:
 def rests_of(track: Track, rest_s: float = REST_S) -> tuple[Rest, ...]:
     """The rests of a track, in order of time: looked for in frames that are new, averaged over all."""
     each = _stride(track)
-    t, T = track.t[::each], track.T[::each]
+    t = track.t[::each]
+    T = track.T[::each]
     if len(t) < _FEWEST:
         return ()
     noise = np.maximum(_noise(T), _LEAST)
@@ -122,7 +124,8 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[tuple[int, int]]:
     still = np.linalg.norm(change / noise, axis=1) < _STILL * _MEDIAN / np.sqrt(m)
     spans: list[tuple[int, int]] = []
     for a, b in _runs(still):
-        begin, end = a, b + 2 * m
+        begin = a
+        end = b + 2 * m
         if spans and begin <= spans[-1][1]:
             before, was = spans.pop()
             half = (begin + was) // 2
@@ -157,10 +160,12 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[tuple[int, int]]:
         return [(a, b)]
     mean = average(T[a : b + 1])
     xi = np.clip(pose.log(pose.inverse(mean.T) @ T[a : b + 1]) / noise, -4.0, 4.0)
-    sums, k = np.cumsum(xi, axis=0), np.arange(1, n)
+    sums = np.cumsum(xi, axis=0)
+    k = np.arange(1, n)
     gap = sums[:-1] / k[:, None] - (sums[-1] - sums[:-1]) / (n - k)[:, None]
     chi = (gap**2).sum(axis=1) * k * (n - k) / n / _alike(xi)
-    chi[: _FEWEST - 1], chi[n - _FEWEST :] = 0.0, 0.0
+    chi[: _FEWEST - 1] = 0.0
+    chi[n - _FEWEST :] = 0.0
     at = int(np.argmax(chi))
     size = np.abs(gap[at] * noise)
     if chi[at] < _SHIFTED or (size[:3].max() < _SAME_M and size[3:].max() < _SAME_RAD):

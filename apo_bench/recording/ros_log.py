@@ -49,7 +49,10 @@ def read_ros_csv(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
 
 def read_ros_json(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
     """A list of messages, or one message per line; a topic names the object where there is no child_frame_id."""
-    ids, t, packed, places = list[str](), list[float](), list[list[float]](), list[str]()
+    ids = list[str]()
+    t = list[float]()
+    packed = list[list[float]]()
+    places = list[str]()
     for place, message in _messages(path):
         for one in _stamped(message):
             if len(ids) == MOST_ROWS:
@@ -105,7 +108,8 @@ def _stamped(message: dict[str, Any]) -> Iterator[dict[str, Any]]:
 def _stamp(message: dict[str, Any], place: str) -> float:
     stamp = message.get("header", {}).get("stamp") if isinstance(message.get("header"), dict) else None
     if isinstance(stamp, dict):
-        whole, part = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs", 0))
+        whole = stamp.get("sec", stamp.get("secs"))
+        part = stamp.get("nanosec", stamp.get("nsecs", 0))
         return _finite(whole, f"{place}, header.stamp.sec") + 1e-9 * _finite(part, f"{place}, header.stamp.nanosec")
     x = _finite(stamp, f"{place}, header.stamp")
     return x * 1e-9 if x.is_integer() else x

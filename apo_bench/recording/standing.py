@@ -8,7 +8,8 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-_HIGH_M, _TILTED_DEG = 0.01, 10.0
+_HIGH_M = 0.01
+_TILTED_DEG = 10.0
 """A part that was seen so much higher or more tilted stands otherwise."""
 
 
@@ -20,11 +21,13 @@ def starts(seen: Poses, known: Mapping[str, Array | None], planned: Poses) -> tu
         known: Places that were stated; None: as planned.
         planned: Of all parts.
     """
-    start, whence = dict(planned), dict.fromkeys(planned, "scenario")
+    start = dict(planned)
+    whence = dict.fromkeys(planned, "scenario")
     for part, T in seen.items():
         if part in known:
             place = known[part]
-            start[part], whence[part] = planned[part] if place is None else place, "known"
+            start[part] = planned[part] if place is None else place
+            whence[part] = "known"
             continue
         stands = standing(planned[part], T)
         start[part], whence[part] = (T, "otherwise") if stands is None else (stands, "seen")
@@ -36,7 +39,8 @@ def standing(planned: Array, seen: Array) -> Array | None:
     R = seen[:3, :3] @ planned[:3, :3].T
     turn = float(np.degrees(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
     made = np.array(pose.at((0.0, 0.0, 0.0), (0.0, 0.0, turn)) @ planned)
-    made[:2, 3], made[2, 3] = seen[:2, 3], planned[2, 3]
+    made[:2, 3] = seen[:2, 3]
+    made[2, 3] = planned[2, 3]
     off = pose.log(pose.inverse(made) @ seen)
     if abs(seen[2, 3] - planned[2, 3]) > _HIGH_M or np.degrees(np.linalg.norm(off[3:])) > _TILTED_DEG:
         return None

@@ -10,7 +10,8 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.rests import Rest
 
-_ADJUSTED_M, _ADJUSTED_RAD = 0.01, np.radians(10.0)
+_ADJUSTED_M = 0.01
+_ADJUSTED_RAD = np.radians(10.0)
 """A rest that is nearer to the one before is the same stay."""
 _ADJUSTED_S = 1.5
 """Longest time of such an adjustment."""

@@ -22,8 +22,12 @@ def still_residuals(log: Log) -> Residuals:
     Raises:
         InputError: Nothing rests.
     """
-    where, shift, turn, distance = list[tuple[int, int, int]](), list[Array](), list[Array](), list[float]()
-    camera, image = Camera(np.eye(4)), 0
+    where = list[tuple[int, int, int]]()
+    shift = list[Array]()
+    turn = list[Array]()
+    distance = list[float]()
+    camera = Camera(np.eye(4))
+    image = 0
     for part, track in enumerate(log.tracks.values()):
         for rest in rests_of(track):
             errors = _errors(camera, track, rest)
@@ -52,7 +56,8 @@ def _errors(camera: Camera, track: Track, rest: Rest) -> Array:
 
     A mean of n frames takes part of each error with it, so what is left is as much larger as it was made smaller.
     """
-    T, n = track.T[rest.first : rest.last + 1], float(rest.mean.inlier.sum())
+    T = track.T[rest.first : rest.last + 1]
+    n = float(rest.mean.inlier.sum())
     F = camera.frames(rest.T[None])[0]
     shift = (T[:, :3, 3] - rest.T[:3, 3]) @ F
     turn = pose.log(pose.inverse(rest.T) @ T)[:, 3:] @ rest.T[:3, :3].T @ F

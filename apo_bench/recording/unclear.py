@@ -13,7 +13,8 @@ from apo_bench.recording.stays import Stays
 
 _MOVED_MM = 10.0
 """A part that moves by more during an operation of another one was not only adjusted."""
-_OPEN_MM, _OPEN = 3.0, 5.0
+_OPEN_MM = 3.0
+_OPEN = 5.0
 """Contacts are open if by more than this, and more than so many deviations; a degree counts like a millimetre."""
 
 

@@ -17,7 +17,8 @@ GIVEN = "given"
 WRONG = tuple(RELATIONS)
 RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice", "recognised-jointly")
 _KINDS = (GIVEN, *WRONG, *RECOGNISED)
-SHIFT_MM, _LARGEST_SHIFT_MM = 2.0, 50.0
+SHIFT_MM = 2.0
+_LARGEST_SHIFT_MM = 50.0
 
 
 def relations_name(given: str) -> str:

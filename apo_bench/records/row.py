@@ -224,7 +224,8 @@ class Row(TypedDict, total=False):
 
 
 _ENDS: Any = Literal
-_CODE, _STAGE = _ENDS[tuple(CODES)] | None, _ENDS[STAGES] | None
+_CODE = _ENDS[tuple(CODES)] | None
+_STAGE = _ENDS[STAGES] | None
 _CLOSED = {"failure_stage": _STAGE} | dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
 ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
 """Column -> its type, with the range that it may have."""

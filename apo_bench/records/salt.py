@@ -17,7 +17,8 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_bytes
 
-FEWEST, _MOST = 16, 512
+FEWEST = 16
+_MOST = 512
 """Bytes of a salt; 16 are 128 bits."""
 _FEWEST_DIFFERENT = 8
 """Of 16 bytes at random fewer are different in one of 10^11 cases."""

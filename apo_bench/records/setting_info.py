@@ -84,10 +84,12 @@ def check_value(info: SettingInfo, value: object, called: str = "", meaning: str
         if not isinstance(value, str) or value not in info.choices:
             raise InputError(unknown(info.called, str(value), info.choices))
     elif info.called:
-        (low, high), name = info.range, called or info.called
+        low, high = info.range
+        name = called or info.called
         number = float(value) if isinstance(value, Real) else math.nan
         if info.is_whole and not (isinstance(value, Integral) and low <= number <= high):
             raise InputError(f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.")
         if not low <= number <= high:
-            given, why = f"{number:g}" if isinstance(value, Real) else repr(value), meaning or info.meaning
+            given = f"{number:g}" if isinstance(value, Real) else repr(value)
+            why = meaning or info.meaning
             raise InputError(f"a {name} of {given} was given; a number from {low:g} to {high:g} is allowed, {why}.")

@@ -244,7 +244,8 @@ def _settings() -> Iterable[SettingInfo]:
     kinds = get_type_hints(TrialSettings, include_extras=True)
     for one in fields(TrialSettings):
         info: SettingInfo = one.metadata["info"]
-        column, option = info.column or one.name, info.option or one.name.replace("_", "-")
+        column = info.column or one.name
+        option = info.option or one.name.replace("_", "-")
         yield replace(info, name=one.name, kind=kinds[one.name], default=one.default, column=column, option=option)
 
 
@@ -292,7 +293,8 @@ def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[floa
         raise InputError(f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.")
     if len(given) not in (1, 2):
         raise InputError(f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees.")
-    mm, deg = given[0], 0.0 if eye == RANGE else given[-1]
+    mm = given[0]
+    deg = 0.0 if eye == RANGE else given[-1]
     check("level_mm", mm, eye)
     check("level_deg", deg)
     return mm, deg

@@ -178,7 +178,8 @@ def differences(first: Side, second: Side) -> tuple[Difference, ...]:
     """
     if not (first.run and second.run):
         read = [bool(side.run) or None for side in (first, second)]
-        first, second = first._replace(run={RUN: read[0]}), second._replace(run={RUN: read[1]})
+        first = first._replace(run={RUN: read[0]})
+        second = second._replace(run={RUN: read[1]})
     said = [_said(side) for side in (first, second)]
     names = list(dict.fromkeys([*said[0], *said[1]]))
     return tuple(Difference(n, said[0].get(n), said[1].get(n)) for n in names if said[0].get(n) != said[1].get(n))

@@ -101,7 +101,8 @@ def in_words(found: Comparison) -> str:
 
 def _agreed(total: Agreement) -> str:
     """How many verdicts agree, and at how many seeds all of them do; seeds are independent, trials are not."""
-    same, seeds = total.same, total.same_everywhere
+    same = total.same
+    seeds = total.same_everywhere
     if not same.trials:
         return "None of them counts: no demonstration was right itself."
     right = f"{total.only_first:,} right in the first alone, {total.only_second:,} in the second alone"

@@ -75,7 +75,8 @@ def _order(row: Row) -> tuple[Any, ...]:
 
 def _newest(found: Sequence[Row], chosen: Sequence[Row]) -> Row:
     """The first one of a method and scenario that was chosen least."""
-    methods, scenarios = [row["method"] for row in chosen], [row["scenario"] for row in chosen]
+    methods = [row["method"] for row in chosen]
+    scenarios = [row["scenario"] for row in chosen]
     met: dict[tuple[str, str], int] = {}
     for i, row in enumerate(found):
         met.setdefault((row["method"], row["scenario"]), i)

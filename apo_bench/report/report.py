@@ -45,7 +45,10 @@ FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confus
 """Tables that are also kept as files; those of the last two kinds, and what was recognised, if there is any."""
 OURS = (*FILES, *PNG, "failure_stages", "gap_before_and_after", "prediction", "timing")
 """Names of our tables and figures, without endings; `difference_to_..` is ours too."""
-PAGE, TABLES, FIGURES, ROWS = "report.html", "tables", "figures", "rows.parquet"
+PAGE = "report.html"
+TABLES = "tables"
+FIGURES = "figures"
+ROWS = "rows.parquet"
 
 
 class Report(NamedTuple):
@@ -112,9 +115,14 @@ def report(
 
 
 def _written(folder: Path, rows: Sequence[Row], found: Summary, failed: Failures) -> Report:
-    run, timing = read_run(folder), read_timing(folder)
-    files, took, known = scenario_files(run), times(timing), work(timing)
-    recognised, confused, gap = recognitions(rows), confusions(rows), gaps(rows)
+    run = read_run(folder)
+    timing = read_timing(folder)
+    files = scenario_files(run)
+    took = times(timing)
+    known = work(timing)
+    recognised = recognitions(rows)
+    confused = confusions(rows)
+    gap = gaps(rows)
     grouped = members(settings(found.cells), found.cells)
     tables = {
         "cells": cell_table(found.cells),

@@ -43,7 +43,8 @@ def _check(after: Arrival, asked: Preference, key: str, main: str) -> None:
                 f"give a direction that leads onto that face or along it, or leave 'along' out."
             )
     if asked.travel_m is not None and after.chain.way is not None:
-        least, level = after.chain.way.length_m, abs(after.chain.way.direction[2]) < 0.5
+        least = after.chain.way.length_m
+        level = abs(after.chain.way.direction[2]) < 0.5
         if level and asked.travel_m < least - 1e-6:
             raise InputError(
                 f"{key}, travel_mm: {1e3 * asked.travel_m:g} mm before its goal '{main}' would still be inside of what "

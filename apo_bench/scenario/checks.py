@@ -67,7 +67,8 @@ def check_scenario(scenario: Scenario, file: str) -> None:
 
 def _cases(scenario: Scenario) -> Iterator[Case]:
     site = scenario.site
-    (x, y), middle = site.center_m, sum(site.yaw_rad) / 2
+    x, y = site.center_m
+    middle = sum(site.yaw_rad) / 2
     yield Case(layout_at(scenario, x, y, middle))
     for i, shift in enumerate(scenario.shifts):
         for length in (shift.low_m, shift.high_m):
@@ -82,7 +83,8 @@ def _cases(scenario: Scenario) -> Iterator[Case]:
                 layout_at(scenario, x, y, middle, turns_rad=turns), f"operation {turn.operation + 1}, vary", words
             )
     for i, j, yaw in product((-1, 1), (-1, 1), sorted({middle, *site.yaw_rad})):
-        x, y = site.center_m[0] + i * site.spread_m[0], site.center_m[1] + j * site.spread_m[1]
+        x = site.center_m[0] + i * site.spread_m[0]
+        y = site.center_m[1] + j * site.spread_m[1]
         words = f" when the site is at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
         yield Case(layout_at(scenario, x, y, yaw), "site", words, site_only=True)
 
@@ -102,7 +104,8 @@ def _check_starts(scenario: Scenario, file: str, case: Case) -> None:
 def _check_turns(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...]) -> None:
     """A part turns about the vertical only: the robot does not turn parts over."""
     for k, operation in enumerate(scenario.assembly.operations):
-        before, after = stages[k][operation.main], stages[k + 1][operation.main]
+        before = stages[k][operation.main]
+        after = stages[k + 1][operation.main]
         tilt = _angle_deg(before[:3, :3].T[:, 2], after[:3, :3].T[:, 2])
         if tilt > _ANGLE_DEG:
             raise _refuse(
@@ -132,9 +135,12 @@ def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact:
     if scenario.assembly.is_round(contact):
         _check_round(scenario, file, case, key, contact, poses)
         return
-    face, on = scenario.assembly.face(contact.manipulated), scenario.assembly.face(contact.environment)
-    T_face, T_on = poses[contact.manipulated.part], poses[contact.environment.part]
-    n_face, n_on = T_face[:3, :3] @ face.normal, T_on[:3, :3] @ on.normal
+    face = scenario.assembly.face(contact.manipulated)
+    on = scenario.assembly.face(contact.environment)
+    T_face = poses[contact.manipulated.part]
+    T_on = poses[contact.environment.part]
+    n_face = T_face[:3, :3] @ face.normal
+    n_on = T_on[:3, :3] @ on.normal
     angle = _angle_deg(n_face, -n_on)
     if angle > _ANGLE_DEG:
         sentence = f"'{contact}': the faces look {180 - angle:.4g} degrees apart"
@@ -189,8 +195,10 @@ def _check_play(scenario: Scenario, file: str) -> None:
 
 
 def _check_round(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:
-    (m, e), face_of = contact, scenario.assembly.face_of
-    kind, found = contact_kind(face_of(m), face_of(e)), mate(face_of(m), poses[m.part], face_of(e), poses[e.part])
+    m, e = contact
+    face_of = scenario.assembly.face_of
+    kind = contact_kind(face_of(m), face_of(e))
+    found = mate(face_of(m), poses[m.part], face_of(e), poses[e.part])
     angle = float(np.degrees(found.angle_rad))
     if angle > _ANGLE_DEG and kind != "cone on rim":
         what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"

@@ -114,8 +114,10 @@ def _kind(node: JsonNode) -> Kind:
 
 def _check(contact: Contact, node: JsonNode, moves: tuple[str, ...], there: set[str]) -> None:
     """The first face is of a part that moves, the second of one that rests where it was put."""
-    above, below = node.child(None, "first"), node.child(None, "second")
-    a, b = contact.manipulated.part, contact.environment.part
+    above = node.child(None, "first")
+    below = node.child(None, "second")
+    a = contact.manipulated.part
+    b = contact.environment.part
     if a not in moves:
         refuse(above, f"'{a}' does not move here; name a face of '{moves[0]}' or a carried part")
     if b in moves:

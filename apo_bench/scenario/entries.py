@@ -22,7 +22,10 @@ from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
 from apo_bench.scenario.keys import LARGEST_MM, read_pose, read_span, read_unit_axis, refuse, refuse_name
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 
-_MOST_PARTS, _MOST_OPERATIONS, _MOST_CONTACTS, _MOST_SHIFTS = 50, 100, 50, 20
+_MOST_PARTS = 50
+_MOST_OPERATIONS = 100
+_MOST_CONTACTS = 50
+_MOST_SHIFTS = 20
 """In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
 _ARM = "arm"
 """What the robot is called in a scene."""
@@ -194,7 +197,8 @@ def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) 
     keys = node.fields((), ("at_mm", "across")) if node else {}
     low, high = solid.bounds
     level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
-    across, point = None, _above_middle(solid, before)
+    across = None
+    point = _above_middle(solid, before)
     if "at_mm" in keys:
         point = 1e-3 * keys["at_mm"].numbers(3)
         over = PAD_M[1] * np.round(before[2, :3], 9)

@@ -13,7 +13,8 @@ from apo_bench.scenario.scenario import Scenario
 
 NOTHING_M = 1e-9
 """A part that is displaced by less is where it should be."""
-_SWEEPS, _AGREED_M = 40, 1e-12
+_SWEEPS = 40
+_AGREED_M = 1e-12
 """Walls that are not at right angles to each other are followed in turn, so often, until all agree to within this."""
 
 _Displaced = dict[str, Array]
@@ -40,7 +41,9 @@ def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpre
         offset: (3,), [m], in the frame of the main part of the careless operation.
     """
     assembly = scenario.assembly
-    offsets, displaced, left = np.zeros((len(assembly), 3)), _Displaced(), ()
+    offsets = np.zeros((len(assembly), 3))
+    displaced = _Displaced()
+    left = ()
     if scenario.careless is None or not offset.any():
         return ErrorSpread(offsets, left)
     stages = (layout.start, *placements(assembly, layout.start, layout.goals))

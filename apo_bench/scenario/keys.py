@@ -29,7 +29,8 @@ def refuse_name(node: JsonNode, kind: str, given: str, allowed: Iterable[str]) -
 def read_pose(node: JsonNode) -> Array:
     """`{ at_mm = [x, y, z], turn_deg = [rx, ry, rz] }` as (4, 4), [m]."""
     keys = node.fields(("at_mm",), ("turn_deg",))
-    at, turn = keys["at_mm"].numbers(3), keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
+    at = keys["at_mm"].numbers(3)
+    turn = keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
     if np.abs(at).max() > LARGEST_MM:
         keys["at_mm"].fail(f"three lengths from -{LARGEST_MM:g} to {LARGEST_MM:g} mm are needed")
     if np.abs(turn).max() > 360:

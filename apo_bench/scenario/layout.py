@@ -22,7 +22,8 @@ def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: floa
         clearance_mm: Of the parts that are used (none: the scenario's): a part that stands on a fit face at its start
             stands that much lower.
     """
-    site, first_turn = scenario.site, 3 + len(scenario.shifts)
+    site = scenario.site
+    first_turn = 3 + len(scenario.shifts)
     unit = rng.uniform(-1.0, 1.0, size=first_turn + len(scenario.turns))
     x, y = np.asarray(site.center_m) + unit[:2] * site.spread_m
     yaw = _between(*site.yaw_rad, unit[2])

@@ -108,7 +108,8 @@ class Carelessness:
     @property
     def rms_m(self) -> float:
         """Root mean square of the offset: E x^2 of a uniform size is (a^2 + ab + b^2) / 3."""
-        a, b = self.low_m, self.high_m
+        a = self.low_m
+        b = self.high_m
         return float(np.sqrt((a * a + a * b + b * b) / 3.0))
 
 

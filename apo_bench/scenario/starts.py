@@ -19,7 +19,9 @@ def in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple
 
 
 def _supported(assembly: Assembly, start: Poses, part: str, most_m: float) -> bool:
-    solid, T, way = assembly.solids[part], start[part], np.array([most_m])
+    solid = assembly.solids[part]
+    T = start[part]
+    way = np.array([most_m])
     return any(
         drop_depths(solid, T, way, other, start[name])[0] > TOUCH_M
         for name, other in assembly.solids.items()

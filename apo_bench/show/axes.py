@@ -13,7 +13,8 @@ from apo_bench.geometry.round_face import RoundFace
 
 _BEYOND_M = 0.02
 """How far a line goes on beyond the faces."""
-_ONE_M, _ONE_COSINE = 1e-3, 1.0 - 1e-4
+_ONE_M = 1e-3
+_ONE_COSINE = 1.0 - 1e-4
 """Axes that are nearer to each other are drawn as one line."""
 _INK = (0.15, 0.15, 0.15)
 
@@ -35,7 +36,8 @@ def axes_of(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> li
     found: list[list[Array]] = []
     for contact in contacts:
         for of in contact:
-            face, T = assembly.face_of(of), poses[of.part]
+            face = assembly.face_of(of)
+            T = poses[of.part]
             if isinstance(face, RoundFace):
                 _add(found, pose.apply(T, face.ends), T[:3, :3] @ face.axis)
     return [_whole(points) for points in found]

@@ -22,9 +22,15 @@ from apo_bench.io.words import listed_words
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 
-_WIDTH, _HEIGHT, _LINE_PX = 620, 480, 20
-_NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.08, 0.95, 28.0, -20.0
-_MOST_LINES, _LETTERS = 6, 86
+_WIDTH = 620
+_HEIGHT = 480
+_LINE_PX = 20
+_NEAREST_M = 0.08
+_FARTHER = 0.95
+_AZIMUTH_DEG = 28.0
+_ELEVATION_DEG = -20.0
+_MOST_LINES = 6
+_LETTERS = 86
 
 
 class BeliefPanel(NamedTuple):
@@ -98,7 +104,8 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
     near = dict.fromkeys([*last.moves, *(c.environment.part for c in last.contacts)])
     camera = _camera(scenario, beliefs[0].poses, tuple(part for part in near if part not in scenario.assembly.fixed))
     lines = max(len(_below(b)) for b in beliefs) + 1
-    below, width = _LINE_PX * lines + 8, _WIDTH * len(beliefs)
+    below = _LINE_PX * lines + 8
+    width = _WIDTH * len(beliefs)
     height = _HEIGHT + below + 56
     figure = Figure(figsize=(width / 100, height / 100))
     what = listed_words([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"

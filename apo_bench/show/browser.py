@@ -19,7 +19,8 @@ from apo_bench.simulation.film.still import GHOST_OPACITY, HAND_COLOR, HAND_M, G
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.story import Story
 
-HOST, PORT = "127.0.0.1", 8080
+HOST = "127.0.0.1"
+PORT = 8080
 _PICTURE_S = 1.0 / 30.0
 _FOV_RAD = np.radians(45.0)
 """As in films."""
@@ -66,10 +67,12 @@ class Page:
     """What one browser, or several, see: they share one place in the story."""
 
     def __init__(self, story: Story, port: int) -> None:
-        self.cursor, self.lock = Cursor(story), threading.Lock()
+        self.cursor = Cursor(story)
+        self.lock = threading.Lock()
         self._scene = story.scene
         self._data = initial_state(story.scene.work, story.chapters[0].start)
-        self._server, self._drawn = _server(port), ""
+        self._server = _server(port)
+        self._drawn = ""
         self.address = f"http://{HOST}:{self._server.get_port()}"
         self._set_up(story)
 
@@ -80,14 +83,17 @@ class Page:
     def draw(self) -> None:
         """Bring the page up to date, if anything has changed."""
         with self.lock:
-            still, chapter, moment = self.cursor.still(), self.cursor.chapter, self.cursor.moment
+            still = self.cursor.still()
+            chapter = self.cursor.chapter
+            moment = self.cursor.moment
             state = repr((chapter, moment, self.cursor.faces, sorted(self.cursor.goals), self._arm_shown.value))
         if state == self._drawn:
             return
         show_moment(self._scene, self._data, still.chapter, still.moment)
         with self._server.atomic():
             for body, at in zip(self._bodies, body_poses(self._scene, self._data), strict=True):
-                body.position, body.wxyz = at[:3], at[3:]
+                body.position = at[:3]
+                body.wxyz = at[3:]
             for mesh in self._arm:
                 mesh.visible = self._arm_shown.value and not len(still.moment.hands)
             for i, hand in enumerate(self._hands):
@@ -110,17 +116,22 @@ class Page:
                 mesh.visible = key in shown
                 if mesh.visible:
                     at = pose.pack(shown[key])
-                    mesh.position, mesh.wxyz = at[:3], at[3:]
+                    mesh.position = at[:3]
+                    mesh.wxyz = at[3:]
 
     def _set_up(self, story: Story) -> None:
-        server, world, assembly = self._server, story.scene.work, story.scene.scenario.assembly
+        server = self._server
+        world = story.scene.work
+        assembly = story.scene.scenario.assembly
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("apo-bench view")
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(cast_shadow=False)
         look_at, far = framing(assembly, [story.assembled])
         view = server.initial_camera
-        view.look_at, view.position, view.fov = look_at, look_at - far * _forwards(), _FOV_RAD
+        view.look_at = look_at
+        view.position = look_at - far * _forwards()
+        view.fov = _FOV_RAD
         bodies = range(world.model.nbody)
         self._bodies = [server.scene.add_frame(f"/bodies/{i}", show_axes=False) for i in bodies]
         meshes = [

@@ -47,7 +47,8 @@ def cards(
 
 def scenario_card(scenario: Scenario, level: int = 1) -> str:
     """The card of a scenario under a heading of that level."""
-    mark, graph = "#" * level, relation_graph(scenario.assembly)
+    mark = "#" * level
+    graph = relation_graph(scenario.assembly)
     parts = [f"{mark} {scenario.name}: {scenario.title}"]
     if scenario.paper:
         parts.append(f"In the paper: {scenario.paper}.")
@@ -138,13 +139,15 @@ def _varies(scenario: Scenario) -> Iterator[str]:
         span = _span(shift.low_m, shift.high_m)
         yield f"Operation {shift.operation + 1}: {main} by {span} mm along {_axis(shift.axis)}."
     for turn in scenario.turns:
-        main, (low, high) = scenario.assembly.operations[turn.operation].main, np.degrees([turn.low_rad, turn.high_rad])
+        main = scenario.assembly.operations[turn.operation].main
+        low, high = np.degrees([turn.low_rad, turn.high_rad])
         about = f"{_axis(turn.axis)}{_through(turn)}"
         yield f"Operation {turn.operation + 1}: {main} by {low:g} to {high:g} degrees about {about}."
 
 
 def _success(scenario: Scenario) -> Iterator[str]:
-    t, clearance = scenario.thresholds, scenario.clearance_mm
+    t = scenario.thresholds
+    clearance = scenario.clearance_mm
     if scenario.success:
         yield scenario.success
     yield (
@@ -181,7 +184,8 @@ def _success(scenario: Scenario) -> Iterator[str]:
 
 def _wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
     """Contacts whose faces can come farther apart than their own clearance, and how far, [mm]; at the nominal goals."""
-    assembly, clearance = scenario.assembly, scenario.clearance_mm
+    assembly = scenario.assembly
+    clearance = scenario.clearance_mm
     history = placements(assembly, scenario.start, scenario.goals)
     for contact, made, _ in assembly.relations():
         play = joint_play_mm(assembly, contact, made, history[made], clearance)

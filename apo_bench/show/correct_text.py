@@ -133,7 +133,8 @@ def _moved(observation: Observation, correction: Correction) -> Array:
 
 
 def _operations_form(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
-    packed, moved = pose.pack(correction.goals), _moved(observation, correction)
+    packed = pose.pack(correction.goals)
+    moved = _moved(observation, correction)
     return [
         {
             "operation": k + 1,

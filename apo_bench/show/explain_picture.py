@@ -17,12 +17,17 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
 
-_WIDTH, _HEIGHT = 900, 540
+_WIDTH = 900
+_HEIGHT = 540
 _LINE_PX = 21
-_ARROW_M, _AWAY_M = 0.038, 0.006
+_ARROW_M = 0.038
+_AWAY_M = 0.006
 """Length of an arrow, and how far from its part it begins."""
 _GRAY = (0.45, 0.45, 0.45)
-_NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 230.0, -33.0
+_NEAREST_M = 0.12
+_FARTHER = 1.0
+_AZIMUTH_DEG = 230.0
+_ELEVATION_DEG = -33.0
 _LOW = 0.3
 """How high on its part a ring lies, from its lower end along the axis."""
 _SHADE = 0.8
@@ -49,7 +54,8 @@ def draw_explanation(scenario: Scenario, observation: Observation, found: Explan
     from apo_bench.simulation.scene.render import camera_view, picture
     from apo_bench.simulation.scene.scene import build_scene
 
-    drawn, scene = _parts(scenario, found), build_scene(scenario)
+    drawn = _parts(scenario, found)
+    scene = build_scene(scenario)
     low, high = world_bounds((one.solid, one.pose) for one in drawn)
     azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + _AZIMUTH_DEG
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
@@ -91,7 +97,8 @@ def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
     """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
     from apo_bench.simulation.scene.marks import ShiftArrows, TurnRing
 
-    R, middle = one.pose[:3, :3], one.solid.bounds.mean(axis=0)
+    R = one.pose[:3, :3]
+    middle = one.solid.bounds.mean(axis=0)
     r, g, b = one.color
     color = (_SHADE * r, _SHADE * g, _SHADE * b)
     axis = R @ direction.axis

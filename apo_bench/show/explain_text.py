@@ -136,7 +136,8 @@ def _along_axes(found: Explanation, o: OperationExplanation) -> str:
     rounds = [
         found.assembly.solids[o.part].rounds[name] for name in own if name in found.assembly.solids[o.part].rounds
     ]
-    said, last = list[str](), ""
+    said = list[str]()
+    last = ""
     for free in o.free:
         face = None if free.along else next((one for one in rounds if _is_on(free.direction, one)), None)
         if face is not None:

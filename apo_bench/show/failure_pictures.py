@@ -31,9 +31,16 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.report.failures import FailurePicture
 from apo_bench.show.axes import axis_marks
 
-_WIDTH, _HEIGHT, _QUALITY = 640, 480, 82
-_NEAREST_M, _FARTHER, _AZIMUTH_DEG, _ELEVATION_DEG = 0.12, 1.0, 128.0, -24.0
-_ARROW_M, _TIP_M, _ARROW = 0.11, 0.012, (0.85, 0.1, 0.1)
+_WIDTH = 640
+_HEIGHT = 480
+_QUALITY = 82
+_NEAREST_M = 0.12
+_FARTHER = 1.0
+_AZIMUTH_DEG = 128.0
+_ELEVATION_DEG = -24.0
+_ARROW_M = 0.11
+_TIP_M = 0.012
+_ARROW = (0.85, 0.1, 0.1)
 """How far from a contact its arrow begins and ends, and its colour."""
 _SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
 """A trial that was run again is the same if these are."""
@@ -136,7 +143,8 @@ def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
 
 def _failed_contact(row: Row, scene: Any) -> Contact | None:
     """The contact that the sentence of a failure names; else the first one of an operation that was stopped."""
-    operations, k = scene.scenario.assembly.operations, row.get("failure_operation")
+    operations = scene.scenario.assembly.operations
+    k = row.get("failure_operation")
     every = [contact for operation in operations for contact in operation.contacts]
     named = [contact for contact in every if f"{contact} " in f"{row.get('sentence') or ''} "]
     stopped = operations[k - 1].contacts if k and row["failure_code"] == "force_stop" else ()
@@ -153,7 +161,8 @@ def _mark(row: Row, scene: Any, poses: Poses) -> Any:
     face that should lie on it."""
     from apo_bench.simulation.scene.marks import Marks, ShiftArrows
 
-    contact, assembly = _failed_contact(row, scene), scene.scenario.assembly
+    contact = _failed_contact(row, scene)
+    assembly = scene.scenario.assembly
     if contact is None:
         return None
     of = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment

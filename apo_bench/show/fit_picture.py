@@ -11,8 +11,10 @@ from apo_bench.io.default_looks import default_looks
 from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import Residuals
 
-_SEEN, _FITTED = "#9fb8d1", "#a6341b"
-_BINS, _SHOWN = 40, 0.995
+_SEEN = "#9fb8d1"
+_FITTED = "#a6341b"
+_BINS = 40
+_SHOWN = 0.995
 """Bins of a histogram, and up to which quantile it is drawn."""
 
 
@@ -22,8 +24,10 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    upright, known = residuals.upright, residuals.turn_known
-    shift, turn = measured.shift_mm, measured.turn_deg
+    upright = residuals.upright
+    known = residuals.turn_known
+    shift = measured.shift_mm
+    turn = measured.turn_deg
     columns = (
         ("across the ray [mm]", residuals.across_mm[upright], shift.cdf_across, shift.limit),
         ("along the ray, size [mm]", residuals.along_mm[upright], shift.cdf_along, shift.limit),

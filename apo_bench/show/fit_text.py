@@ -61,7 +61,9 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
 
 def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> list[str]:
     """A fit in words, line by line."""
-    n, found, inlier = len(residuals.where), int(residuals.found.sum()), int(residuals.inlier.sum())
+    n = len(residuals.where)
+    found = int(residuals.found.sum())
+    inlier = int(residuals.inlier.sum())
     mean, error = _bias(residuals)
     turns = _percentiles(residuals.angle_deg[residuals.inlier])[:2]
     by_trace = _percentiles(residuals.trace_deg[residuals.inlier])[:2]
@@ -104,7 +106,8 @@ def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
 
 def fit_notes(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> tuple[str, ...]:
     """What a reader of the noise file should know of the fit, one line each."""
-    upright, known = int(residuals.upright.sum()), int(residuals.turn_known.sum())
+    upright = int(residuals.upright.sum())
+    known = int(residuals.turn_known.sum())
     return (
         f"Level 1 is as measured, {residuals.distance_mm / 1e3:.2f} m from the camera in the median: mm and degrees, "
         "Student t, none beyond the limit.",

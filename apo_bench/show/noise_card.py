@@ -24,7 +24,8 @@ _DRAWS = 1000
 """Observations of that scenario, three operations each, behind a histogram."""
 PANELS = ("across the ray", "along the ray", "tilt", "about the ray")
 PANEL_UNITS = ("mm", "mm", "deg", "deg")
-_BINS, _WIDTH = 17, 14
+_BINS = 17
+_WIDTH = 14
 """Bins of a histogram in text, the outermost with all that is beyond, and the length of its longest bar."""
 
 
@@ -64,8 +65,13 @@ def _model(given: Any) -> Any:
 
 def draw_errors(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     """Errors of many observations of the nominal example 5.1; operations that were not seen have none."""
-    noise, shown, camera, rng = make_noise(given, level), nominal_demonstration(), Camera(), np.random.default_rng(0)
-    errors, variances, missed = [], [], 0
+    noise = make_noise(given, level)
+    shown = nominal_demonstration()
+    camera = Camera()
+    rng = np.random.default_rng(0)
+    errors = []
+    variances = []
+    missed = 0
     for _ in range(draws):
         observation = observe(shown, noise, rng)
         Q = np.zeros((len(observation.goals), 6, 6))
@@ -103,7 +109,8 @@ def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
 
 def model_description(given: Any, heading: int = 1) -> str:
     """What a model says of itself, without a histogram."""
-    said, name = facts(given), given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
+    said = facts(given)
+    name = given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
     parts = [f"{'#' * heading} {name}: {said.title}"]
     if said.formula:
         parts.append("\n".join(f"    {line}" for line in said.formula))
@@ -138,7 +145,8 @@ def _histogram(drawn: Drawn) -> list[str]:
     longest = max(1, int(counts.max()))
     lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name in PANELS)]
     for i in range(_BINS):
-        low, high = (edges[i - 1] if i else None), (edges[i] if i < _BINS - 1 else None)
+        low = edges[i - 1] if i else None
+        high = edges[i] if i < _BINS - 1 else None
         if low is None:
             where = f"< {high:.2f}"
         elif high is None:

@@ -9,7 +9,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.io.default_looks import default_looks
 from apo_bench.show.noise_card import PANEL_UNITS, PANELS, Drawn
 
-_SIZE_INCH, _BINS = (9.0, 2.3), 49
+_SIZE_INCH = (9.0, 2.3)
+_BINS = 49
 _REACH = 6.0
 """Half width of a panel in stated standard deviations; what is beyond is counted in the outermost bins."""
 _COLOR = "#4477aa"

@@ -58,7 +58,9 @@ class PlanLine(NamedTuple):
 
 def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     """What the robot is asked to do, step by step."""
-    everything, odls, arcs = nominal_operations(scenario), plan.assembly.odls(), plan.assembly.arcs()
+    everything = nominal_operations(scenario)
+    odls = plan.assembly.odls()
+    arcs = plan.assembly.arcs()
     made_by = [plan.assembly.relations()[arc[0]].made for arc in arcs]
     lost_at = [plan.assembly.relations()[arc[0]].lost for arc in arcs]
     lines = []

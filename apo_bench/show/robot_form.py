@@ -37,7 +37,8 @@ def robot_form(
         lines: Of the plan, step by step.
         notes: What is to be said with it.
     """
-    poses, to_base = dict(plan.start), pose.inverse(frames.T_world_base)
+    poses = dict(plan.start)
+    to_base = pose.inverse(frames.T_world_base)
     steps = []
     history: list[Mapping[str, Array]] = []
     for line in lines:
@@ -83,12 +84,15 @@ def _step(
     scenario: Scenario,
     frames: RobotFrames,
 ) -> dict[str, Any]:
-    part, solid = line.what.main, plan.assembly.solids[line.what.main]
-    here, goal = poses[part], after[part]
+    part = line.what.main
+    solid = plan.assembly.solids[line.what.main]
+    here = poses[part]
+    goal = after[part]
     grip = tip_in_part(line.grasp, here)
     low, high = solid.bounds
     width = float(np.abs(line.grasp.across) @ (high - low))
-    tip, end = here @ grip, goal @ grip
+    tip = here @ grip
+    end = goal @ grip
     made = () if line.undo else plan.assembly.operations[line.operation].contacts
     return {
         "operation": line.operation + 1,
@@ -117,13 +121,17 @@ def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
     across = grasp.across - (grasp.across @ down) * down
     across = across / np.linalg.norm(across)
     T = np.eye(4)
-    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = across, np.cross(down, across), down, grasp.point
+    T[:3, 0] = across
+    T[:3, 1] = np.cross(down, across)
+    T[:3, 2] = down
+    T[:3, 3] = grasp.point
     return T
 
 
 def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
     """The motions by which the part leaves the contacts that it is in, one after the other."""
-    found, at = [], here
+    found = []
+    at = here
     for macro in line.leaves.departs:
         way = here[:3, :3] @ line.leaves.own(macro.direction)
         to = _shifted(at, way, macro.length_m or NEAR_M)
@@ -139,7 +147,8 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     if not macros:
         at = _shifted(goal, way_in, -line.comes.line.travel_m)
         return [_motion("put down", False, at, goal, way_in, grip, frames)]
-    found, end = list[dict[str, Any]](), goal
+    found = list[dict[str, Any]]()
+    end = goal
     for i, macro in reversed(list(enumerate(macros))):
         way = goal[:3, :3] @ line.comes.own(macro.direction)
         first_along = way @ way_in > _ALONG and not any(

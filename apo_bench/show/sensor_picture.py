@@ -18,10 +18,13 @@ from apo_bench.show.sensor_run import SensorRun
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 _TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
-_APPEARED, _VANISHED, _OUTLINE = "#1b7837", "#b2182b", "#d95f02"
+_APPEARED = "#1b7837"
+_VANISHED = "#b2182b"
+_OUTLINE = "#d95f02"
 _AROUND = 20
 """Pixels around what changed."""
-_LARGEST_MM, _RESIDUAL_MM = 60.0, 5.0
+_LARGEST_MM = 60.0
+_RESIDUAL_MM = 5.0
 
 
 @default_looks()
@@ -30,7 +33,8 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    events, assembly = run.events, run.recording.demonstration.assembly
+    events = run.events
+    assembly = run.recording.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
@@ -66,7 +70,9 @@ def _crop(axes: Any, events: Sequence[Event], view: int) -> None:
 
 
 def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], event: Event, view: int) -> None:
-    before, after, regions = images[event.first][view], images[event.last][view], event.regions[view]
+    before = images[event.first][view]
+    after = images[event.last][view]
+    regions = event.regions[view]
     row[0].imshow(watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
     row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
     row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-_LARGEST_MM, vmax=_LARGEST_MM)

@@ -81,14 +81,17 @@ class Cursor:
         if not self.playing:
             return
         self._played_s += seconds
-        moments, k = self.shown.moments, self.moment
+        moments = self.shown.moments
+        k = self.moment
         while k + 1 < len(moments) and moments[k + 1].time_s <= self._played_s:
             k += 1
-        self.moment, self.playing = k, k + 1 < len(moments)
+        self.moment = k
+        self.playing = k + 1 < len(moments)
 
     def words(self) -> tuple[str, ...]:
         """What is done here, the force, how far goals and the part are from the true goal; at the end, how it ended."""
-        moment, assembly = self.at, self.story.scene.scenario.assembly
+        moment = self.at
+        assembly = self.story.scene.scenario.assembly
         said = [f"{moment.time_s:.2f} s, {operation_words(assembly, moment)}"]
         if self.shown.world is self.story.scene.work and self.shown.ending:
             said.append(f"force {moment.doing.force_n:.1f} N")
@@ -109,7 +112,8 @@ class Cursor:
         said = []
         for name, T in named.items():
             twist = pose.log(pose.inverse(true[k]) @ T)
-            mm, deg = 1e3 * np.linalg.norm(twist[:3]), np.degrees(np.linalg.norm(twist[3:]))
+            mm = 1e3 * np.linalg.norm(twist[:3])
+            deg = np.degrees(np.linalg.norm(twist[3:]))
             said.append(f"{name}: {mm:.2f} mm, {deg:.2f} degrees off")
         return said
 
@@ -124,7 +128,8 @@ class Cursor:
         self.go((beyond[0] if way > 0 else beyond[-1]) if beyond else (len(self.shown.moments) if way > 0 else 0))
 
     def _faces(self) -> tuple[PartFace, ...]:
-        assembly, k = self.story.scene.scenario.assembly, self.at.doing.operation
+        assembly = self.story.scene.scenario.assembly
+        k = self.at.doing.operation
         if self.faces == "all":
             return tuple(PartFace(s, f) for s, solid in assembly.solids.items() for f in (*solid.faces, *solid.rounds))
         if self.faces == "none" or k is None:
@@ -133,7 +138,8 @@ class Cursor:
 
     def _ghosts(self) -> tuple[Ghost, ...]:
         """What was moved up to here, where goals put it."""
-        k, assembly = self.at.doing.operation, self.story.scene.scenario.assembly
+        k = self.at.doing.operation
+        assembly = self.story.scene.scenario.assembly
         if k is None:
             return ()
         moved = {part for operation in assembly.operations[: k + 1] for part in operation.moves}

@@ -48,7 +48,8 @@ def trial_again(folder: Path, number: int | None, salt_file: Path | None = None)
         secret = row["salt"] is not None and salt is None
         why = "its salt was not given; name its file by --salt-file" if secret else "other code or assets made it"
         raise RuntimeError(f"trial {number} of {folder} cannot be run again: {why}.")
-    recording, track = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt), Track()
+    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    track = Track()
     again = run_trial(spec, scene, recording=recording, content=content, watch=track.hooks)
     if again["sim_seconds"] is None:
         raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")
@@ -57,7 +58,9 @@ def trial_again(folder: Path, number: int | None, salt_file: Path | None = None)
 
 
 def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:
-    path, first, k = folder / "trials.jsonl", None, 0
+    path = folder / "trials.jsonl"
+    first = None
+    k = 0
     for k, line in each_line(path, "table of trials"):
         if number is not None and k != number:
             continue

@@ -32,9 +32,12 @@ LIFT_M = 0.0
 """How far above where it was seen a part is let go, tuned by `python benchmarks/tune.py`."""
 CLEARANCE_M = 0.25e-3
 """Play per side of fit faces where none is stated, since parts without any cannot be put together."""
-_DENSITY, _FRICTION = 600.0, 0.8
+_DENSITY = 600.0
+_FRICTION = 0.8
 """[kg/m^3] and coefficient of sliding, of wood, as in the part files."""
-SOFT_S, _LONGEST_S, _REST_S = 0.3, 1.5, 0.05
+SOFT_S = 0.3
+_LONGEST_S = 1.5
+_REST_S = 0.05
 """How long parts move as in syrup; when an operation ends at the latest; how long rest must last."""
 _SYRUP = 200.0
 """Damping while parts move as in syrup, [1/s]: a part falls at 5 cm/s."""
@@ -76,7 +79,9 @@ def _put(scene: World, data: mujoco.MjData, moves: tuple[str, ...], T: Array) ->
 
 def _rest(scene: World, data: mujoco.MjData) -> None:
     """Step until no part has moved for a while."""
-    model, began, quiet = scene.model, data.time, 0.0
+    model = scene.model
+    began = data.time
+    quiet = 0.0
     dof = np.array(list(scene.dof.values()))[:, None] + np.arange(6)
     mujoco.mj_forward(model, data)
     inertia = np.array([[model.body_mass[b]] * 3 + [*model.body_inertia[b]] for b in map(scene.body.get, scene.free)])

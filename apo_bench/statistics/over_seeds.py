@@ -66,7 +66,8 @@ class Contrast(NamedTuple):
     @property
     def enough(self) -> int | None:
         """Seeds at which a sign test would show who is better, if as many of them differ as here; None: not known."""
-        win, lose = self.better / self.seeds, self.worse / self.seeds
+        win = self.better / self.seeds
+        lose = self.worse / self.seeds
         if (win - lose) * self.difference <= 0.0:
             return None
         try:
@@ -78,7 +79,8 @@ class Contrast(NamedTuple):
 def pooled(results: Results) -> Pooled:
     """The rate of one method over all its trials, of which there is one at least."""
     by_seed = _by_seed({key: float(value) for key, value in results.items()})
-    right, trials = sum(results.values()), len(results)
+    right = sum(results.values())
+    trials = len(results)
     if len(by_seed.values) == trials:
         return Pooled(right, trials, trials, wilson(right, trials))
     interval = mean_interval(by_seed.values, 0.0, by_seed.most)

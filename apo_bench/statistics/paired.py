@@ -140,7 +140,8 @@ def tango(b: int, c: int, n: int) -> Interval:
 
     if n == 0:
         return Interval(-1.0, 1.0)
-    z, d = float(norm.ppf((1 + CONFIDENCE) / 2)), (b - c) / n
+    z = float(norm.ppf((1 + CONFIDENCE) / 2))
+    d = (b - c) / n
     low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + _EDGE, d - _EDGE)
     high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + _EDGE, 1 - _EDGE)
     return Interval(float(low), float(high))

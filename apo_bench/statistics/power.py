@@ -69,7 +69,8 @@ def shares(rate: float, reference: float, agree: float | None = None) -> tuple[f
     _inside(reference, "rate", 0.0, 1.0, ends=True)
     if agree is None:
         return rate * (1 - reference), reference * (1 - rate)
-    least, most = abs(1.0 - rate - reference), 1.0 - abs(rate - reference)
+    least = abs(1.0 - rate - reference)
+    most = 1.0 - abs(rate - reference)
     if not least - 1e-9 <= agree <= most + 1e-9:
         raise InputError(
             f"an agreement of {agree:g} was given; success rates of {rate:g} and {reference:g} allow {least:g} to "
@@ -104,7 +105,8 @@ def paired_power(pairs: int, win: float, lose: float, error: float = ERROR) -> f
     """
     from scipy.stats import binom
 
-    better, worse = max(win, lose), min(win, lose)
+    better = max(win, lose)
+    worse = min(win, lose)
     if better == 0.0:
         return 0.0
     m = _likely(pairs, better + worse)
@@ -148,7 +150,8 @@ def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerE
     if not 1 <= trials <= _MOST:
         raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
-    error, z2 = _error(comparisons), _z() ** 2
+    error = _error(comparisons)
+    z2 = _z() ** 2
     discordant = least_discordant(error)
     return PowerEvidence(
         trials=trials,

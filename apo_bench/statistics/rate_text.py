@@ -8,7 +8,8 @@ def percent(rate: float | None, digits: int = 1) -> str:
     """`97.0 %`, or a dash where nothing counted; only what is all or nothing says 100.0 or 0.0."""
     if rate is None:
         return "–"
-    said, least = f"{100 * rate:.{digits}f}", 10.0**-digits
+    said = f"{100 * rate:.{digits}f}"
+    least = 10.0**-digits
     if rate < 1.0 and float(said) == 100.0:
         return f"> {100 - least:.{digits}f} %"
     return f"< {least:.{digits}f} %" if rate > 0.0 and float(said) == 0.0 else f"{said} %"

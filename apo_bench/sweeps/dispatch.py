@@ -101,11 +101,15 @@ class Dispatch:
         false_starts: So many workers in a row end before a trial begins until that is given up.
         """
         self.waiting = deque(Job(list(unit.trials)) for unit in work)
-        self._lock, self._limit_s, self._emit = lock, limit_s, emit
-        self._deaths, self._false_starts = deaths, false_starts
+        self._lock = lock
+        self._limit_s = limit_s
+        self._emit = emit
+        self._deaths = deaths
+        self._false_starts = false_starts
         self._has_begun = False
         """Whether a worker of this sweep has begun a trial."""
-        self._now, self._looked = 0.0, time.monotonic()
+        self._now = 0.0
+        self._looked = time.monotonic()
 
     def tick(self) -> None:
         """Look at the clock, which stands still while this process does."""
@@ -127,10 +131,14 @@ class Dispatch:
         kind, *said = checked(message)
         job.heard = self._now
         if kind == "began":
-            job.since, job.false_starts, self._has_begun = self._now, 0, True
+            job.since = self._now
+            job.false_starts = 0
+            self._has_begun = True
         elif kind == "row":
             del job.trials[0]
-            job.since, job.deaths, job.false_starts = None, 0, 0
+            job.since = None
+            job.deaths = 0
+            job.false_starts = 0
             self._emit(*said)
 
     def is_late(self, job: Job) -> bool:
@@ -151,11 +159,13 @@ class Dispatch:
             RuntimeError: They do, and it is not the doing of a corrector of one's own.
         """
         if job.trials and code is not None and self._is_lost(job, code, why):
-            spec, took_s = job.trials.pop(0), None if job.since is None else self._now - job.since
+            spec = job.trials.pop(0)
+            took_s = None if job.since is None else self._now - job.since
             row = lost(spec, self._lock.content[spec.scenario], code)
             self._emit(row, timing(row, None, None, took_s, worker))
             job.deaths = job.false_starts = 0
-        job.since, job.heard = None, math.inf
+        job.since = None
+        job.heard = math.inf
         if job.trials:
             self.waiting.appendleft(job)
 

@@ -117,7 +117,8 @@ def _left(
     work: Iterable[Unit], loaded: Mapping[str, Scenario], lock: EnvironmentLock, store: RunFolder, check: Check
 ) -> list[Unit]:
     """The trials that have no row yet; the rows that there are must be what those trials would give."""
-    left, hashes = [], {}
+    left = []
+    hashes = {}
     for unit in work:
         check()
         trials = []

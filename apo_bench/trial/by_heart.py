@@ -40,7 +40,8 @@ def goals_by_heart(nominal: Array, observation: Observation) -> Array:
 def _rough(nominal: Array, goals: Array) -> Array:
     """(x, y, yaw): the mean turn of the parts, then the mean of what is left."""
     turns = goals[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
-    sine, cosine = (turns[:, 1, 0] - turns[:, 0, 1]).sum(), (turns[:, 0, 0] + turns[:, 1, 1]).sum()
+    sine = (turns[:, 1, 0] - turns[:, 0, 1]).sum()
+    cosine = (turns[:, 0, 0] + turns[:, 1, 1]).sum()
     yaw = float(np.arctan2(sine, cosine))
     T = _planar(np.array([0.0, 0.0, yaw]))
     return np.append((goals[:, :2, 3] - (T @ nominal)[:, :2, 3]).mean(axis=0), yaw)

@@ -22,7 +22,8 @@ def confidence(
         corrector_input: With those that the corrector was given.
         truth: (n, 4, 4), world frame, [m]; None if it is not known.
     """
-    right, given = observation.assembly, corrector_input.assembly
+    right = observation.assembly
+    given = corrector_input.assembly
     wrong: Row = {"wrong_relation": None if given is right else culprit(right, given)}
     return wrong | _test(result.correction) | _truth(result, corrector_input, truth)
 

@@ -104,7 +104,8 @@ def _module_hash(module: str) -> str | None:
 def _located(module: str) -> ModuleSpec | None:
     """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
     admit(module)
-    found, path = None, None
+    found = None
+    path = None
     for end in range(1, module.count(".") + 2):
         name = ".".join(module.split(".")[:end])
         try:

@@ -28,11 +28,13 @@ ROOMS_MM = (2.0, 0.5)
 where the first cannot be."""
 _SLACK = 0.01
 """What had less room than that keeps it, but for so much [mm]."""
-_ROOMY, _STANDS = ("on_way", "from_above"), ("falls", "leans")
+_ROOMY = ("on_way", "from_above")
+_STANDS = ("falls", "leans")
 """Measures of the room between parts, and of how they stand."""
 _EXACT_M = 1e-9
 """Contacts that hold this well hold as before."""
-_LEAST_MM, _LEAST_DEG = 0.01, 0.01
+_LEAST_MM = 0.01
+_LEAST_DEG = 0.01
 """Operations that move by less are not named."""
 
 
@@ -101,7 +103,8 @@ def fitting_plan(
     Raises:
         InputError: The correction did not converge.
     """
-    plan, told = correction.plan(observation), observation if told is None else told
+    plan = correction.plan(observation)
+    told = observation if told is None else told
     asked = plan if told.assembly is plan.assembly else replace(plan, assembly=told.assembly)
     if isinstance(where, Scenario):
         if not predict(asked, where.clearance_mm, where.thresholds, where.attach).fails:
@@ -123,7 +126,8 @@ def _goals_that_fit(plan: Plan, believed: Observation, around: _Surroundings) ->
         return None
     if space is None:
         return None
-    before, allowed = tuple(around.measured(plan)), _earlier_gaps(plan)
+    before = tuple(around.measured(plan))
+    allowed = _earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
         moved = _moved(plan, goals)

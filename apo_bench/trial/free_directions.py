@@ -27,7 +27,8 @@ from apo_bench.correction.solvers.whitened import noise_factor, spread
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-TRIED, _BEGUN = 32, 4
+TRIED = 32
+_BEGUN = 4
 """Places that are looked at where linearising leads nowhere, and how many of them are begun with."""
 _TURNS = 5
 """So often what fails is linearised."""
@@ -142,10 +143,12 @@ class _Search(NamedTuple):
 
     def mended(self, s: Array) -> Array | None:
         """The nearest point at which what fails at s, linearised, does not; again from there until it fits."""
-        rows, least = np.zeros((0, len(s))), np.zeros(0)
+        rows = np.zeros((0, len(s)))
+        least = np.zeros(0)
         for _ in range(_TURNS):
             G, h = self._linearised(s)
-            rows, least = np.concatenate([rows, G]), np.concatenate([least, h])
+            rows = np.concatenate([rows, G])
+            least = np.concatenate([least, h])
             found = shortest(rows, least) if len(G) else None
             if found is None:
                 return None
@@ -165,7 +168,8 @@ class _Search(NamedTuple):
 
     def nearer(self, far: Array) -> Array:
         """From a point that fits back towards zero as far as it fits, and from there to the nearest that is found."""
-        inside, outside = 1.0, 0.0
+        inside = 1.0
+        outside = 0.0
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
             inside, outside = (middle, outside) if self.fits_at(middle * far) else (inside, middle)
@@ -194,13 +198,15 @@ def shortest(G: Array, h: Array) -> Array | None:
 
 def _held(observation: Observation, goals: Array) -> _Held:
     """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
-    assembly, tolerance = observation.assembly, observation.gap_m
+    assembly = observation.assembly
+    tolerance = observation.gap_m
     plain = equations(assembly, observation.start, goals)
     system, exact, inequalities = demanded(plain, assembly, observation.play_m)
     off = violations(system, exact, inequalities, goals)
     if (off > tolerance).any():
         none = np.zeros(0)
-        system, exact = plain, np.ones_like(exact)
+        system = plain
+        exact = np.ones_like(exact)
         inequalities = Inequalities(plain.among(~exact), none, none)
         off = violations(system, exact, inequalities, goals)
     limits = np.maximum(off, _EXACT_M)

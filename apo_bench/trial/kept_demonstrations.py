@@ -122,7 +122,8 @@ def _made(settings: TrialSettings, scene: Scene) -> Recording:
 
 
 def _written(key: str, made: Recording) -> str:
-    human, layout = made.demonstration, made.layout
+    human = made.demonstration
+    layout = made.layout
     said = {
         "truth": layout.goals.tolist(),
         "start": {part: T.tolist() for part, T in layout.start.items()},
@@ -155,7 +156,8 @@ def _read(path: Path, key: str, scene: Scene) -> Recording:
     said = root["demonstration"].fields(("truth", "start", "goals", "final", "careless", "code", "why"))
     if said["code"].text() not in _CODES:
         said["code"].fail(f"{' or '.join(_CODES)} is needed")
-    assembly, n = scene.scenario.assembly, len(scene.scenario.assembly)
+    assembly = scene.scenario.assembly
+    n = len(scene.scenario.assembly)
     layout = Layout(_poses(said["truth"], n), _named(said["start"], scene))
     human = Demonstration(
         assembly=assembly,

@@ -70,7 +70,8 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
     shown = []
     for (one, correction), s in zip(usable, size, strict=True):
         gross = frozenset(np.flatnonzero((s > _GROSS * typical).any(axis=1) | ~one.seen).tolist())
-        n, unseen = len(one.goals), frozenset(np.flatnonzero(~one.seen).tolist())
+        n = len(one.goals)
+        unseen = frozenset(np.flatnonzero(~one.seen).tolist())
         others = [gross ^ {k} for k in range(n) if k not in unseen]
         F = factors(camera, correction.goals, P)
         ways = view_ways(correction.goals, P)
@@ -87,7 +88,8 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
 
 def _measured(found: LearnedNoise, far_mm: Array, source: str, missed: float, P: Array) -> MeasuredNoise:
     across, along, tilt, about, shift, turn = (estimate.value for estimate in found.deviations)
-    limit_mm, limit_deg = max(INLIER_MM, _LIMIT * max(across, along)), max(TURNED_DEG, _LIMIT * max(tilt, about))
+    limit_mm = max(INLIER_MM, _LIMIT * max(across, along))
+    limit_deg = max(TURNED_DEG, _LIMIT * max(tilt, about))
     far_mm = far_mm[far_mm > limit_mm]
     farthest = limit_mm * float(np.exp(2.0 * np.log(far_mm / limit_mm).mean())) if len(far_mm) else 2.0 * limit_mm
     there = any(estimate.low > 0.0 for estimate in found.deviations[4:])

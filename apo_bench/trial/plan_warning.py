@@ -19,7 +19,8 @@ def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) 
     Args:
         correction: What the corrector returned; None where none was asked.
     """
-    sentences, test = [], None if correction is None else correction.test_after or correction.test
+    sentences = []
+    test = None if correction is None else correction.test_after or correction.test
     if test is not None and not test.passes:
         sentences.append(f"the stated noise does not explain the correction (p = {test.p_value:.2g})")
     prediction = predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach)
@@ -41,7 +42,8 @@ def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
     """
     scene = build_scene(scenario, arm=arm)
     if plan is None:
-        (x, y), yaw = scenario.site.center_m, float(np.mean(scenario.site.yaw_rad))
+        x, y = scenario.site.center_m
+        yaw = float(np.mean(scenario.site.yaw_rad))
         at = layout_at(scenario, x, y, yaw, clearance_mm=scene.clearance_mm)
         plan = Plan(scenario.assembly, at.start, at.goals)
     moves = arm_moves(plan, scene)

@@ -37,7 +37,8 @@ def with_recognised_contacts(observation: Observation, kind: str) -> Observation
 
 def count_contacts(right: Assembly, given: Assembly) -> dict[str, int]:
     """How many of the contacts that were given are right, how many were missed, how many are false."""
-    true, named = _contacts(right), _contacts(given)
+    true = _contacts(right)
+    named = _contacts(given)
     return {
         "contacts_right": len(true & named),
         "contacts_missed": len(true - named),

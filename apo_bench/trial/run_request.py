@@ -77,7 +77,8 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
 
 
 def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
-    scene, recording = scene_of(spec), None
+    scene = scene_of(spec)
+    recording = None
     track = Track() if request.video or show else None
     watch = None if track is None else track.hooks
     if request.video:

@@ -139,7 +139,8 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
     Args:
         searches: As in `replay_and_judge`.
     """
-    arm, scenario = arm_moves(plan, scene, searches), scene.scenario
+    arm = arm_moves(plan, scene, searches)
+    scenario = scene.scenario
     prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
     said: Predicted = {
@@ -171,7 +172,8 @@ def draw_robot_error(given: str, scene: Scene, seed: int, salt: Salt | None = No
         hand_eye = middle @ hand_eye @ pose.inverse(middle)
     joints = np.radians(sigmas.joints_deg) * stream(seed, JOINTS, salt).standard_normal(len(scene.arm.joints))
     tool = pose.at(1e-3 * sigmas.tool_mm * stream(seed, TOOL, salt).standard_normal(3), (0.0, 0.0, 0.0))
-    m, deg = 1e-3 * sigmas.in_hand[0], sigmas.in_hand[1]
+    m = 1e-3 * sigmas.in_hand[0]
+    deg = sigmas.in_hand[1]
     slips = stream(seed, IN_HAND, salt).standard_normal((len(scene.scenario.assembly), 3))
     in_hand = np.array([pose.at((0.0, m * y, m * z), (deg * turn, 0.0, 0.0)) for y, z, turn in slips])
     return RobotError(hand_eye, joints, tool, in_hand)
@@ -203,7 +205,8 @@ def replay_and_judge(
 
 def trial_outcome(attempt: Attempt) -> Outcome:
     """Physics decides: what is right is done, and of what is wrong the robot's own word comes first."""
-    outcome, verdict = attempt.result.outcome, attempt.verdict
+    outcome = attempt.result.outcome
+    verdict = attempt.verdict
     if verdict.success:
         return Outcome("done", "ok", None, sentence("ok"))
     if outcome.failed:

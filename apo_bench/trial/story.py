@@ -19,7 +19,9 @@ from apo_bench.simulation.film.track import Chapter, Track
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import Recording, watch_again
 
-AS_SEEN, AS_CORRECTED, AS_TRUE = "as seen", "as corrected", "true"
+AS_SEEN = "as seen"
+AS_CORRECTED = "as corrected"
+AS_TRUE = "true"
 
 
 @final
@@ -58,13 +60,16 @@ def told(
     """
     plan = track.plan
     assert plan is not None
-    assembly, method = scene.scenario.assembly, row["method"]
-    start, goals = plan.start, {AS_SEEN: seen.goals, AS_CORRECTED: plan.goals}
+    assembly = scene.scenario.assembly
+    method = row["method"]
+    start = plan.start
+    goals = {AS_SEEN: seen.goals, AS_CORRECTED: plan.goals}
     if method == "none" or np.array_equal(seen.goals, plan.goals):
         del goals[AS_CORRECTED]
     chapters = []
     if recording is not None:
-        goals[AS_TRUE], start = recording.layout.goals, recording.layout.start
+        goals[AS_TRUE] = recording.layout.goals
+        start = recording.layout.start
         chapters.append(_demonstration(spec, scene, recording))
     reached = Chapter(
         title=f"{scene.scenario.name}: replay, method {method}",

@@ -220,8 +220,10 @@ def _numbers(operations: Iterable[int]) -> list[int]:
 
 
 def _physics(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
-    result, verdict = attempt.result, attempt.verdict
-    fixed, free = None, None
+    result = attempt.result
+    verdict = attempt.verdict
+    fixed = None
+    free = None
     if truth is not None:
         fixed, free = pose_errors(plan.assembly, plan.start, truth, result.reached)
     found = verdict.rests_on

@@ -21,7 +21,10 @@ from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.own import observation
 from benchmarks.corrector_bench.problems import problem
 
-YARDSTICK, UNCOMPILED, CONTACT, MANY = "paper", "plain", "contact", "correct_many"
+YARDSTICK = "paper"
+UNCOMPILED = "plain"
+CONTACT = "contact"
+MANY = "correct_many"
 WAYS = MappingProxyType(
     {
         YARDSTICK: "paper",
@@ -47,7 +50,9 @@ def main(ways: str, name: str, draws: str, out: str) -> None:
 
 def each(name: str, ways: Sequence[str], draws: int) -> tuple[list[list[float]], list[list[float]]]:
     """One row per draw."""
-    of, ms, gaps = problem(name), list[list[float]](), list[list[float]]()
+    of = problem(name)
+    ms = list[list[float]]()
+    gaps = list[list[float]]()
     for seed in range(draws):
         seen = observation(of, draw(of, "2/1", seed))
         ended = [_timed(partial(apo_bench.correct, seen, WAYS[way]), warm=seed == 0) for way in ways]
@@ -58,7 +63,10 @@ def each(name: str, ways: Sequence[str], draws: int) -> tuple[list[list[float]],
 
 def rounds(name: str, _: Sequence[str], draws: int) -> tuple[list[list[float]], list[list[float]]]:
     """One row per round: the same observations by `paper` in a loop and by `correct_many`, time of one correction."""
-    of, size, ms, gaps = problem(name), 5 * draws, list[list[float]](), list[list[float]]()
+    of = problem(name)
+    size = 5 * draws
+    ms = list[list[float]]()
+    gaps = list[list[float]]()
     seen = [observation(of, draw(of, "2/1", seed)) for seed in range(size)]
     for k in range(ROUNDS):
         loop, slow = _timed(partial(_loop, seen), warm=False)

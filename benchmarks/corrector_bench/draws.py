@@ -17,7 +17,9 @@ LEVELS = {"2/1": (2.0, 1.0), "5/3": (5.0, 3.0), "10/8": (10.0, 8.0), "20/20": (2
 """Standard deviations in mm and degrees, per axis of the body twist."""
 FACTORS = (0.3, 4.0)
 """Per part, log-uniform: what `per-part` noise multiplies a level by."""
-PLACE_M, SLIDE_M, SLIDE_RAD = 0.05, 0.005, 0.09
+PLACE_M = 0.05
+SLIDE_M = 0.005
+SLIDE_RAD = 0.09
 
 
 class Draw(NamedTuple):
@@ -53,7 +55,8 @@ def moved(of: Problem, rng: np.random.Generator) -> Array:
     for a, slide in zip(amount, of.slides, strict=True):
         truth = truth @ pose.exp(a * unit * slide)
     x, y = rng.uniform(-PLACE_M, PLACE_M, size=2)
-    place, at = pose.at([x, y, 0.0], [0.0, 0.0, rng.uniform(-180.0, 180.0)]), list(of.together)
+    place = pose.at([x, y, 0.0], [0.0, 0.0, rng.uniform(-180.0, 180.0)])
+    at = list(of.together)
     truth[at] = place @ truth[at]
     return truth
 

@@ -51,8 +51,10 @@ def quality(of: Problem, given: Draw, goals: Array, residual_m: float | None = N
         return Quality(*[float("inf")] * len(Quality._fields))
     if residual_m is None:
         residual_m = float(np.abs(of.system(given.seen).residual(goals)).max())
-    z, true = lengths(given, goals), lengths(given, given.truth)
-    error, seen_error = sigma(given, given.truth, goals), sigma(given, given.truth, given.seen)
+    z = lengths(given, goals)
+    true = lengths(given, given.truth)
+    error = sigma(given, given.truth, goals)
+    seen_error = sigma(given, given.truth, given.seen)
     Q = free_at_truth(of, given)
     f = np.sqrt(Q.shape[1])
     return Quality(

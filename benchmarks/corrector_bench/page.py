@@ -86,7 +86,8 @@ def _worst(rows: Iterable[Row]) -> Iterable[str]:
             groups.setdefault((row.what, row.target), []).append(row)
     for (what, target), group in groups.items():
         values = [row.value for row in group if row.value is not None]
-        low, high = min(values), max(values)
+        low = min(values)
+        high = max(values)
         said = f"{low:.3g} to {high:.3g}" if ".." in target else f"{high if target.startswith('<=') else low:.3g}"
         names = [row.problem for row in group]
         where = ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more"

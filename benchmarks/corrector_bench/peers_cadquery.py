@@ -91,7 +91,8 @@ def _module() -> Any:
 
 def _mated(cq: Any, observation: Observation) -> Array:
     """The seen goals (n, 4, 4), those of parts that were last moved as the main part replaced."""
-    operations, goals = observation.assembly.operations, np.array(observation.goals)
+    operations = observation.assembly.operations
+    goals = np.array(observation.goals)
     standing = [relation for relation in observation.assembly.relations() if relation.lost is None]
     last = {part: k for k, operation in enumerate(operations) for part in operation.moves}
     if not any(end.part in last for relation in standing for end in relation.contact):
@@ -131,7 +132,8 @@ def _box(cq: Any, center: Array, half: Array) -> Any:
 def _patch(cq: Any, observation: Observation, of: PartFace) -> Any:
     """A square at the middle of the corners of a face, looking the same way, in the frame of the part."""
     face = observation.assembly.face(of)
-    center, n = face.outline.mean(axis=0) * _MM, face.normal
+    center = face.outline.mean(axis=0) * _MM
+    n = face.normal
     return cq.Face.makePlane(_PATCH_MM, _PATCH_MM, cq.Vector(*center), cq.Vector(*n))
 
 
@@ -141,7 +143,8 @@ def _location(cq: Any, T: Array) -> Any:
 
 def _pose(location: Any) -> Array:
     """Row by row, since angles and names of turns would lose digits; the rotation made orthogonal again."""
-    moved, T = location.wrapped.Transformation(), np.eye(4)
+    moved = location.wrapped.Transformation()
+    T = np.eye(4)
     T[:3] = [[moved.Value(i, j) for j in range(1, 5)] for i in range(1, 4)]
     T[:3, 3] /= _MM
     U, _, Vt = np.linalg.svd(T[:3, :3])

@@ -24,7 +24,8 @@ def ceres(observation: Observation) -> Array:
     """Goals, (n, 4, 4)."""
     import pyceres
 
-    space, n = whitened(observation), len(observation.goals)
+    space = whitened(observation)
+    n = len(observation.goals)
     system = equations(observation.assembly, observation.start, observation.goals)
 
     def contacts(z: Array) -> Array:
@@ -33,7 +34,8 @@ def ceres(observation: Observation) -> Array:
     def slope(z: Array) -> Array:
         return space.pulled(z, system.linearised(space.goals(z))[1]) / CONTACT_M
 
-    z, asked = [np.zeros(6) for _ in range(n)], pyceres.Problem()
+    z = [np.zeros(6) for _ in range(n)]
+    asked = pyceres.Problem()
     costs = [
         _cost(pyceres, len(system), n, contacts, slope),
         _cost(pyceres, 6 * n, n, lambda z: z, lambda z: np.eye(6 * n)),

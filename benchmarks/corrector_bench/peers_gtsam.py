@@ -26,7 +26,8 @@ from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-_TOLERANCE, TURNS = 1e-12, 100
+_TOLERANCE = 1e-12
+TURNS = 100
 _TURN_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """(x, y, z, rx, ry, rz) -> GTSAM's order; its own inverse."""
 _TURN_FIRST.flags.writeable = False
@@ -65,8 +66,10 @@ def _module() -> Any:
 
 def _solved(gtsam: Any, observation: Observation, contact_m: float) -> Array:
     whitened(observation)  # GTSAM takes a covariance that is none without a word
-    system, n = equations(observation.assembly, observation.start, observation.goals), len(observation.goals)
-    graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    system = equations(observation.assembly, observation.start, observation.goals)
+    n = len(observation.goals)
+    graph = gtsam.NonlinearFactorGraph()
+    values = gtsam.Values()
     for k, (T, covariance) in enumerate(zip(observation.goals, observation.covariance, strict=True)):
         noise = gtsam.noiseModel.Gaussian.Covariance(np.asfortranarray(covariance[np.ix_(_TURN_FIRST, _TURN_FIRST)]))
         graph.add(gtsam.PriorFactorPose3(k, gtsam.Pose3(T), noise))
@@ -90,7 +93,8 @@ def _error(one: Equations, goals: Array) -> Callable[[Any, Any, Any], Array]:
     """e of one contact and, where asked for, its derivative by the pose of each key."""
 
     def error(this: Any, values: Any, jacobians: Any) -> Array:
-        now, keys = np.array(goals), this.keys()
+        now = np.array(goals)
+        keys = this.keys()
         for k in keys:
             now[k] = values.atPose3(k).matrix()
         if jacobians is None:

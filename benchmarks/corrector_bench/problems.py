@@ -30,7 +30,9 @@ from apo_bench.scenario.file import load_scenario
 
 PITCH_M = 0.14
 FIGURES = ("fig2", "fig3", "fig6")
-X, Y, YAW = np.eye(6)[0], np.eye(6)[1], np.eye(6)[5]
+X = np.eye(6)[0]
+Y = np.eye(6)[1]
+YAW = np.eye(6)[5]
 
 
 @final
@@ -99,7 +101,8 @@ def fig6() -> Problem:
     The numbers are T1, T2, T3, T5, T6 of the paper. A slide of the stick through the holes turns up in T5 and T6.
     """
     scenario = load_scenario("pocket_table")
-    assembly, kept = scenario.assembly, [0, 1, 2, 4, 5]
+    assembly = scenario.assembly
+    kept = [0, 1, 2, 4, 5]
     left = Assembly(assembly.solids, tuple(assembly.operations[k] for k in kept), assembly.fixed)
     slides = _slides(5, [{0: Y}, {3: X, 4: X}])
     return Problem("fig6", left, _start(left), scenario.goals[kept], (0, 1, 2, 3), slides)
@@ -115,7 +118,9 @@ def chain(castles: int) -> Problem:
 
 def lined_up(castles: int) -> tuple[Assembly, Array]:
     """The assembly of a chain and its goals, (2 K - 1, 4, 4): first all castles, then all sticks."""
-    castle, stick, table = load_part("castle"), load_part("stick"), load_part("table")
+    castle = load_part("castle")
+    stick = load_part("stick")
+    table = load_part("table")
     operations = [_standing(f"castle{k}") for k in range(castles)]
     operations += [_lying(f"stick{k}", [f"castle{k}", f"castle{k + 1}"]) for k in range(castles - 1)]
     goals = [pose.at([k * PITCH_M, 0, 0]) for k in range(castles)]
@@ -131,8 +136,12 @@ def grid(side: int) -> Problem:
     52 G^2 - 48 G rows, n = 6 (3 G^2 - 2 G), rank 16 G^2 - 12 G - 1.
     Whole rows may move across, whole columns along, and every stick along its slots.
     """
-    cross, stick, table = crossed(), load_part("stick"), load_part("table")
-    operations, goals, where = list[Operation](), list[Array](), dict[tuple[int, int], int]()
+    cross = crossed()
+    stick = load_part("stick")
+    table = load_part("table")
+    operations = list[Operation]()
+    goals = list[Array]()
+    where = dict[tuple[int, int], int]()
     for i, j in np.ndindex(side, side):
         where[i, j] = len(operations)
         operations.append(_standing(f"castle{i}_{j}"))
@@ -160,9 +169,13 @@ def grid(side: int) -> Problem:
 
 def crossed() -> Solid:
     """A castle with slots along x and along y: the numbers of the castle, four merlons in place of two."""
-    inner, outer, floor, top = 0.01, 0.03, 0.03, 0.04
+    inner = 0.01
+    outer = 0.03
+    floor = 0.03
+    top = 0.04
     boxes = [Box("base", np.array([0, 0, floor / 2]), np.array([outer, outer, floor / 2]))]
-    middle, half = (inner + outer) / 2, (outer - inner) / 2
+    middle = (inner + outer) / 2
+    half = (outer - inner) / 2
     for k, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         center = np.array([sx * middle, sy * middle, (floor + top) / 2])
         boxes.append(Box(f"merlon{k}", center, np.array([half, half, (top - floor) / 2])))

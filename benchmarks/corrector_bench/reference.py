@@ -21,7 +21,8 @@ from benchmarks.corrector_bench.measures import lengths
 from benchmarks.corrector_bench.problems import Problem
 
 TURNS = 100
-GAP_M, DRIFT = 1e-12, 1e-9
+GAP_M = 1e-12
+DRIFT = 1e-9
 """When the conditions count as met: largest |e| [m], and norm of what is not in the row space [sigma]."""
 
 
@@ -42,14 +43,18 @@ def optimum(of: Problem, given: Draw, system: Equations | None = None) -> Optimu
 
 
 def _descended(of: Problem, given: Draw, system: Equations, z: Array) -> Optimum:
-    L, n, cap = factors(given.covariance), of.n, np.sqrt(6 * of.n)
+    L = factors(given.covariance)
+    n = of.n
+    cap = np.sqrt(6 * of.n)
     for _ in range(TURNS):
         xi = (L @ z.reshape(n, 6, 1))[..., 0]
         goals = given.seen @ pose.exp(xi)
         e, J = system.linearised(goals)
         J = np.einsum("mki,kij->mkj", J.reshape(-1, n, 6), right_jacobian(xi) @ L).reshape(-1, 6 * n)
         U, w, Vt = np.linalg.svd(J, full_matrices=False)
-        U, w, Vt = U[:, : of.rank], w[: of.rank], Vt[: of.rank]
+        U = U[:, : of.rank]
+        w = w[: of.rank]
+        Vt = Vt[: of.rank]
         drift = np.linalg.norm(z - Vt.T @ (Vt @ z))
         if np.abs(e).max() < GAP_M and drift < DRIFT:
             return Optimum(goals, float(np.linalg.norm(z)))

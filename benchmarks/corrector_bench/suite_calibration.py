@@ -13,7 +13,8 @@ from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import FIGURES, Problem, problem
 from benchmarks.corrector_bench.rows import Row
 
-LEVEL, REGION = 0.01, 0.95
+LEVEL = 0.01
+REGION = 0.95
 FIRST = 10_000
 """Seeds of their own."""
 
@@ -31,7 +32,11 @@ def _rows(name: str, per_part: bool, draws: int) -> list[Row]:
     of = problem(name)
     where = f"{name} 2/1{', per part' if per_part else ''}"
     bound = chdtri(6 * of.n - of.rank, 1.0 - REGION)
-    alarms, said, found, fixed_mm, refused = 0, 0, 0, [], 0
+    alarms = 0
+    said = 0
+    found = 0
+    fixed_mm = []
+    refused = 0
     for seed in range(FIRST, FIRST + draws):
         given = draw(of, "2/1", seed, per_part)
         seen = observation(of, given)
@@ -53,7 +58,8 @@ def _rows(name: str, per_part: bool, draws: int) -> list[Row]:
 
 def _across_m(of: Problem, given: Draw, goals: Array) -> float:
     """Distance from the truth across the free directions, root mean square over parts: what curvature leaves."""
-    Q, L = free_basis(of, given, goals), factors(given.covariance)
+    Q = free_basis(of, given, goals)
+    L = factors(given.covariance)
     off = lengths(given, given.truth) - lengths(given, goals)
     twist = L @ (off - Q @ (Q.T @ off)).reshape(-1, 6, 1)
     return float(np.sqrt(np.mean(np.sum(twist[:, :3, 0] ** 2, axis=1))))

@@ -26,13 +26,17 @@ def suite(draws: int) -> list[Row]:
 
 def _row(level: str, draws: int) -> Row:
     plain = apo_bench.ContactCorrector(compiled=False)
-    off, otherwise, count = 0.0, 0, 0
+    off = 0.0
+    otherwise = 0
+    count = 0
     for of in map(apo_bench.load_scenario, SCENARIOS):
         for seed in range(FIRST, FIRST + draws):
             seen = _drawn(of, level, seed)
-            a, b = apo_bench.correct(seen, plain), apo_bench.correct(seen, "contact")
+            a = apo_bench.correct(seen, plain)
+            b = apo_bench.correct(seen, "contact")
             otherwise += (a.status, a.rank, a.sentence, a.dropped) != (b.status, b.rank, b.sentence, b.dropped)
-            off, count = max(off, 1e3 * float(np.abs(a.goals - b.goals).max())), count + 1
+            off = max(off, 1e3 * float(np.abs(a.goals - b.goals).max()))
+            count = count + 1
     what = "goals compiled against not compiled, all scenarios, mm"
     return Row("Q8", level, what, off, "<= 1e-9", "", {"draws": count, "other status, rank or sentence": otherwise})
 
@@ -45,5 +49,6 @@ def _drawn(of: Scenario, level: str, seed: int) -> Observation:
     sigma = np.repeat([1e-3 * mm, np.radians(degrees)], 3) * rng.uniform(0.5, 1.5, size=(n, 1))
     L = sigma[:, :, None] * (np.tril(rng.normal(scale=0.2, size=(n, 6, 6)), -1) + np.eye(6))
     goals = of.goals @ pose.exp((L @ rng.standard_normal((n, 6, 1)))[..., 0])
-    everything, play_m = np.ones(n, dtype=np.bool_), PLAYS_M[seed % 2]
+    everything = np.ones(n, dtype=np.bool_)
+    play_m = PLAYS_M[seed % 2]
     return Observation(of.assembly, of.start, goals, L @ np.swapaxes(L, 1, 2), everything, play_m=play_m)

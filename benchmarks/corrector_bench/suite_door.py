@@ -60,7 +60,8 @@ def _measured(ways: list[str], name: str, draws: int) -> tuple[Array, Array, str
 
 def fault(gaps: Array) -> str:
     """Why a way is not timed; empty if it closed every contact of every draw."""
-    raised, worst = int(np.isnan(gaps).sum()), float(np.nanmax(gaps, initial=0.0))
+    raised = int(np.isnan(gaps).sum())
+    worst = float(np.nanmax(gaps, initial=0.0))
     if raised == len(gaps):
         return "no solution"
     left = int((gaps > OPEN_M).sum())

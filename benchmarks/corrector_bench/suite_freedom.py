@@ -22,7 +22,10 @@ def suite(draws: int) -> list[Row]:
 
 
 def _row(name: str, level: str, draws: int) -> Row:
-    of, right, widest, ranks = problem(name), 0, 0.0, 0
+    of = problem(name)
+    right = 0
+    widest = 0.0
+    ranks = 0
     for seed in range(draws):
         given = draw(of, level, seed)
         made = corrected(observation(of, given))

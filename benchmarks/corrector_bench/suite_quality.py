@@ -31,7 +31,8 @@ def judged(peer: str, of: Problem, level: str, draws: int, per_part: bool = Fals
     """Solves and measures; a draw that was not finished counts as infinitely bad."""
     ran = run(peer, of.name, level, draws, per_part=per_part, limit_s=120.0)
     lost = Quality(*[float("inf")] * len(Quality._fields))
-    rated, excess = [], []
+    rated = []
+    excess = []
     for seed in range(draws):
         given = draw(of, level, seed, per_part)
         found = quality(of, given, ran.goals[seed]) if seed < len(ran.goals) else lost

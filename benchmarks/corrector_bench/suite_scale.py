@@ -15,14 +15,17 @@ from benchmarks.corrector_bench.peers import Run, Task
 from benchmarks.corrector_bench.problems import Problem, problem
 from benchmarks.corrector_bench.rows import Row
 
-CHAINS, GRIDS, DENSE = (20, 40, 80, 200), (5, 10), (20, 40)
+CHAINS = (20, 40, 80, 200)
+GRIDS = (5, 10)
+DENSE = (20, 40)
 FASTER = {20: ">= 4", 40: ">= 15"}
 NAMES = (*(f"chain{k}" for k in CHAINS), *(f"grid{g}" for g in GRIDS))
 
 
 def suite(draws: int) -> list[Row]:
     """As many rounds as a fortieth of the draws."""
-    rounds, of = max(2, draws // 40), {name: problem(name) for name in NAMES}
+    rounds = max(2, draws // 40)
+    of = {name: problem(name) for name in NAMES}
     ms: dict[str, list[float]] = {name: [] for name in (*NAMES, *(f"dense chain{k}" for k in DENSE))}
     last: dict[str, tuple[Draw, Array]] = {}
     for seed in range(rounds):

@@ -80,7 +80,8 @@ def _one(of: Problem, clearance_mm: float, seed: int) -> Walled:
     middle = corrected(observation(of, given), "contact")
     outside = beyond(of, given, made.goals, half)
     drift = pushed(of, given, made.goals, half)
-    length, true = np.linalg.norm(lengths(given, made.goals)), np.linalg.norm(lengths(given, given.truth))
+    length = np.linalg.norm(lengths(given, made.goals))
+    true = np.linalg.norm(lengths(given, given.truth))
     off, off_centred = (
         1e3 * float(np.linalg.norm((goals - given.truth)[-1, :3, 3])) for goals in (made.goals, middle.goals)
     )
@@ -120,7 +121,8 @@ def pushed(of: Problem, given: Draw, goals: Array, half_m: float) -> float:
     """The law of Karush, Kuhn and Tucker: z pushes against equations, and against touched walls from within."""
     f = InZ(of.system(given.seen), given.seen, factors(given.covariance))
     z = lengths(given, goals)
-    e, J = 1e-3 * f.value(z), f.slope(z)
+    e = 1e-3 * f.value(z)
+    J = f.slope(z)
     wall = np.array([_is_side(of, relation.contact) for relation in of.assembly.relations()])[f.system.contact]
     _, w, Vt = np.linalg.svd(J[~wall])
     free = Vt[int(np.count_nonzero(w > 1e-9 * w[0])) :]

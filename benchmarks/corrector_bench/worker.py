@@ -33,10 +33,13 @@ class Spent(NamedTuple):
 
 def main(peer: str, name: str, level: str, per_part: str, seeds: str, out: str, beside: str = "") -> None:
     """Writes goals (k, n, 4, 4) of the peer and milliseconds (k, 1 + beside) of all."""
-    known, of = peers(), problem(name)
+    known = peers()
+    of = problem(name)
     turn = [peer, *[other for other in beside.split(",") if other]]
     first, last = map(int, seeds.split(":"))
-    goals, times, wall = [], [], []
+    goals = []
+    times = []
+    wall = []
     for seed in range(first, last):
         given = draw(of, level, seed, per_part == "1")
         task = Task(of, of.system(given.seen), given.seen, given.covariance)
@@ -53,7 +56,8 @@ def _timed(peer: Peer, task: Task, again: bool) -> tuple[Array, Spent]:
     try:
         for _ in range(1 + again):
             run = peer(task)
-            clock, start = time.perf_counter(), time.process_time()
+            clock = time.perf_counter()
+            start = time.process_time()
             goals = run()
             spent = Spent(1e3 * (time.process_time() - start), 1e3 * (time.perf_counter() - clock))
         return np.asarray(goals, dtype=np.float64), spent

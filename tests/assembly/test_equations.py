@@ -111,11 +111,14 @@ def test_no_gap_at_the_truth(build) -> None:
 def test_equations_are_distances_of_posed_vertices_to_posed_planes(seed: int) -> None:
     scene = random_scene(seed)
     e = equations(scene.assembly, scene.start, scene.goals).residual(scene.goals)
-    history, row = placements(scene.assembly, scene.start, scene.goals), 0
+    history = placements(scene.assembly, scene.start, scene.goals)
+    row = 0
     for contact, made, _ in scene.assembly.relations():
         m, b = contact
-        T, n = history[made][m.part], scene.assembly.face(m).plane
-        face, on = scene.assembly.face(b), history[made][b.part]
+        T = history[made][m.part]
+        n = scene.assembly.face(m).plane
+        face = scene.assembly.face(b)
+        on = history[made][b.part]
         smaller_first = scenes_area(face) <= scenes_area(scene.assembly.face(m)) * (1 + 1e-9)
         corners = pose.apply(on, face.outline) if smaller_first else pose.apply(T, scene.assembly.face(m).outline)
         if not smaller_first:
@@ -170,7 +173,8 @@ def test_only_equations_with_a_free_motion_parameter_take_part() -> None:
 @given(st.integers(0, 10**6))
 @settings(max_examples=20, deadline=None)
 def test_equations_of_some_contacts_are_some_of_the_equations(seed: int) -> None:
-    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    scene = random_scene(seed)
+    rng = np.random.default_rng(seed)
     system = equations(scene.assembly, scene.start, scene.goals)
     assert system.made.tolist() == [relation.made for relation in scene.assembly.relations()]
     moved = scenes.noisy(scene.goals, rng, 5.0, 5.0)
@@ -218,7 +222,8 @@ def test_ranks_at_the_truth(name: str, free: tuple[int, ...] | None, rank: int) 
 @settings(max_examples=30, deadline=None)
 def test_least_step_is_the_pseudo_inverse(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    J, e = rng.standard_normal((8, 3)) @ rng.standard_normal((3, 6)), rng.standard_normal(8)
+    J = rng.standard_normal((8, 3)) @ rng.standard_normal((3, 6))
+    e = rng.standard_normal(8)
     step, rank = least_step(J, e, 1e-9)
     assert rank == 3
     assert_allclose(step, -np.linalg.pinv(J, rcond=1e-9) @ e, atol=1e-9)

@@ -117,7 +117,8 @@ def test_arcs_hold_at_the_truth_and_the_worst_is_the_gap(name: str) -> None:
     scene = scenes.ALL[name]()
     seen = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
     for step in range(1, len(scene.goals) + 1):
-        graph, done = relation_graph(scene.assembly, step), scene.assembly.first(step)
+        graph = relation_graph(scene.assembly, step)
+        done = scene.assembly.first(step)
         assert max(arc_residuals(scene.assembly, scene.start, scene.goals, graph)) < 1e-12
         worst = max(arc_residuals(scene.assembly, scene.start, seen, graph))
         assert worst == pytest.approx(largest_gap(done, scene.start, seen[:step]), rel=1e-9)

@@ -28,8 +28,11 @@ pytestmark = pytest.mark.numeric
 
 Pair = tuple[list[Contact], int, Poses]
 """The contacts of two parts, the operation that makes them, and where all parts are then."""
-WALKS, STEPS, HALVINGS = 4, 5, 24
-FARTHEST_MM, FARTHEST_DEG = 1.5, 1.0
+WALKS = 4
+STEPS = 5
+HALVINGS = 24
+FARTHEST_MM = 1.5
+FARTHEST_DEG = 1.0
 """Motions at both ends of what is tried: farther than the play of anything here, less than what leaves a slot."""
 WALLS_MM = 0.02
 """Holes are polygons around their circle, and depths are measured to 2 um."""
@@ -37,7 +40,8 @@ WALLS_MM = 0.02
 
 def pairs(scenario: Scenario) -> Iterator[Pair]:
     assembly = scenario.assembly
-    history, relations = placements(assembly, scenario.start, scenario.goals), assembly.relations()
+    history = placements(assembly, scenario.start, scenario.goals)
+    relations = assembly.relations()
     for arc in assembly.arcs():
         made = relations[arc[0]].made
         yield [relations[i].contact for i in arc], made, history[made]
@@ -70,8 +74,10 @@ def test_a_slide_sinks_in_its_dovetail_and_gets_room_between_the_walls() -> None
     other one, receded by c, stops it: c + 2 c sin 30. Its floor opens until both walls stop it, c / sin 30; rolled as
     well, until an edge of the bottom is on the receded floor, by the factor that the geometry of the trapezium gives.
     """
-    c, sine = 0.25, sin(radians(30.0))
-    a, b = 31.547005, 4.226497  # width of the bottom, and what a roll opens at the walls per radian, over sine [mm]
+    c = 0.25
+    sine = sin(radians(30.0))
+    a = 31.547005  # width of the bottom, and what a roll opens at the walls per radian, over sine [mm]
+    b = 4.226497
     lifted = (c / sine + b / a * c) / (1.0 - b / a)
     found = plays("dovetail")
     assert len(found) == 6
@@ -101,12 +107,14 @@ def at_edge(scenario: Scenario, pair: Pair, start: Poses, motion: np.ndarray, li
 
     def depth(share: float) -> float:
         T = after(share)[moved]
-        a, b = solids[moved].pieces, solids[rests].pieces
+        a = solids[moved].pieces
+        b = solids[rests].pieces
         return float(intrusion_depths(a, T[:3, :3], T[None, :3, 3], b, start[rests])[0])
 
     if depth(1.0) <= limit_m:
         return None
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if depth(middle) <= limit_m else (low, middle)
@@ -142,7 +150,8 @@ def near(pair: Pair, poses: Poses) -> bool:
 def test_all_play_is_right_and_what_is_deeper_is_not(name: str) -> None:
     """Parts as they are made, moved anyhow until they touch, and on from there: their contacts hold. Moved until they
     are deeper in each other than the margin: one does not."""
-    rng, scenario = np.random.default_rng(5), load_scenario(name)
+    rng = np.random.default_rng(5)
+    scenario = load_scenario(name)
     margin_m = 1e-3 * Thresholds().fit_margin_mm
     tried = 0
     for pair in pairs(scenario):

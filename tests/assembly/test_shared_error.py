@@ -54,8 +54,10 @@ def test_what_is_shared_stands_beside_the_diagonal() -> None:
 @pytest.mark.parametrize("name", ["bias", "bias-view", "correlated"])
 def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
     """Over 1,500 seeds, squared lengths of all errors together are chi-square of 6 n degrees of freedom."""
-    scene, noise = scenes.subassembly_on_castles(), make_noise(name, Level(2.0, 2.0))
-    shown, square = scenes.shown(scene), []
+    scene = scenes.subassembly_on_castles()
+    noise = make_noise(name, Level(2.0, 2.0))
+    shown = scenes.shown(scene)
+    square = []
     for seed in range(1500):
         seen = noise(shown.assembly, shown, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.goals) @ shown.goals).ravel()

@@ -59,7 +59,8 @@ def test_the_free_motions_of_the_geometry_span_the_null_space(name: str) -> None
 
 def test_a_draw_is_the_same_at_every_level_but_for_its_size() -> None:
     of = problem("fig3")
-    small, large = draw(of, "2/1", 7), draw(of, "5/3", 7)
+    small = draw(of, "2/1", 7)
+    large = draw(of, "5/3", 7)
     assert np.array_equal(small.truth, large.truth)
     np.testing.assert_allclose(lengths(small, small.truth), lengths(large, large.truth), atol=1e-9)
 

@@ -7,7 +7,8 @@ import pytest
 from apo_bench.cad.importing import Imported
 from tests.cad.made import Made
 
-FREE_MM, VOLUME = 0.01, 1e-3
+FREE_MM = 0.01
+VOLUME = 1e-3
 
 
 def hold(done: Imported, made: Made, within_mm: float) -> None:

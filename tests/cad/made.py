@@ -59,9 +59,11 @@ def rounded_plate() -> Made:
 
 def holed(sizes: tuple[float, float, float], *bores: tuple[float, float, float]) -> Made:
     """A plate with holes of (x, y, radius) through it."""
-    mesh, volume = block(*sizes), float(np.prod(sizes))
+    mesh = block(*sizes)
+    volume = float(np.prod(sizes))
     for x, y, r in bores:
-        mesh, volume = mesh - rod(r, sizes[2], (x, y, 0)), volume - disc(r, sizes[2])
+        mesh = mesh - rod(r, sizes[2], (x, y, 0))
+        volume = volume - disc(r, sizes[2])
     return Made(mesh, volume, 6, tuple(sorted(r for _, _, r in bores)))
 
 

@@ -45,5 +45,6 @@ def test_centroid_and_inertia_of_a_bush_are_exact(tmp_path: Path) -> None:
     mass = np.pi * 20 * (81 - 25)
     assert 1e3 * solid.centroid == pytest.approx([0, 0, 10], abs=1e-4)
     assert solid.inertia is not None
-    along, across = mass * (81 + 25) / 2, mass * (3 * (81 + 25) + 400) / 12
+    along = mass * (81 + 25) / 2
+    across = mass * (3 * (81 + 25) + 400) / 12
     assert 1e15 * np.diag(solid.inertia) == pytest.approx([across, across, along], rel=1e-3)

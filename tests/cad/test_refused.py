@@ -150,7 +150,8 @@ def test_triangles_turned_the_wrong_way_are_turned_and_said(tmp_path: Path) -> N
 
 
 def test_solids_of_one_shape_are_one_part_with_places(tmp_path: Path) -> None:
-    a, b = block(30, 20, 10), block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
+    a = block(30, 20, 10)
+    b = block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
     path = write_triangles(
         np.concatenate([triangles(each) for each in (a, b, rod(5, 20, (0, 60, 0)))]), tmp_path / "a.stl"
     )
@@ -218,7 +219,8 @@ def test_step_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_places_of_several_solids_are_written(tmp_path: Path) -> None:
-    a, b = block(30, 20, 10), block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
+    a = block(30, 20, 10)
+    b = block(30, 20, 10).rotate((0, 0, 30)).translate((50, 0, 0))
     path = write_triangles(
         np.concatenate([triangles(each) for each in (a, b, block(9, 8, 7, (0, 60, 0)))]), tmp_path / "a.stl"
     )
@@ -233,7 +235,8 @@ def test_triangles_without_an_area_change_nothing(tmp_path: Path) -> None:
     """Two in a row on an edge, as exporters leave them."""
     given = triangles(block(20, 20, 20))
     a, b, c = given[0]
-    m, k = a + (b - a) / 4, a + (b - a) / 2
+    m = a + (b - a) / 4
+    k = a + (b - a) / 2
     more = np.array([[a, m, c], [m, k, c], [k, b, c], [a, b, k], [a, k, m]])
     _, (raw,) = raw_solids(write_triangles(np.concatenate([given[1:], more]), tmp_path / "a.stl"), None)
     assert sum(region.kind == "plane" for region in raw.regions) == 6
@@ -251,7 +254,8 @@ def test_a_cavity_stays_empty_also_behind_a_round_hole(tmp_path: Path) -> None:
 
 def test_a_brep_that_crosses_itself_is_refused_and_rounding_of_arcs_is_not(tmp_path: Path) -> None:
     def solid(kind: str, given: Any) -> BrepSolid:
-        index, none = np.array([[0, 1, 2]]), np.zeros(3)
+        index = np.array([[0, 1, 2]])
+        none = np.zeros(3)
         across = np.cross(given[:, 1] - given[:, 0], given[:, 2] - given[:, 0])
         normals = across / np.linalg.norm(across, axis=1)[:, None]
         faces = (BrepFace(kind, p[0], n, 0.0, 0.0, p, index) for p, n in zip(given, normals, strict=True))

@@ -48,7 +48,8 @@ def test_places_and_directions_of_faces_are_exact(tmp_path: Path) -> None:
     for name, at in {"px": 30, "px2": -20, "nx": 30, "py": 20, "ny": 20, "pz": 50, "pz2": 10, "nz": 0}.items():
         assert named[name].normal is not None
         assert named[name].normal @ named[name].point == pytest.approx(at, abs=EXACT_MM)
-    high, low = named["hole1"], named["hole2"]
+    high = named["hole1"]
+    low = named["hole2"]
     assert np.abs(low.point - [15, 0, 0]).max() < EXACT_MM
     assert low.span == pytest.approx((0, 10), abs=EXACT_MM)
     assert np.abs(high.point - [0, 0, 30]).max() < EXACT_MM
@@ -95,11 +96,13 @@ def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pyte
     from build123d import Box, Color, Compound, Cylinder, Location, Pos
 
     plate = Box(60, 40, 20) - Pos(5, -3, 0) * Cylinder(5.1, 20)
-    plate.label, plate.color = "plate", Color(1, 0, 0)
+    plate.label = "plate"
+    plate.color = Color(1, 0, 0)
     pin = Cylinder(5, 40)
     pins = [pin.located(Location((5, -3, 10))), pin.located(Location((100, 0, 0), (0, 90, 0)))]
     for each in pins:
-        each.label, each.color = "pin", Color(0, 0.5, 1)
+        each.label = "pin"
+        each.color = Color(0, 0.5, 1)
     inner = Compound(label="inner", children=[pins[0]])
     inner.location = Location((0, 0, 7), (0, 0, 90))
     path = write_step(Compound(label="all", children=[plate, inner, pins[1]]), tmp_path / "a.step")

@@ -151,7 +151,8 @@ def test_corners_that_are_packed_small_take_little_memory() -> None:
 
 
 def test_nested_objects_are_placed_by_the_product_of_their_places() -> None:
-    move, turn = "1 0 0 0 1 0 0 0 1 5 0 0", "0 1 0 -1 0 0 0 0 1 0 0 0"
+    move = "1 0 0 0 1 0 0 0 1 5 0 0"
+    turn = "0 1 0 -1 0 0 0 0 1 0 0 0"
     inner = f'<object id="2"><components><component objectid="1" transform="{move}"/></components></object>'
     _, [(name, mesh)] = read_3mf(
         Path("a.3mf"), packed(model(MESH + inner, f'<item objectid="2" transform="{turn}"/>')), MOST

@@ -70,7 +70,8 @@ def test_a_graph_is_printed_as_in_the_paper(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path, picture = _castle_aside(tmp_path, 3.0), tmp_path / "graph.svg"
+    path = _castle_aside(tmp_path, 3.0)
+    picture = tmp_path / "graph.svg"
     asked = ("graph", "stick_in_tower", "--observation", str(path))
     code, out, err = run(capsys, *asked, "--json", "--out", str(picture))
     assert (code, err, out.count("\n")) == (0, "", 1)
@@ -185,7 +186,8 @@ def test_an_observation_travels_through_a_file(capsys: pytest.CaptureFixture[str
     _, drawn, _ = run(capsys, *TRIAL, *HOPELESS, "--json", "--save-observation", str(path))
     code, measured, err = run(capsys, *MEASURED, "--observation", str(path), "--json")
     assert (code, err) == (0, "")
-    before, after = json.loads(drawn), json.loads(measured)
+    before = json.loads(drawn)
+    after = json.loads(measured)
     for key in ("success", "failure_stage", "failure_code", "failure_operation"):
         assert after[key] == before[key]
     assert after["gap_before_mm"] == pytest.approx(before["gap_before_mm"], rel=1e-9)
@@ -228,7 +230,8 @@ def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -
 
 
 def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    seen, path = tmp_path / "seen.json", tmp_path / "replay.mp4"
+    seen = tmp_path / "seen.json"
+    path = tmp_path / "replay.mp4"
     run(capsys, *TRIAL, *HOPELESS, "--save-observation", str(seen))
     document = json.loads(seen.read_text())
     document["operations"][1]["seen"] = False

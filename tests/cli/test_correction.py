@@ -158,7 +158,8 @@ def test_what_happens_in_doubt(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, doubt: str, code: int, status: str
 ) -> None:
     """Castle 2 was seen 25 mm aside: R4, which it has with the stick, is what the rest does without."""
-    path, out = aside(tmp_path, 25.0), tmp_path / "out.csv"
+    path = aside(tmp_path, 25.0)
+    out = tmp_path / "out.csv"
     ended, said, err = run(capsys, *asked(path, "--if-doubtful", doubt, "--json", "--out", str(out)))
     made = json.loads(said)
     assert (ended, made["status"], made["test"]["passes"]) == (code, status, False)
@@ -223,7 +224,8 @@ def test_a_file_of_another_scenario_is_refused(capsys: pytest.CaptureFixture[str
 
 
 def test_what_was_seen_is_not_written_over(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path, link = tmp_path / "seen.csv", tmp_path / "link.csv"
+    path = tmp_path / "seen.csv"
+    link = tmp_path / "link.csv"
     path.write_bytes(SEEN.read_bytes())
     link.symlink_to(path)
     for out, words in ((path, "is the file of the observation; name another"), (link, "a symbolic link")):

@@ -150,7 +150,8 @@ def test_states_and_macros_of_every_operation(name: str) -> None:
 @pytest.mark.parametrize("name", scenes.ALL)
 def test_plans_do_not_depend_on_the_frame(name: str) -> None:
     """Turned and shifted on the table, the same macros in the same directions of the parts; also a little askew."""
-    scene, rng = scenes.ALL[name](), np.random.default_rng(3)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(3)
     straight = understand(scene.assembly, scene.start, scene.goals)
     for _ in range(3):
         turn = scenes.turned(scene, pose.at(rng.uniform(-0.3, 0.3, 3) * (1, 1, 0), (0, 0, rng.uniform(-180, 180))))
@@ -168,7 +169,8 @@ def test_plans_do_not_depend_on_the_frame(name: str) -> None:
 
 @pytest.mark.parametrize("name", TABLE)
 def test_changing_one_motion_parameter_changes_one_line_of_the_plan(name: str) -> None:
-    scenario, rng = load_scenario(name), np.random.default_rng(7)
+    scenario = load_scenario(name)
+    rng = np.random.default_rng(7)
     before = plan_text(plan_lines(nominal(scenario), scenario))
     for k in range(len(scenario.goals)):
         goals = np.array(scenario.goals)
@@ -332,7 +334,8 @@ def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
     done = moves(Plan(scenario.assembly, layout.start, layout.goals), build_scene(scenario))
     stages = placements(scenario.assembly, layout.start, layout.goals)
     for move, what in zip(done, nominal_operations(scenario), strict=True):
-        t, T = move.transfer, stages[what.operation][what.main]
+        t = move.transfer
+        T = stages[what.operation][what.main]
         assert [motion.name for motion in t.macros] == [macro.name for macro in what.after.macros]
         assert len(t.departs) == len(what.before.departs)
         for motion, macro in zip(t.macros, what.after.macros, strict=True):
@@ -354,7 +357,8 @@ def test_rotation_never_adds_freedom_that_translation_lacks(name: str) -> None:
 def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out, frames = tmp_path / "robot.json", tmp_path / "robot.toml"
+    out = tmp_path / "robot.json"
+    frames = tmp_path / "robot.toml"
     frames.write_text('schema = "apo-bench/robot/1"\nquaternion = "wxyz"\n', encoding="utf-8")
     seen = ["plan", "stick_in_tower", "--observation", str(ROOT / "docs" / "seen.csv"), "--method", "contact"]
     assert cli.main([*seen, "--robot", str(out), "--frames", str(frames)]) == 0

@@ -24,7 +24,8 @@ def folder(tmp_path: Path) -> Path:
     parts = seen(NAME, 0.3)
     tracked = {p: Tracked(p, np.eye(4), track.t, track.T) for p, track in parts.items()}
     FORMS["csv-wxyz"].write(tracked, tmp_path / "log.csv")
-    at, q = pose.pack(CAMERA)[:3] * 1e3, pose.pack(CAMERA)[3:]
+    at = pose.pack(CAMERA)[:3] * 1e3
+    q = pose.pack(CAMERA)[3:]
     stands = f"at_mm = {at.tolist()}\nquaternion_wxyz = {q.tolist()}"
     (tmp_path / "c.toml").write_text(f'schema = "apo-bench/camera/1"\n[pose]\n{stands}\n', encoding="utf-8")
     ids = "\n".join(f'{part} = {{ id = "{part}" }}' for part in parts)

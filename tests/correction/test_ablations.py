@@ -66,7 +66,8 @@ def test_the_newest_motion_parameter_alone_does_not_suffice(name: str) -> None:
 def test_where_the_newest_suffices_it_is_as_tracking() -> None:
     scene = scenes.fixture_alignment()
     given = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(2), 1.0, 1.0))
-    mine, whole = last_only(given), paper_track(given)
+    mine = last_only(given)
+    whole = paper_track(given)
     assert (mine.tried, mine.schedule, mine.freed) == (whole.tried, whole.schedule, whole.freed)
     assert len(mine.tried) == 3
     assert_array_equal(mine.goals, whole.goals)
@@ -97,7 +98,8 @@ def test_a_set_without_the_newest_has_to_mend_what_it_makes() -> None:
 
 def test_sets_by_size_then_by_recency_and_no_more_than_that() -> None:
     assert list(smallest((5, 3, 1))) == [(5,), (3,), (1,), (5, 3), (5, 1), (3, 1), (5, 3, 1)]
-    few, many = tuple(range(8)), tuple(range(30))
+    few = tuple(range(8))
+    many = tuple(range(30))
     assert len(list(smallest(few))) == len(set(smallest(few))) == MOST_SETS
     assert len(list(smallest(many))) == MOST_SETS + 1
     assert list(smallest(many))[-1] == many
@@ -151,7 +153,8 @@ def test_without_history_the_end_of_the_simple_case_is_the_same() -> None:
 
 def test_without_what_disappeared_the_fixture_of_example_5_3_stays_wrong() -> None:
     given = seen("fixture")
-    found, whole = no_disappeared(given), paper(given)
+    found = no_disappeared(given)
+    whole = paper(given)
     system = equations(given.assembly, given.start, given.goals)
     against = [str(relation.contact) for relation in given.assembly.relations()].index("castle2.py on cube.ny")
     assert (found.status, counted(found), counted(whole)) == ("converged", (5, 3, 1), (5, 3, 2, 1))

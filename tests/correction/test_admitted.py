@@ -111,8 +111,10 @@ def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
     for claimed in (0.0, float("nan"), -1.0):
         made = correct(one, lambda seen, claimed=claimed: lying(seen, gap_after_m=claimed))
         assert (made.gap_before_m, made.gap_after_m) == (open_m, open_m)
-    wrapped, own = correct(one, lambda seen: contact(seen)), correct(one, "contact")
-    claimed_m, measured_m = (own.gap_before_m, own.gap_after_m), (wrapped.gap_before_m, wrapped.gap_after_m)
+    wrapped = correct(one, lambda seen: contact(seen))
+    own = correct(one, "contact")
+    claimed_m = (own.gap_before_m, own.gap_after_m)
+    measured_m = (wrapped.gap_before_m, wrapped.gap_after_m)
     assert measured_m == pytest.approx(claimed_m, rel=0, abs=1e-15)  # compiled and not: rounding
 
 

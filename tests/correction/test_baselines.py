@@ -147,7 +147,8 @@ def test_snap_takes_the_most_likely_of_all_poses_that_fit() -> None:
 @pytest.mark.parametrize("name", ["bridge", "stick_in_tower", "fixture", "pockets"])
 def test_least_squares_is_no_worse_than_the_truth(name: str, contact_m: float) -> None:
     """The truth has no gap, so at the optimum (e / contact_m)^2 + |z|^2 is at most the squared length of the noise."""
-    seen, truth = noisy(name), scenes.ALL[name]().goals
+    seen = noisy(name)
+    truth = scenes.ALL[name]().goals
     made = correct(seen, partial(least_squares, contact_m=contact_m))
     assert made.gap_after_m**2 / contact_m**2 + length(seen, made.goals) ** 2 <= length(seen, truth) ** 2 * (1 + 1e-9)
     assert made.gap_after_m < 0.5 * contact_m
@@ -156,7 +157,9 @@ def test_least_squares_is_no_worse_than_the_truth(name: str, contact_m: float) -
 @pytest.mark.parametrize("name", ["stick_in_tower", "fixture", "pockets"])
 def test_the_gradient_of_the_penalty_is_that_of_differences(name: str) -> None:
     seen = noisy(name)
-    down, z, h = loss(seen), np.random.default_rng(2).standard_normal(6 * len(seen.goals)) * 0.3, 1e-6
+    down = loss(seen)
+    z = np.random.default_rng(2).standard_normal(6 * len(seen.goals)) * 0.3
+    h = 1e-6
     _, gradient = down(z)
     differences = [(down(z + h * e)[0] - down(z - h * e)[0]) / (2 * h) for e in np.eye(len(z))]
     assert len(intruding(down.meetings, down.space.goals(z))) > 0
@@ -170,7 +173,8 @@ def test_depth_is_the_shortest_way_out() -> None:
     goals[1, :3, 3] += (-2e-3, 1e-3, -0.5e-3)
     system = equations(built.assembly, built.start, goals)
     found = intruding(meeting(built.assembly, system), goals)
-    solids, T = built.assembly.solids, dict(zip(("B", "C", "A"), goals, strict=True)) | {"table": built.start["table"]}
+    solids = built.assembly.solids
+    T = dict(zip(("B", "C", "A"), goals, strict=True)) | {"table": built.start["table"]}
     expected = [intrusion(solids[a], T[a], solids[b], T[b]) for a, b in (("C", "B"), ("C", "table"))]
     depths = -found.residual(goals)
     assert sorted(depths[depths > 1e-9]) == pytest.approx(sorted(expected), abs=1e-12)
@@ -180,7 +184,8 @@ def test_depth_is_the_shortest_way_out() -> None:
 @pytest.mark.parametrize("name", ["bridge", "stick_in_tower", "fixture", "pockets"])
 def test_the_descent_goes_down_and_closes_most_of_the_gap(name: str) -> None:
     seen = noisy(name)
-    made, down = correct(seen, "penalty"), loss(seen)
+    made = correct(seen, "penalty")
+    down = loss(seen)
     z = (pose.log(pose.inverse(seen.goals) @ made.goals) / SIGMA).ravel()
     assert down(z)[0] < 0.05 * down(np.zeros_like(z))[0]
     assert made.gap_after_m < 0.05 * made.gap_before_m

@@ -100,7 +100,8 @@ def test_a_fixture_that_is_taken_away_stays_connected() -> None:
 @settings(max_examples=40, deadline=None)
 def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> None:
     """Equations with a candidate hold candidates only; those of any other operation hold none; more failures, more."""
-    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    scene = random_scene(seed)
+    rng = np.random.default_rng(seed)
     n = len(scene.assembly)
     system = equations(scene.assembly, scene.start, scene.goals)
     failing = rng.random(len(system.letters)) < 0.3

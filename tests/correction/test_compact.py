@@ -65,7 +65,8 @@ def test_a_motion_parameter_that_occurs_twice_adds_up() -> None:
     _, small = both(scene)
     twice = [c for c in range(len(small)) if np.count_nonzero(small.columns[c] == 2) == 2]
     assert twice
-    T, by = scene.goals, 1e-6
+    T = scene.goals
+    by = 1e-6
     _, J = dense(small, T)
     rows = (3 * np.array(twice)[:, None] + np.arange(3)).ravel()
     numeric = np.zeros((len(rows), 6))
@@ -85,7 +86,8 @@ def test_a_motion_parameter_that_occurs_twice_adds_up() -> None:
 @settings(max_examples=20, deadline=None)
 def test_coordinates_come_through_their_matrix(seed: int) -> None:
     """With twist = B z, the derivative by z is the one by the twist, times B."""
-    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    scene = random_scene(seed)
+    rng = np.random.default_rng(seed)
     _, small = both(scene)
     B = rng.standard_normal((len(scene.goals), 6, 6))
     _, J = dense(small, scene.goals)
@@ -96,13 +98,15 @@ def test_coordinates_come_through_their_matrix(seed: int) -> None:
 
 @pytest.mark.parametrize("lead", [(1,), (4,), (2, 3), (0,)])
 def test_leading_axes_are_single_calls(lead: tuple[int, ...]) -> None:
-    scene, rng = scenes.pockets(), np.random.default_rng(1)
+    scene = scenes.pockets()
+    rng = np.random.default_rng(1)
     _, small = both(scene)
     n = len(scene.goals)
     T = scene.goals @ pose.exp(0.01 * rng.standard_normal((*lead, n, 6)))
     B = rng.standard_normal((*lead, n, 6, 6))
     e, blocks = small.blocks(T, B)
-    Jt, words = small.gathered(blocks), small.words(T)
+    Jt = small.gathered(blocks)
+    words = small.words(T)
     assert Jt.shape == (*lead, 6 * n, 3 * len(small))
     for at in np.ndindex(lead):
         one_e, one_blocks = small.blocks(T[at], B[at])
@@ -114,7 +118,8 @@ def test_leading_axes_are_single_calls(lead: tuple[int, ...]) -> None:
 
 def test_own_points_of_each_observation() -> None:
     """Points with a leading axis belong to the observations; `only` takes those that are asked for."""
-    scene, rng = scenes.stick_on_castles(), np.random.default_rng(2)
+    scene = scenes.stick_on_castles()
+    rng = np.random.default_rng(2)
     T = np.array([scenes.noisy(scene.goals, rng, 3.0, 3.0) for _ in range(3)])
     each = [compact_equations(equations(scene.assembly, scene.start, goals), len(goals)) for goals in T]
     together = replace(each[0], points=np.array([one.points for one in each]))
@@ -129,7 +134,8 @@ def test_own_points_of_each_observation() -> None:
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
 def test_among_is_some_of_the_equations(seed: int) -> None:
-    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    scene = random_scene(seed)
+    rng = np.random.default_rng(seed)
     _, small = both(scene)
     moved = scenes.noisy(scene.goals, rng, 5.0, 5.0)
     kept = rng.random(len(small)) < 0.5

@@ -87,7 +87,8 @@ def test_soft_contacts_are_the_same_too(name: str) -> None:
 @pytest.mark.parametrize("own_points", [False, True])
 def test_many_at_once_are_the_same_as_one_after_the_other(own_points: bool) -> None:
     draws = [drawn("stick_on_castles", 5.0, 3.0, seed) for seed in range(6)]
-    goals, L = np.array([d[1] for d in draws]).reshape(2, 3, -1, 4, 4), np.array([d[2] for d in draws])
+    goals = np.array([d[1] for d in draws]).reshape(2, 3, -1, 4, 4)
+    L = np.array([d[2] for d in draws])
     system = draws[0][0]
     if own_points:
         points = np.array([d[0].points for d in draws]) * np.arange(1.0, 7.0)[:, None, None, None]
@@ -145,7 +146,8 @@ def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
 
 def observed(name: str, mm: float, degrees: float, seed: int, play_m: float = 0.0) -> Observation:
     """An observation whose covariance is the one that it was drawn from."""
-    given, (_, goals, L) = load_scenario(name), drawn(name, mm, degrees, seed)
+    given = load_scenario(name)
+    _, goals, L = drawn(name, mm, degrees, seed)
     seen = np.ones(len(goals), dtype=np.bool_)
     return Observation(given.assembly, given.start, goals, L @ np.swapaxes(L, 1, 2), seen, play_m=play_m)
 
@@ -222,7 +224,9 @@ def test_kernels_run_as_they_stand(turn: float) -> None:
     rng = np.random.default_rng(0)
     xi = rng.standard_normal((1, len(goals), 6))
     xi[..., 3:] *= turn / np.linalg.norm(xi[..., 3:], axis=-1, keepdims=True)
-    z, rows, mu = unspread(L, xi), np.arange(1), np.array([1e-3])
+    z = unspread(L, xi)
+    rows = np.arange(1)
+    mu = np.array([1e-3])
     plain, looped = (DenseStep(system, goals[None], L[None], None, some) for some in (None, kernels.PLAIN))
     for step in (plain, looped):
         step.linearise(z, rows)

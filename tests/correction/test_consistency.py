@@ -31,7 +31,8 @@ SCENES = {"redundant": scenes.stick_on_castles, "not redundant": scenes.stick_in
 
 def shifted(assembly: Assembly, by_mm: Mapping[str, float]) -> Assembly:
     """The same relations, with the lower face of some contacts, `a.py on b.spy`, off along its normal."""
-    solids, operations = dict(assembly.solids), []
+    solids = dict(assembly.solids)
+    operations = []
     for operation in assembly.operations:
         contacts = []
         for contact in operation.contacts:
@@ -208,7 +209,8 @@ def resting(scene: scenes.Scene, rng: np.random.Generator, play_mm: float) -> Ar
 
 
 def test_play_is_no_reason_for_an_alarm() -> None:
-    scene, alarms = scenes.stick_on_castles(), {0.0: 0, 0.25: 0}
+    scene = scenes.stick_on_castles()
+    alarms = {0.0: 0, 0.25: 0}
     for seed in range(60):
         rng = np.random.default_rng(seed)
         goals = scenes.noisy(resting(scene, rng, 0.25), rng, 0.05, 0.05)
@@ -230,7 +232,8 @@ def test_play_leaves_the_goals_as_they_are() -> None:
 def test_the_level_decides() -> None:
     seen = look(scenes.stick_in_tower(), 0)
     p = consistency_of(ContactCorrector()(seen)).p_value
-    below, above = ContactCorrector("refuse", p * 0.99)(seen), ContactCorrector("refuse", p + 1e-3)(seen)
+    below = ContactCorrector("refuse", p * 0.99)(seen)
+    above = ContactCorrector("refuse", p + 1e-3)(seen)
     assert (below.status, consistency_of(below).level) == ("converged", p * 0.99)
     assert (above.status, consistency_of(above).level) == ("doubtful", p + 1e-3)
 

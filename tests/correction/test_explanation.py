@@ -110,7 +110,8 @@ def test_the_relations_named_suffice_and_none_is_too_many(name: str) -> None:
 
 def _rank_with(seen: Observation, names: list[str], k: int) -> int:
     """Directions of operation k that are fixed in an assembly that has these relations only."""
-    relations, arcs = seen.assembly.relations(), seen.assembly.arcs()
+    relations = seen.assembly.relations()
+    arcs = seen.assembly.arcs()
     kept = {(relations[i].made, relations[i].contact) for name in names for i in arcs[int(name[1:]) - 1]}
     operations = tuple(
         replace(operation, contacts=tuple(c for c in operation.contacts if (j, c) in kept))
@@ -167,14 +168,16 @@ def test_too_many_operations_are_refused() -> None:
     scenario = load_scenario("block_on_block")
     n = 101
     many = Assembly(scenario.assembly.solids, scenario.assembly.operations[:1] * n, scenario.assembly.fixed)
-    goals, covariance = np.tile(scenario.goals[0], (n, 1, 1)), np.tile(np.eye(6), (n, 1, 1))
+    goals = np.tile(scenario.goals[0], (n, 1, 1))
+    covariance = np.tile(np.eye(6), (n, 1, 1))
     with pytest.raises(InputError, match="101 operations were given; up to 100 can be explained"):
         explain(Observation(many, scenario.start, goals, covariance, np.ones(n, bool)), goals)
 
 
 def test_what_is_free_alone_is_kept_as_seen() -> None:
     """Along a shift that takes nothing with it, a correction of millimetres leaves a part where it was."""
-    rng, seen = np.random.default_rng(5), nominal(load_scenario("stick_in_tower"), 2.0)
+    rng = np.random.default_rng(5)
+    seen = nominal(load_scenario("stick_in_tower"), 2.0)
     xi = rng.standard_normal((3, 6)) * [*[2e-3] * 3, *[np.radians(2.0)] * 3]
     noisy = replace(seen, goals=seen.goals @ pose.exp(xi))
     made = contact(noisy)
@@ -212,7 +215,8 @@ def test_the_posterior_of_parts_is_that_of_draws() -> None:
     scenario = load_scenario("pocket_table")
     seen = nominal(scenario, 1e-3)
     found = explain(seen, seen.goals)
-    rng, drawn = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    drawn = []
     for _ in range(200):
         xi = 1e-6 * rng.standard_normal((len(seen.goals), 6)) * [1, 1, 1, *[np.radians(1e3)] * 3]
         made = contact(replace(seen, goals=seen.goals @ pose.exp(xi)))

@@ -84,7 +84,8 @@ SMALL: dict[str, tuple[Callable[[], scenes.Scene], int]] = {
 
 
 def drawn(name: str, seed: int = 0) -> tuple[CompactEquations, Array, Array]:
-    scene, rng = SMALL[name][0](), np.random.default_rng(seed)
+    scene = SMALL[name][0]()
+    rng = np.random.default_rng(seed)
     L = crooked(len(scene.goals), rng)
     seen = twisted(scene.goals, L, rng)
     return system_of(scene, seen), seen, L
@@ -107,7 +108,8 @@ def nearest_goals_sparse(system: CompactEquations, seen: Array, L: Array, soft_m
 @pytest.mark.parametrize("name", SMALL)
 def test_sparse_is_dense(name: str, way: str) -> None:
     system, seen, L = drawn(name)
-    large, small = nearest_goals_sparse(system, seen, L), nearest_goals(system, seen[None], L)
+    large = nearest_goals_sparse(system, seen, L)
+    small = nearest_goals(system, seen[None], L)
     assert large.at_rest
     assert small.at_rest.all()
     assert_allclose(large.goals, small.goals[0], rtol=0, atol=1e-9)
@@ -122,7 +124,8 @@ def test_sparse_is_dense_for_soft_contacts(name: str, way: str) -> None:
     system, seen, L = drawn(name)
     soft_m = np.random.default_rng(1).uniform(0.1e-3, 1e-3, 3 * len(system))
     soft_m[:3] = 0.0
-    large, small = nearest_goals_sparse(system, seen, L, soft_m), nearest_goals(system, seen[None], L, soft_m)
+    large = nearest_goals_sparse(system, seen, L, soft_m)
+    small = nearest_goals(system, seen[None], L, soft_m)
     assert large.at_rest
     assert_allclose(large.z, small.z[0], rtol=0, atol=1e-5)
     assert_allclose(large.e, small.e[0], rtol=0, atol=1e-9)
@@ -135,8 +138,10 @@ def test_one_step_is_the_shortest_solution(name: str, way: str) -> None:
     where = sparse.incidence(system)
     _, every = system.blocks(seen, L)
     chosen = every[where.contact, where.letter]
-    J, rng = system.gathered(every).T, np.random.default_rng(2)
-    added, right = rng.uniform(1e-6, 1e-5, len(J)), rng.standard_normal(len(J))
+    J = system.gathered(every).T
+    rng = np.random.default_rng(2)
+    added = rng.uniform(1e-6, 1e-5, len(J))
+    right = rng.standard_normal(len(J))
     expected = J.T @ np.linalg.solve(J @ J.T + np.diag(added), right)
     found = sparse.sparse_solver(where)(added, chosen, right)
     assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
@@ -147,8 +152,11 @@ def test_products_are_those_of_the_matrix(name: str) -> None:
     system, seen, L = drawn(name)
     where = sparse.incidence(system)
     _, every = system.blocks(seen, L)
-    chosen, J, rng = every[where.contact, where.letter], system.gathered(every).T, np.random.default_rng(3)
-    z, y = rng.standard_normal((1, J.shape[1]))[0], rng.standard_normal((1, len(J)))[0]
+    chosen = every[where.contact, where.letter]
+    J = system.gathered(every).T
+    rng = np.random.default_rng(3)
+    z = rng.standard_normal((1, J.shape[1]))[0]
+    y = rng.standard_normal((1, len(J)))[0]
     assert_allclose(where.matrix(chosen).toarray(), J, rtol=0, atol=1e-15)
     assert_allclose(where.times(chosen, z), J @ z, rtol=0, atol=1e-14)
     assert_allclose(where.transposed_times(chosen, y), J.T @ y, rtol=0, atol=1e-14)
@@ -172,7 +180,8 @@ def test_rank_of_nothing() -> None:
 @pytest.mark.parametrize("build", [row, tower, hub])
 def test_three_thousand_blocks(build: Callable[[int], scenes.Scene]) -> None:
     n = 3000
-    scene, L = build(n), scales(n, 0.5, 0.02)
+    scene = build(n)
+    L = scales(n, 0.5, 0.02)
     seen = twisted(scene.goals, L, np.random.default_rng(0))
     found = nearest_goals(system_of(scene, seen), seen, L)
     assert found.at_rest

@@ -43,9 +43,11 @@ def shown(name: str, seed: int) -> Demonstration:
 
 def seen(name: str, seed: int, *, gross: float = 0.0, constant: bool = False) -> tuple[Observation, int]:
     """By the model `camera` at level 1, which states three times the truth; how many operations are grossly wrong."""
-    demonstration, rng = shown(name, seed), np.random.default_rng([seed, 1])
+    demonstration = shown(name, seed)
+    rng = np.random.default_rng([seed, 1])
     made = make_noise("camera", Level(1.0, 1.0))(demonstration.assembly, demonstration, rng)
-    goals, n = np.array(made.goals), len(made.goals)
+    goals = np.array(made.goals)
+    n = len(made.goals)
     wrong = rng.random(n) < gross
     far = pose.exp(rng.uniform(-1.0, 1.0, (n, 6)) * np.repeat([0.3, 1.5], 3) + np.repeat([0.06, 0.3], 3))
     goals = np.where(wrong[:, None, None], goals @ far, goals)
@@ -108,14 +110,17 @@ def test_an_error_of_the_whole_view_is_told_from_those_of_operations() -> None:
 
 
 def test_the_slope_of_the_likelihood_is_that_of_its_values() -> None:
-    camera, prepared = Camera(), []
+    camera = Camera()
+    prepared = []
     for seed in range(3):
         observation, _ = seen("stick_in_tower", seed, gross=0.5)
         goals = np.array(shown("stick_in_tower", seed).goals)
-        F, ways = factors(camera, goals, view_frame(camera, [goals])), view_ways(goals, view_frame(camera, [goals]))
+        F = factors(camera, goals, view_frame(camera, [goals]))
+        ways = view_ways(goals, view_frame(camera, [goals]))
         some = readings(observation, goals, [(), (1,), (0, 2)])
         prepared.append(likelihood._prepared(Shown(some, F, ways, 3)))
-    x, c = np.array([0.1, 1.5, 0.4, -0.3, -2.0, 0.2, -1.0]), 0.1 * np.arange(6.0)
+    x = np.array([0.1, 1.5, 0.4, -0.3, -2.0, 0.2, -1.0])
+    c = 0.1 * np.arange(6.0)
     _, slope = likelihood._surprise(x, prepared, c)
     for j, step in enumerate(1e-5 * np.eye(len(x))):
         ends = [likelihood._surprise(x + sign * step, prepared, c)[0] for sign in (1, -1)]

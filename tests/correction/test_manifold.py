@@ -78,7 +78,8 @@ def test_a_step_is_shortened_by_how_far_it_turns_a_goal_and_not_by_how_far_it_sh
 @pytest.mark.parametrize("level", LEVELS)
 def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> None:
     scene = scenes.ALL[name]()
-    n, L = len(scene.goals), scales(len(scene.goals), *level)
+    n = len(scene.goals)
+    L = scales(len(scene.goals), *level)
     for seed in range(10):
         seen = twisted(scene.goals, L, np.random.default_rng(seed))
         system = system_of(scene, seen)
@@ -96,7 +97,8 @@ def test_on_the_manifold_and_nearest(name: str, level: tuple[float, float]) -> N
 
 @pytest.mark.parametrize("name", RANKS)
 def test_correlated_noise_too(name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(3)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(3)
     for _ in range(10):
         L = crooked(len(scene.goals), rng)
         seen = twisted(scene.goals, L, rng)
@@ -122,11 +124,13 @@ def test_consistent_goals_stay(name: str) -> None:
 
 def test_the_derivative_is_one() -> None:
     """J of the result against differences of e by z."""
-    scene, rng = scenes.stick_in_tower(), np.random.default_rng(0)
+    scene = scenes.stick_in_tower()
+    rng = np.random.default_rng(0)
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
-    found, by = nearest_goals(system, seen, L), 1e-4
+    found = nearest_goals(system, seen, L)
+    by = 1e-4
     e = [
         [system.residual(seen @ pose.exp((L @ (found.z + sign * step).reshape(3, 6, 1))[..., 0])) for sign in (1, -1)]
         for step in by * np.eye(18)
@@ -139,8 +143,10 @@ def test_the_derivative_is_one() -> None:
 @settings(max_examples=15, deadline=None)
 def test_the_world_frame_does_not_matter(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    scene, L = scenes.stick_in_tower(), crooked(3, rng)
-    seen, world = twisted(scene.goals, L, rng), pose.exp(rng.standard_normal(6))
+    scene = scenes.stick_in_tower()
+    L = crooked(3, rng)
+    seen = twisted(scene.goals, L, rng)
+    world = pose.exp(rng.standard_normal(6))
     moved = scenes.turned(scenes.Scene(scene.assembly, scene.start, seen), world)
     a = nearest_goals(system_of(scene, seen), seen, L)
     b = nearest_goals(system_of(moved, moved.goals), moved.goals, L)
@@ -152,7 +158,8 @@ def test_the_world_frame_does_not_matter(seed: int) -> None:
 @settings(max_examples=15, deadline=None)
 def test_only_the_shape_of_the_noise_matters(seed: int, factor: float) -> None:
     rng = np.random.default_rng(seed)
-    scene, L = scenes.stick_on_castles(), crooked(3, rng)
+    scene = scenes.stick_on_castles()
+    L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     a, b = (nearest_goals(system_of(scene, seen), seen, scale) for scale in (L, factor * L))
     resting = 10.0 * STEP * max(1.0, factor)  # the solver rests within `STEP` of the noise that it was told
@@ -165,8 +172,10 @@ def test_only_the_shape_of_the_noise_matters(seed: int, factor: float) -> None:
 def test_any_root_of_the_covariance_will_do(seed: int) -> None:
     """L and L Q, Q orthogonal, state the same noise."""
     rng = np.random.default_rng(seed)
-    scene, L = scenes.bridge(), crooked(3, rng)
-    seen, Q = twisted(scene.goals, L, rng), np.linalg.qr(rng.standard_normal((3, 6, 6)))[0]
+    scene = scenes.bridge()
+    L = crooked(3, rng)
+    seen = twisted(scene.goals, L, rng)
+    Q = np.linalg.qr(rng.standard_normal((3, 6, 6)))[0]
     a, b = (nearest_goals(system_of(scene, seen), seen, scale) for scale in (L, L @ Q))
     assert_allclose(b.goals, a.goals, rtol=0, atol=1e-8)
     assert_allclose((Q @ b.z.reshape(3, 6, 1)).ravel(), a.z, rtol=0, atol=1e-5)
@@ -209,8 +218,10 @@ def test_slsqp_finds_the_same_where_nothing_is_redundant() -> None:
 @pytest.mark.parametrize("name", ["bridge", "stick_in_tower"])
 def test_ever_stiffer_springs_lead_to_the_same(name: str) -> None:
     """Redundant contacts as penalties, made ten times stiffer again and again, started from the answer before."""
-    scene, rng = scenes.ALL[name](), np.random.default_rng(11)
-    n, L = 3, crooked(3, rng)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(11)
+    n = 3
+    L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     plain = equations(scene.assembly, scene.start, seen)
 
@@ -227,7 +238,8 @@ def test_ever_stiffer_springs_lead_to_the_same(name: str) -> None:
 
 @pytest.mark.parametrize("name", RANKS)
 def test_many_at_once_are_one_after_the_other(name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(5)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(5)
     n = len(scene.goals)
     system = system_of(scene, scene.goals)
     L = np.array([crooked(n, rng, *level) for level in (*LEVELS, (0.01, 0.01), (2.0, 1.0), (2.0, 1.0))])
@@ -249,14 +261,16 @@ def test_many_at_once_are_one_after_the_other(name: str) -> None:
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
 def test_numbers_that_are_not_finite_are_left_alone(wrong: float) -> None:
-    scene, rng = scenes.stick_on_castles(), np.random.default_rng(0)
+    scene = scenes.stick_on_castles()
+    rng = np.random.default_rng(0)
     L = scales(3, 2.0, 1.0)
     seen = np.array([twisted(scene.goals, L, rng) for _ in range(3)])
     system = system_of(scene, scene.goals)
     good = nearest_goals(system, seen, L)
     seen[1, 2, 0, 3] = wrong
     with np.errstate(invalid="ignore"):
-        found, alone = nearest_goals(system, seen, L), nearest_goals(system, seen[1], L)
+        found = nearest_goals(system, seen, L)
+        alone = nearest_goals(system, seen[1], L)
     assert found.finite.tolist() == [True, False, True]
     assert found.at_rest.tolist() == [True, False, True]
     assert_array_equal(found.goals[1], seen[1])
@@ -267,7 +281,8 @@ def test_numbers_that_are_not_finite_are_left_alone(wrong: float) -> None:
 
 
 def test_without_contacts_nothing_changes() -> None:
-    scene, rng = scenes.stick_on_castles(), np.random.default_rng(0)
+    scene = scenes.stick_on_castles()
+    rng = np.random.default_rng(0)
     L = crooked(3, rng)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
@@ -292,7 +307,8 @@ def test_no_operations_and_no_observations() -> None:
 @pytest.mark.parametrize("name", ["bridge", "stick_on_castles", "pockets"])
 def test_soft_contacts_balance_the_noise(name: str) -> None:
     """The gradient of |z|^2 + |e / soft|^2 vanishes; contacts that are demanded hold."""
-    scene, rng = scenes.ALL[name](), np.random.default_rng(4)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(4)
     n = len(scene.goals)
     for demanded in (0.0, 0.5):
         L = crooked(n, rng)
@@ -311,7 +327,8 @@ def test_soft_contacts_balance_the_noise(name: str) -> None:
 
 
 def test_softer_contacts_are_followed_less() -> None:
-    scene, rng = scenes.stick_in_tower(), np.random.default_rng(9)
+    scene = scenes.stick_in_tower()
+    rng = np.random.default_rng(9)
     L = scales(3, 2.0, 1.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)

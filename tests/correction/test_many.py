@@ -31,7 +31,8 @@ SCENES: dict[str, Callable[[], scenes.Scene]] = {**scenes.ALL, "chain6": lambda:
 
 def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) -> list[Observation]:
     """Observations of one assembly, each with noise of its own."""
-    rng, out = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    out = []
     for i in range(count):
         n = len(scene.goals)
         L = crooked(n, rng, mm, deg) if i % 2 else scales(n, mm, deg)
@@ -82,14 +83,16 @@ def test_vertices_of_either_face(name: str) -> None:
             each[None], np.broadcast_to(np.eye(6), (1, len(each), 6, 6))
         )
         e_one, blocks_one = one.blocks(each, np.broadcast_to(np.eye(6), (len(each), 6, 6)))
-        J, J_one = together.gathered(blocks)[0].T, one.gathered(blocks_one).T
+        J = together.gathered(blocks)[0].T
+        J_one = one.gathered(blocks_one).T
         assert_allclose(J.T @ J, J_one.T @ J_one, rtol=0, atol=1e-12)
         assert_allclose(J.T @ e[0], J_one.T @ e_one, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_vertices_of_random_assemblies(seed: int) -> None:
-    scene, rng = random_scene(seed), np.random.default_rng(seed)
+    scene = random_scene(seed)
+    rng = np.random.default_rng(seed)
     goals = np.array([scenes.noisy(scene.goals, rng, 20.0, 20.0) for _ in range(3)])
     together = laid_together(scene, goals)
     e = together.residual(goals).reshape(3, -1, 3)
@@ -124,7 +127,8 @@ def test_the_same_with_wrong_relations(doubt: str) -> None:
     assembly = shifted(scene.assembly, {"stick.py on castle1.spy": 10.0})
     seen = [replace(one, assembly=assembly) for one in draws(scene, 4)]
     corrector = ContactCorrector(doubt)  # type: ignore[arg-type]
-    many, single = correct_many(seen, corrector), [corrector(one) for one in seen]
+    many = correct_many(seen, corrector)
+    single = [corrector(one) for one in seen]
     assert [made.status for made in many] == [made.status for made in single]
     assert [made.dropped for made in many] == [made.dropped for made in single]
     assert {made.status for made in many} == {"converged" if doubt == "drop" else "inconsistent"}

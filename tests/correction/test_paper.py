@@ -101,7 +101,8 @@ def test_what_remains_for_each_freed_set(name: str, wrong: list[int], error: Err
 )
 @pytest.mark.parametrize("level", [0.5, 1.0, 2.0])
 def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int, level: float) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(3)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(3)
     for _ in range(5):
         seen = scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level))
         found = paper(seen)
@@ -152,13 +153,15 @@ def drift(scene: scenes.Scene, seen: Array, how: Callable[..., Solution] = solve
 
 @pytest.mark.parametrize("name", ["bridge", "stick_on_castles", "fixture", "pockets"])
 def test_free_directions_stay_where_they_were_seen(name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(7)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(7)
     drifts = [drift(scene, scenes.noisy(scene.goals, rng, 2.0, 1.0)) for _ in range(25)]
     assert max(drifts) < 0.2
 
 
 def test_the_rank_counts_where_the_solver_rests_not_where_it_begins() -> None:
-    scene, rng = scenes.stick_in_tower(), np.random.default_rng(7)
+    scene = scenes.stick_in_tower()
+    rng = np.random.default_rng(7)
     seen = [scenes.noisy(scene.goals, rng, 2.0, 1.0) for _ in range(100)]
     units = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], 3)
     ranks = []
@@ -172,7 +175,8 @@ def test_the_rank_counts_where_the_solver_rests_not_where_it_begins() -> None:
 
 
 def test_a_tiny_cut_off_moves_free_directions_and_looks_just_as_good() -> None:
-    scene, rng = scenes.stick_on_castles(), np.random.default_rng(7)
+    scene = scenes.stick_on_castles()
+    rng = np.random.default_rng(7)
     seen = [scenes.noisy(scene.goals, rng, 2.0, 1.0) for _ in range(25)]
     assert max(drift(scene, goals) for goals in seen) < 0.2
     drifts = [drift(scene, goals, partial(descend, cut_off=1e-6)) for goals in seen]
@@ -310,7 +314,8 @@ def test_a_tilt_above_the_threshold_makes_a_candidate() -> None:
 @pytest.mark.parametrize("name", scenes.ALL)
 def test_settling_opens_no_contact_that_held(name: str) -> None:
     """Levels about the threshold, where a goal that is put right can put a later one wrong."""
-    scene, rng = scenes.ALL[name](), np.random.default_rng(5)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(5)
     for level in np.repeat([0.01, 0.02, 0.03, 0.05], 10):
         found = paper(scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level)))
         assert found.ok

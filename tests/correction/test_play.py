@@ -44,7 +44,8 @@ def test_each_fit_on_the_way_adds_its_play():
 @pytest.mark.parametrize("name", BOXES)
 def test_deviations_are_those_of_the_covariance(name):
     assembly = shown(name)[0].assembly
-    S, deviation = fit_covariance(assembly, PLAY_M), fit_deviation(assembly, PLAY_M)
+    S = fit_covariance(assembly, PLAY_M)
+    deviation = fit_deviation(assembly, PLAY_M)
     if S is None:
         assert not deviation.any()
         return
@@ -56,10 +57,13 @@ def test_deviations_are_those_of_the_covariance(name):
 def test_faces_that_look_opposite_ways_are_off_by_the_same():
     assembly = shown("carried_bridge")[0].assembly
     number = {str(r.contact): i for i, r in enumerate(assembly.relations())}
-    S, corners = fit_covariance(assembly, 1.0)[::3, ::3], np.diff(pattern(assembly).begin)
+    S = fit_covariance(assembly, 1.0)[::3, ::3]
+    corners = np.diff(pattern(assembly).begin)
     S = 3.0 * S / np.sqrt(np.outer(corners, corners))
-    up, down = number["stick.pz on cube.hpz"], number["stick.nz on cube.hnz"]
-    slot, other = number["stick.nz on castle1.sfl"], number["stick.nz on castle2.sfl"]
+    up = number["stick.pz on cube.hpz"]
+    down = number["stick.nz on cube.hnz"]
+    slot = number["stick.nz on castle1.sfl"]
+    other = number["stick.nz on castle2.sfl"]
     assert (S[up, up], S[up, down], S[down, slot]) == pytest.approx((1.0, -1.0, 1.0))
     assert S[slot, other] == pytest.approx(2.0)
 
@@ -80,7 +84,8 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
     for name in ("stick_in_tower", "pocket_table"):
         seen = replace(look(name, 0), play_m=PLAY_M)
         asked = problem((seen,))
-        system, slack_m = asked.compact.only(0), fit_deviation(seen.assembly, seen.play_m)
+        system = asked.compact.only(0)
+        slack_m = fit_deviation(seen.assembly, seen.play_m)
         exact = nearest_goals(system, seen.goals, asked.L[0])
         soft = nearest_goals(system, seen.goals, asked.L[0], slack_m)
         over = soft.e[slack_m > 0.0] / slack_m[slack_m > 0.0]
@@ -98,7 +103,8 @@ def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():
     deep = equations(scenario.assembly, layout.start, goals).gaps(goals)
     assert by_contact("carried_bridge", deep)["stick.nz on castle1.sfl"] == pytest.approx(3.0 * PLAY_M)
     human = Demonstration(scenario.assembly, layout.start, goals, layout.start, np.zeros((5, 6, 6)), play_m=PLAY_M)
-    rng, noise = np.random.default_rng(0), make_noise("isotropic", Level(0.05, 0.05))
+    rng = np.random.default_rng(0)
+    noise = make_noise("isotropic", Level(0.05, 0.05))
     seen = [observe(human, noise, rng) for _ in range(200)]
     refused = sum(made.status == "doubtful" for made in correct_many(seen, contact_refuse))
     assert refused <= 8

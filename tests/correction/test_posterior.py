@@ -33,8 +33,10 @@ def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:
 @given(st.integers(0, 10**6), st.sampled_from(sorted(RANKS)))
 @settings(max_examples=25, deadline=None)
 def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(seed)
-    n, L = len(scene.goals), crooked(len(scene.goals), rng, 5.0, 3.0)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(seed)
+    n = len(scene.goals)
+    L = crooked(len(scene.goals), rng, 5.0, 3.0)
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
     found = nearest_goals(system, seen, L)
@@ -66,7 +68,8 @@ def test_every_row_that_counts_leaves_no_gap() -> None:
 
 
 def test_without_contacts_it_is_the_noise_that_is_left() -> None:
-    scene, L = scenes.stick_in_tower(), crooked(3, np.random.default_rng(0))
+    scene = scenes.stick_in_tower()
+    L = crooked(3, np.random.default_rng(0))
     system = system_of(scene, scene.goals)
     found = nearest_goals(system.among(np.zeros(len(system), dtype=np.bool_)), scene.goals, L)
     assert_allclose(marginals(found.B[None], np.eye(18)[None])[0], L @ np.swapaxes(L, 1, 2), rtol=1e-12, atol=1e-20)
@@ -79,7 +82,8 @@ def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> 
     scene = scenes.ALL[name]()
     n = len(scene.goals)
     L = crooked(n, np.random.default_rng(1), 0.5, 0.5) if correlated else scales(n, 0.5, 0.5)
-    errors, stated = np.zeros((400, n, 6)), np.zeros((n, 6, 6))
+    errors = np.zeros((400, n, 6))
+    stated = np.zeros((n, 6, 6))
     for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))])):
         assert made.covariance is not None
         errors[seed] = pose.log(pose.inverse(made.goals) @ scene.goals)
@@ -97,7 +101,8 @@ def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> 
 
 def test_contacts_take_uncertainty_away_and_add_none() -> None:
     """The stated noise minus what is left is positive semidefinite, up to the curvature of a correction this small."""
-    scene, L = scenes.stick_in_tower(), crooked(3, np.random.default_rng(2), 0.01, 0.01)
+    scene = scenes.stick_in_tower()
+    L = crooked(3, np.random.default_rng(2), 0.01, 0.01)
     seen = look(scene, L, 0)
     made = correct(seen, "contact")
     assert made.covariance is not None
@@ -109,7 +114,8 @@ def test_contacts_take_uncertainty_away_and_add_none() -> None:
 @cache
 def corrected_towers() -> tuple[scenes.Scene, list[Observation], tuple[Correction, ...]]:
     """300 draws of one tower, for every level."""
-    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    scene = scenes.stick_in_tower()
+    L = scales(3, 1.0, 1.0)
     seen = [look(scene, L, seed) for seed in range(300)]
     return scene, seen, correct_many(seen)
 
@@ -124,7 +130,8 @@ def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, h
 
 
 def test_regions_of_noise_that_is_stated_too_small_do_not() -> None:
-    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    scene = scenes.stick_in_tower()
+    L = scales(3, 1.0, 1.0)
     held = []
     for seed in range(60):
         seen = look(scene, L, seed)
@@ -135,7 +142,8 @@ def test_regions_of_noise_that_is_stated_too_small_do_not() -> None:
 
 def test_only_free_directions_count() -> None:
     """Off along the free x of the stick the truth is outside from some sigmas on; off the table it is not looked at."""
-    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    scene = scenes.stick_in_tower()
+    L = scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     made = correct(seen, "contact")
     assert contains_truth(seen, made, made.goals)
@@ -150,7 +158,8 @@ def test_only_free_directions_count() -> None:
 
 def test_what_was_left_out_no_longer_fixes_anything() -> None:
     """Lifted out of its slots the stick is outside only if nothing holds it there."""
-    scene, L = scenes.stick_on_castles(), scales(3, 1.0, 1.0)
+    scene = scenes.stick_on_castles()
+    L = scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     made = correct(seen, "contact")
     lifted = np.array(made.goals)
@@ -167,7 +176,8 @@ def pocketed() -> scenes.Scene:
 
 
 def test_where_there_is_no_region_there_is_no_answer() -> None:
-    scene, L = scenes.stick_in_tower(), scales(3, 1.0, 1.0)
+    scene = scenes.stick_in_tower()
+    L = scales(3, 1.0, 1.0)
     seen = look(scene, L, 0)
     assert contains_truth(seen, correct(seen, "paper"), scene.goals) is None
     unseen = replace(seen, seen=np.array([True, True, False]))

@@ -89,7 +89,8 @@ def test_jacobian_is_that_of_finite_differences(kind):
 @pytest.mark.parametrize("kind", ["shaft in hole", "cone in cone", "cone on rim"])
 def test_any_two_perpendicular_planes_through_an_axis_give_the_same_goals(kind):
     observation, _ = case(kind, seed=3)
-    known, solids = correct(observation).goals, observation.assembly.solids
+    known = correct(observation).goals
+    solids = observation.assembly.solids
     for turn in (0.3, 1.1, 2.5):
         toward = np.array([np.cos(turn), np.sin(turn), 0.0])
         turned = {
@@ -112,7 +113,8 @@ def violated(kind, goals):
         return np.array(
             [*on_table, *(pose.apply(pose.inverse(local), np.array([[0.0, 0.0, 20 * MM]]))[0] - [0, 0, 30 * MM])]
         )
-    at, along = local[:3, 3], local[:3, 2]
+    at = local[:3, 3]
+    along = local[:3, 2]
     if kind == "shaft in hole":
         cuts = [(at + (z - at[2]) / along[2] * along)[:2] for z in (0.0, 20 * MM)]
         return np.array([*on_table, *np.concatenate(cuts)])
@@ -145,7 +147,8 @@ def test_the_goals_are_those_of_an_independent_solver(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_test_and_the_regions_hold_what_they_say(kind):
     """Of 400 draws: five standard deviations of a share of 5 % are 5.5 points; 2,000 are in the documentation."""
-    rng, (observation, truth) = np.random.default_rng(5), case(kind)
+    rng = np.random.default_rng(5)
+    observation, truth = case(kind)
     many = [seen(observation.assembly, observation.start, truth, rng) for _ in range(400)]
     made = correct_many(many)
     assert all(one.ok for one in made)
@@ -187,7 +190,8 @@ def test_a_missing_view_is_inferred_from_a_round_contact():
 
 def test_a_wrong_relation_is_named_as_it_was_given():
     """The bore says 5 mm too far along; only the contact as given, not what stands for it, is spoken of."""
-    bore, top = touching("pin.shaft", "plate.bore"), touching("pin.bottom", "table.top")
+    bore = touching("pin.shaft", "plate.bore")
+    top = touching("pin.bottom", "table.top")
     assembly, start, truth = scene(bore, top, at=PLATE_AT)
     plate = assembly.solids["plate"]
     wrong = replace(plate.rounds["bore"], point=np.array([8 * MM, 0.0, 0.0]))
@@ -265,7 +269,8 @@ def test_play_of_a_round_fit_is_a_disc(radius, fit, play):
         made = correct(seen(loose, start, truth, np.random.default_rng(seed), play_m=0.25e-3))
         assert made.ok
         local = pose.inverse(made.goals[0]) @ made.goals[1]
-        at, along = local[:3, 3], local[:3, 2]
+        at = local[:3, 3]
+        along = local[:3, 2]
         ends = [(at + (z - at[2]) / along[2] * along)[:2] for z in (0.0, 20 * MM)]
         far = max(np.linalg.norm(ends, axis=1))
         assert np.cos(np.pi / 16) * play * MM - 1e-6 <= far <= play * MM + 1e-6
@@ -285,11 +290,14 @@ def test_a_cone_that_recedes_lets_its_shaft_in_deeper():
 @pytest.mark.parametrize("mm", [0.02, 0.5])
 def test_a_shaft_that_stands_anywhere_in_its_play_is_no_alarm(mm):
     """Of 300 draws with both ends somewhere in a disc of 0.25 mm, at a nominal 1 %."""
-    bore, c = touching("pin.shaft", "plate.bore"), 0.25 * MM
+    bore = touching("pin.shaft", "plate.bore")
+    c = 0.25 * MM
     assembly, start, _ = scene(bore, at=IN_BORE, fit=True)
-    rng, many = np.random.default_rng(3), []
+    rng = np.random.default_rng(3)
+    many = []
     for _ in range(300):
-        radius, angle = c * np.sqrt(rng.uniform(size=2)), rng.uniform(0.0, 2 * np.pi, 2)
+        radius = c * np.sqrt(rng.uniform(size=2))
+        angle = rng.uniform(0.0, 2 * np.pi, 2)
         low, high = (
             np.array([r * np.cos(a), r * np.sin(a), z]) for r, a, z in zip(radius, angle, (0, 20 * MM), strict=True)
         )

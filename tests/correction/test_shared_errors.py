@@ -39,7 +39,8 @@ def seen(model: str, name: str = "pocket_table", seed: int = 0, level: float = 2
 
 def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
     """pocket_table: contacts with the fixed table tell where the camera is; taken alone, operations are torn apart."""
-    joint, alone = [], []
+    joint = []
+    alone = []
     for seed in range(8):
         observation, truth = seen("bias-view", seed=seed)
         for given, errors in ((observation, joint), (replace(observation, shared=()), alone)):
@@ -55,7 +56,8 @@ def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str
 
     `benchmarks/calibration.py` takes 2,000 draws of every model.
     """
-    p, covered = [], []
+    p = []
+    covered = []
     for seed in range(30):
         observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed)
         made = correct(observation, "contact")
@@ -69,7 +71,8 @@ def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str
 @pytest.mark.parametrize("model", ["heavy-tailed", "megapose-tless-inliers"])
 def test_the_test_and_the_regions_are_those_of_the_tails(model: str) -> None:
     """Of 50 draws, alarms at a nominal 10 % and regions of 95 % as chance makes them (binomial, 4 sigma)."""
-    p, covered = [], []
+    p = []
+    covered = []
     for seed in range(50):
         observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5)
         made = correct(observation, "contact")
@@ -131,10 +134,13 @@ def test_a_shared_error_above_its_covariance_is_refused() -> None:
 
 
 def test_an_outlier_beside_an_error_of_the_view_is_left_out_and_the_rest_solved_jointly() -> None:
-    joint, alone = [], []
+    joint = []
+    alone = []
     for seed in range(4):
         observation, truth = seen("bias-view", seed=seed)
-        (camera,), goals, stated = observation.shared, np.array(observation.goals), np.array(observation.covariance)
+        (camera,) = observation.shared
+        goals = np.array(observation.goals)
+        stated = np.array(observation.covariance)
         goals[1] = goals[1] @ pose.at((0.12, -0.07, 0.05), (40.0, -20.0, 60.0))
         stated[1] += camera.added(goals)[1] - camera.added(observation.goals)[1]
         wrong = replace(observation, goals=goals, covariance=stated)

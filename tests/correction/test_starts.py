@@ -58,7 +58,8 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
 def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
     for name in BOXES:
         seen = look(name, 1, 4.0)
-        one, other = correct(seen, "contact"), correct(seen, ContactCorrector(elsewhere=False))
+        one = correct(seen, "contact")
+        other = correct(seen, ContactCorrector(elsewhere=False))
         assert one.goals.tolist() == other.goals.tolist()
         assert one.sentence == other.sentence
 

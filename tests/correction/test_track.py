@@ -114,7 +114,8 @@ def test_before_an_operation_is_seen_it_changes_nothing() -> None:
     early = replace(
         seen, assembly=scene.assembly.first(n), goals=goals[:n], covariance=seen.covariance[:n], seen=seen.seen[:n]
     )
-    whole, part = paper_track(seen), paper_track(early)
+    whole = paper_track(seen)
+    part = paper_track(early)
     assert part.schedule == whole.schedule[: len(part.schedule)]
     assert whole.targets is not None
     assert_array_equal(part.targets, whole.targets[: len(part.schedule)])
@@ -151,7 +152,8 @@ SUCCEEDING = {
 
 @pytest.mark.parametrize("name", SUCCEEDING)
 def test_the_sets_that_succeed_with_noise(name: str) -> None:
-    scene, ends = scenes.ALL[name](), Counter[tuple[int, ...]]()
+    scene = scenes.ALL[name]()
+    ends = Counter[tuple[int, ...]]()
     for seed in range(60):
         seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0))
         found = paper_track(seen)

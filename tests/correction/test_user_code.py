@@ -142,7 +142,8 @@ class Unspeakable(Exception):
     ],
 )
 def test_whatever_is_raised_is_one_line(error: Exception, words: str) -> None:
-    seen, rng = scenes.seen(TOWER, TOWER.goals), np.random.default_rng(0)
+    seen = scenes.seen(TOWER, TOWER.goals)
+    rng = np.random.default_rng(0)
     with pytest.raises(InputError) as by_noise:
         observe(scenes.shown(TOWER), make_noise(_raising(error), LEVEL), rng)
     with pytest.raises(InputError) as by_relations:

@@ -64,13 +64,16 @@ def unbalanced(seen: Observation, goals: Array) -> float:
     """What neither equations nor touched walls, pushing inwards, account for in z (Karush, Kuhn and Tucker)."""
     L = np.linalg.cholesky(seen.covariance)
     xi = pose.log(pose.inverse(seen.goals) @ goals)
-    z, B = correction(seen.goals, goals, np.asarray(L, dtype=np.float64)), right_jacobian(xi) @ L
+    z = correction(seen.goals, goals, np.asarray(L, dtype=np.float64))
+    B = right_jacobian(xi) @ L
     system = equations(seen.assembly, seen.start, seen.goals)
     asked = np.array([seen.assembly.interval(r.contact, seen.play_m) for r in seen.assembly.relations()])
     low, high = asked[system.contact].T
     e, J = system.linearised(goals)
     J = (J.reshape(len(e), -1, 1, 6) @ B).reshape(len(e), -1)
-    exact, at_low, at_high = low == high, e < low + 1e-9, e > high - 1e-9
+    exact = low == high
+    at_low = e < low + 1e-9
+    at_high = e > high - 1e-9
     _, w, Vt = np.linalg.svd(J[exact])
     free = Vt[np.count_nonzero(w > 1e-7 * w[0]) :] if exact.any() else np.eye(len(z))
     pushes = np.concatenate([J[at_low & ~exact], -J[at_high & ~exact]]) @ free.T
@@ -84,7 +87,8 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
     name: str, clearance_mm: float, level: tuple[float, float]
 ) -> None:
     """Noise of the second level is so large beside a slot of 0.2 mm that linearised walls leave no room at first."""
-    scene, half_m = scenes.ALL[name](), 0.5e-3 * clearance_mm
+    scene = scenes.ALL[name]()
+    half_m = 0.5e-3 * clearance_mm
     n = len(scene.goals)
     assembly = walled(scene, name, Gap("clearance", -half_m, half_m))
     touched = 0
@@ -96,7 +100,8 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
         made = correct(seen, "contact")
         assert made.ok, (seed, made.sentence)
         assert beyond(seen, made.goals) <= 1e-12
-        z, true = correction(seen.goals, made.goals, L), correction(seen.goals, truth, L)
+        z = correction(seen.goals, made.goals, L)
+        true = correction(seen.goals, truth, L)
         assert z @ z <= (true @ true) * (1 + 1e-9)
         assert unbalanced(seen, made.goals) <= 1e-6
         touched += beyond(seen, made.goals) > -1e-9
@@ -105,7 +110,8 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
 
 @pytest.mark.parametrize("name", SIDES)
 def test_walls_that_are_far_away_do_nothing(name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(0)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(0)
     L = crooked(len(scene.goals), rng)
     goals = twisted(scene.goals, L, rng)
     far = look(walled(scene, name, Gap("clearance", -1.0, 1.0)), scene, goals, L)
@@ -113,7 +119,8 @@ def test_walls_that_are_far_away_do_nothing(name: str) -> None:
         replace(o, contacts=tuple(c for c in o.contacts if not is_side(name, c))) for o in scene.assembly.operations
     )
     without = look(replace(scene.assembly, operations=left), scene, goals, L)
-    a, b = correct(far, "contact"), correct(without, "contact")
+    a = correct(far, "contact")
+    b = correct(without, "contact")
     assert a.ok
     assert_allclose(a.goals, b.goals, rtol=0, atol=1e-9)
     assert a.rank == b.rank
@@ -121,7 +128,8 @@ def test_walls_that_are_far_away_do_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", SIDES)
 def test_walls_that_close_lead_to_the_middle(name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(1)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(1)
     L = crooked(len(scene.goals), rng)
     goals = twisted(scene.goals, L, rng)
     middle = correct(look(scene.assembly, scene, goals, L), "contact").goals
@@ -143,7 +151,8 @@ def test_a_part_that_was_seen_between_its_walls_stays() -> None:
         [scenes.mm(0, 0, 25)],
     )
     gaps = {scene.assembly.operations[0].contacts[0]: Gap("clearance", -1e-3, 1e-3)}
-    assembly, L = replace(scene.assembly, gaps=gaps), scales(1, 2.0, 1.0)
+    assembly = replace(scene.assembly, gaps=gaps)
+    L = scales(1, 2.0, 1.0)
     inside = look(assembly, scene, np.array([scenes.mm(3, 4, 25.4)]), L)
     made = correct(inside, "contact")
     assert (made.ok, made.rank) == (True, 0)
@@ -170,7 +179,8 @@ def test_one_wall_may_be_the_nominal_face() -> None:
 @pytest.mark.parametrize("play_mm", [0.0, 0.25, 1.0])
 def test_contact_puts_parts_that_fit_one_play_lower(play_mm: float, method: Any) -> None:
     """Compiled where that can be, and as it is without Numba."""
-    scene, L = scenes.stick_on_castles(), scales(3, 2.0, 1.0)
+    scene = scenes.stick_on_castles()
+    L = scales(3, 2.0, 1.0)
     floors = [c for c in scene.assembly.operations[2].contacts if c.environment.face == "sfl"]
     assembly = replace(scene.assembly, gaps={c: Gap("contact") for c in floors})
     goals = twisted(scene.goals, L, np.random.default_rng(3))
@@ -184,7 +194,8 @@ def test_contact_puts_parts_that_fit_one_play_lower(play_mm: float, method: Any)
 
 
 def test_contact_of_faces_without_play_is_plain_contact() -> None:
-    scene, L = scenes.stick_on_castles(), scales(3, 2.0, 1.0)
+    scene = scenes.stick_on_castles()
+    L = scales(3, 2.0, 1.0)
     gaps = {c: Gap("contact") for o in scene.assembly.operations[:2] for c in o.contacts}
     goals = twisted(scene.goals, L, np.random.default_rng(3))
     a = correct(look(replace(scene.assembly, gaps=gaps), scene, goals, L, 1e-3), "contact")
@@ -193,7 +204,8 @@ def test_contact_of_faces_without_play_is_plain_contact() -> None:
 
 
 def test_clearance_without_numbers_is_the_play() -> None:
-    scene, L = scenes.stick_on_castles(), scales(3, 2.0, 1.0)
+    scene = scenes.stick_on_castles()
+    L = scales(3, 2.0, 1.0)
     goals = twisted(scene.goals, L, np.random.default_rng(5))
     play = look(walled(scene, "stick_on_castles", Gap("clearance")), scene, goals, L, 0.5e-3)
     said = look(walled(scene, "stick_on_castles", Gap("clearance", -0.5e-3, 0.5e-3)), scene, goals, L, 0.5e-3)
@@ -205,7 +217,8 @@ def test_clearance_without_numbers_is_the_play() -> None:
 )
 def test_no_room_between_the_walls(intervals_mm: tuple[tuple[float, float], tuple[float, float]]) -> None:
     """Both sides of a stick as wide as its slot: their distances add up to nothing."""
-    scene, L = scenes.stick_on_castles(), scales(3, 2.0, 1.0)
+    scene = scenes.stick_on_castles()
+    L = scales(3, 2.0, 1.0)
     sides = [
         c for c in scene.assembly.operations[2].contacts if c.environment in ((("castle1"), "spy"), ("castle1", "sny"))
     ]
@@ -220,7 +233,8 @@ def test_no_room_between_the_walls(intervals_mm: tuple[tuple[float, float], tupl
 
 def test_exact_contacts_that_leave_no_way_to_the_walls() -> None:
     """The floor of castle 1 is asked to be 5 to 6 mm below the stick that lies on castle 2: nothing can turn."""
-    scene, L = scenes.stick_on_castles(), scales(3, 2.0, 1.0)
+    scene = scenes.stick_on_castles()
+    L = scales(3, 2.0, 1.0)
     floor = next(c for c in scene.assembly.operations[2].contacts if str(c) == "stick.nz on castle1.sfl")
     seen = look(replace(scene.assembly, gaps={floor: Gap("clearance", 5e-3, 6e-3)}), scene, scene.goals, L)
     made = correct(seen, "contact")

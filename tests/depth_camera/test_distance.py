@@ -28,7 +28,8 @@ def rays(rng: np.random.Generator, n: int) -> np.ndarray:
 
 def test_boxes_as_hulls_are_as_far_as_boxes_and_struck_where_these_are():
     rng = np.random.default_rng(0)
-    plain, hulls = shape_of(BOXES, T), shape_of([as_hull(BOXES[0]), BOXES[1]], T)
+    plain = shape_of(BOXES, T)
+    hulls = shape_of([as_hull(BOXES[0]), BOXES[1]], T)
     points = pose.apply(T, rng.uniform(-0.06, 0.06, (2000, 3)))
     d, gradient = signed_distance(plain, points)
     found, same = signed_distance(hulls, points)
@@ -50,7 +51,8 @@ def test_distance_from_a_convex_piece_is_that_of_an_optimiser(seed: int):
     rng = np.random.default_rng(seed)
     cloud = rng.uniform(-0.03, 0.03, (12, 3))
     hull = Hull("h", cloud[ConvexHull(cloud).vertices])
-    n, d = hull.planes[:, :3], hull.planes[:, 3]
+    n = hull.planes[:, :3]
+    d = hull.planes[:, 3]
     points = rng.uniform(-0.06, 0.06, (40, 3))
     found, gradient = signed_distance(shape_of([hull]), points)
     for p, distance, way in zip(points, found, gradient, strict=True):

@@ -68,7 +68,8 @@ def errors(name: str, seen: Observation, seed: int = 3) -> Array:
 
 @pytest.mark.parametrize("name", TWO)
 def test_being_watched_changes_nothing(name: str) -> None:
-    alone, seen = record_demonstration(scene(name), 1.0, 3).demonstration, watched(name).demonstration
+    alone = record_demonstration(scene(name), 1.0, 3).demonstration
+    seen = watched(name).demonstration
     assert alone.goals.tobytes() == seen.goals.tobytes()
     assert {part: T.tobytes() for part, T in alone.final.items()} == {
         part: T.tobytes() for part, T in seen.final.items()
@@ -78,12 +79,14 @@ def test_being_watched_changes_nothing(name: str) -> None:
 def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
     built = scene("stick_in_tower")
     start = watched("stick_in_tower").layout.start
-    hands, finder = Hands(built, start), RangeFinder()
+    hands = Hands(built, start)
+    finder = RangeFinder()
     hands.grab(0, "stick")  # the ball that holds it is thicker than the stick
     sight = Sight(built.shown)
     sight.look(hands.data.qpos)
     image = sight.range_image(finder)
-    solids, play = built.scenario.assembly.solids, 1e-3 * built.clearance_mm
+    solids = built.scenario.assembly.solids
+    play = 1e-3 * built.clearance_mm
     whole = join_shapes(shape_of(physical_pieces(solids[part], play), start[part]) for part in solids)
     for view, distance in zip(finder.views, image.distance, strict=True):
         expected = strike_distances(whole, view.origin, view.rays)[0].reshape(distance.shape)
@@ -97,7 +100,8 @@ def test_the_simulator_and_plain_geometry_see_the_same_and_no_hands() -> None:
 
 def test_it_is_quiet_only_when_nothing_changes_for_a_while() -> None:
     camera = TvCamera()
-    change, rng = Change(camera), np.random.default_rng(0)
+    change = Change(camera)
+    rng = np.random.default_rng(0)
     plain = np.full(camera.view.width * camera.view.height, 0.5)
     moved = np.array(plain)
     moved[:40] += 0.2
@@ -238,7 +242,8 @@ def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
     more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--fidelity", "contact", "--out", str(out)]
     assert main(["sweep", "block_on_block", *asked, *more]) == 0
     assert main(["report", str(out)]) == 0
-    said, page = capsys.readouterr().out, pages.words(out / "report.html")
+    said = capsys.readouterr().out
+    page = pages.words(out / "report.html")
     for text in (said, page):
         assert "0.5 mm per ray" in text
         assert "0 deg" not in text

@@ -40,7 +40,9 @@ def posed(shape: Shape, T: Array) -> Shape:
 
 def points_on(shape: Shape, T: Array, views: tuple[View, ...] | None = None) -> Points:
     """What the views of the range finder see of a shape at T, without any error."""
-    at, rays, number = [], [], []
+    at = []
+    rays = []
+    number = []
     for v, view in enumerate(views or RangeFinder().views):
         distance, _ = strike_distances(posed(shape, T), view.origin, view.rays)
         hit = np.isfinite(distance)
@@ -53,7 +55,8 @@ def points_on(shape: Shape, T: Array, views: tuple[View, ...] | None = None) -> 
 @settings(max_examples=50, deadline=None)
 @given(seed=SEEDS, name=st.sampled_from(sorted(SHAPES)))
 def test_rays_end_on_the_surface_and_meet_nothing_before(seed: int, name: str) -> None:
-    rng, shape = np.random.default_rng(seed), SHAPES[name]
+    rng = np.random.default_rng(seed)
+    shape = SHAPES[name]
     origin = rng.standard_normal(3)
     origin *= 0.6 / np.linalg.norm(origin)
     rays = -origin + 0.08 * rng.standard_normal((40, 3))
@@ -73,7 +76,8 @@ def test_rays_end_on_the_surface_and_meet_nothing_before(seed: int, name: str) -
 @settings(max_examples=50, deadline=None)
 @given(seed=SEEDS, name=st.sampled_from(sorted(SHAPES)))
 def test_distance_outside_is_that_of_the_nearest_point_of_a_box(seed: int, name: str) -> None:
-    rng, shape = np.random.default_rng(seed), SHAPES[name]
+    rng = np.random.default_rng(seed)
+    shape = SHAPES[name]
     points = rng.uniform(-0.2, 0.2, (60, 3))
     each = [points - np.clip(points, c - h, c + h) for c, h in zip(shape.center, shape.half, strict=True)]
     away = np.linalg.norm(each, axis=2).min(axis=0)
@@ -110,7 +114,8 @@ def test_of_poses_that_look_the_same_the_expected_turn_is_reported() -> None:
 
 
 def test_noise_alone_is_no_change() -> None:
-    view, rng = RangeFinder().views[0], np.random.default_rng(1)
+    view = RangeFinder().views[0]
+    rng = np.random.default_rng(1)
     before = range_of(posed(SHAPES["castle"], STANDING), view)
     for level in (0.0, 1e-3, 4e-3):
         noisy = [before + level * rng.standard_normal(before.shape) for _ in range(2)]
@@ -124,11 +129,14 @@ def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool
     """The first is not seen, instead of being where the second ended; a hand that pauses alone does no harm."""
     turned = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 20.0))
     start = {"castle": STANDING, "block": mm(0, -180, 25)}
-    halfway, goal, last = mm(100, 100, 0) @ turned, mm(-60, 120, 0) @ turned, mm(120, -90, 25)
+    halfway = mm(100, 100, 0) @ turned
+    goal = mm(-60, 120, 0) @ turned
+    last = mm(120, -90, 25)
     operations = [Operation("castle")] * (1 + moved_twice) + [Operation("block")]
     assembly = Assembly({name: SOLIDS[name] for name in start}, tuple(operations), frozenset())
     after = [start, start | {"castle": halfway}, start | {"castle": goal}, {"castle": goal, "block": last}]
-    finder, rng = RangeFinder(), np.random.default_rng(0)
+    finder = RangeFinder()
+    rng = np.random.default_rng(0)
     images = []
     for poses in after:
         scene = join_shapes(posed(SHAPES[name], T) for name, T in poses.items())
@@ -188,10 +196,15 @@ def test_exact_points_are_fitted_exactly_from_some_start(name: str) -> None:
 
 
 def test_the_stated_covariance_is_that_of_the_fits() -> None:
-    rng, shape, T = np.random.default_rng(3), SHAPES["castle"], STANDING
+    rng = np.random.default_rng(3)
+    shape = SHAPES["castle"]
+    T = STANDING
     exact = points_on(shape, T).thinned(900)
-    noise, bias, trials = 1e-3, 1e-4, 120
-    xi, z = np.zeros((trials, 6)), np.zeros(trials)
+    noise = 1e-3
+    bias = 1e-4
+    trials = 120
+    xi = np.zeros((trials, 6))
+    z = np.zeros(trials)
     for i in range(trials):
         common = bias * rng.standard_normal(2)[exact.view]
         error = noise * rng.standard_normal(len(exact)) + common
@@ -204,7 +217,8 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
 
 
 def test_what_no_point_says_is_stated_to_be_unknown() -> None:
-    shape, T = SHAPES["stick"], STANDING
+    shape = SHAPES["stick"]
+    T = STANDING
     points = points_on(shape, T)
     along = (points.at - T[:3, 3]) @ T[:3, 0]
     middle = points.only(np.abs(along) < 0.05)
@@ -238,8 +252,10 @@ def test_wrong_models_and_wrong_poses_explain_less() -> None:
 
 
 def test_levels_scale_one_draw_and_level_zero_is_exact() -> None:
-    finder, rng = RangeFinder(), np.random.default_rng
-    distance, cosine = rng(0).uniform(0.7, 1.0, (2, 30, 40)), rng(1).uniform(0.3, 1.0, (2, 30, 40))
+    finder = RangeFinder()
+    rng = np.random.default_rng
+    distance = rng(0).uniform(0.7, 1.0, (2, 30, 40))
+    cosine = rng(1).uniform(0.3, 1.0, (2, 30, 40))
     image = RangeImage(distance, cosine)
     clean, one, two = (finder.sense(image, level, rng(5)) for level in (0.0, 1e-3, 2e-3))
     seen = np.isfinite(clean)

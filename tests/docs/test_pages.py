@@ -95,7 +95,8 @@ def why_not(line: Line) -> str | None:
 
 @pytest.mark.parametrize("line", LINES, ids=str)
 def test_the_command_line_takes_every_command_of_the_pages(line: Line) -> None:
-    command, words = typer.main.get_command(app), list(line.words)
+    command = typer.main.get_command(app)
+    words = list(line.words)
     while hasattr(command, "commands"):
         command = command.commands[words.pop(0)]
     command.make_context("apo-bench", words)
@@ -200,7 +201,8 @@ def test_what_a_page_says_works_from_top_to_bottom(
     if page.name == "report.md":
         for sweep in ("mine", "other"):
             shutil.copytree(SWEEP, tmp_path / "runs" / sweep)
-    known, names = set(sys.modules), {"__name__": "__main__"}
+    known = set(sys.modules)
+    names = {"__name__": "__main__"}
     for each in SESSIONS[page]:
         if isinstance(each, Line):
             assert main(list(each.words)) == 0, f"{each}: {capsys.readouterr().err}"

@@ -189,7 +189,8 @@ def test_lines_of_keys_are_found() -> None:
 
 
 def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    poses, out = tmp_path / "poses.toml", tmp_path / "pile.toml"
+    poses = tmp_path / "poses.toml"
+    out = tmp_path / "pile.toml"
     poses.write_text(
         '[[pose]]\npart = "block"\nname = "upper"\nat_mm = [300, 100, 85]\nquaternion_wxyz = [1, 0, 0, 0]\n'
         '[[pose]]\npart = "block"\nname = "lower"\nat_mm = [300, 100, 35]\ncolor = [0.2, 0.4, 0.6]\n',

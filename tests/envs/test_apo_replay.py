@@ -139,7 +139,8 @@ def _check_episode(env: Any, row: dict[str, Any]) -> None:
     _, reward, terminated, truncated, info = env.step(zeros(env))
     assert (reward, terminated, truncated) == (float(row["success"]), True, False)
     assert (info["is_success"], info["loose_success"]) == (row["success"], row["loose_success"])
-    stage, code = row["failure_stage"] or "done", row["failure_code"] or "ok"
+    stage = row["failure_stage"] or "done"
+    code = row["failure_code"] or "ok"
     assert (info["stage"], info["code"], info["sentence"]) == (stage, code, row["sentence"])
     assert info["operation"] == row["failure_operation"]
     assert info["predicted"] == row["predicted"]
@@ -344,7 +345,8 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
 ) -> None:
     import apo_bench.envs.apo_replay as module
 
-    real, calls = module.record_demonstration, []
+    real = module.record_demonstration
+    calls = []
 
     def fails_at_first(scene: Any, careless: float, seed: int, eye: str) -> Any:
         calls.append(seed)
@@ -453,7 +455,8 @@ def test_the_human_mode_watches_the_replay_and_closes(watched: APOReplay, monkey
 
     class Window:
         def __init__(self, scene: Any) -> None:
-            self.ticks, self.closed = 0, False
+            self.ticks = 0
+            self.closed = False
             windows.append(self)
 
         def __call__(self, data: Any) -> None:

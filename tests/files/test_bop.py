@@ -119,7 +119,9 @@ def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
 
 def test_false_detections_are_counted(tmp_path: Path, made: Made) -> None:
     """Of what is there, of what is not in its image, and of images that nobody gave the truth of."""
-    where, R, t = made.where, made.R, made.t
+    where = made.where
+    R = made.R
+    t = made.t
     more = np.concatenate([where, where[:2], np.add(where[:3], [0, 0, 50]), np.add(where[:4], [0, 1000, 0])])
     rows = np.concatenate([np.arange(len(where)), np.arange(2), np.arange(3), np.arange(4)])
     seen = read_results(
@@ -133,7 +135,8 @@ def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path
     """Published truth is rounded and scaled; angles do not suffer from that, those of the trace do."""
     R = Rotation.from_euler("xyz", [[30, 20, 10]], degrees=True).as_matrix()
     seen = Rotation.from_euler("z", 3.0, degrees=True).as_matrix() @ R
-    where, t = np.ones((1, 3), dtype=int), np.array([[0.0, 0.0, 900.0]])
+    where = np.ones((1, 3), dtype=int)
+    t = np.array([[0.0, 0.0, 900.0]])
     estimates = read_results(made_of.results(tmp_path / "e.csv", where, seen, t))
     found = match_residuals(estimates, read_results(made_of.results(tmp_path / "t.csv", where, 1.004 * R, t)))
     assert found.angle_deg[0] == pytest.approx(3.0, abs=1e-5)
@@ -233,7 +236,8 @@ def test_malformed_truth_is_refused_with_the_entry(document: Any, message: str, 
 
 
 def test_truth_that_is_too_large_or_no_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    estimates, path = read_results(written(tmp_path, HEADER, ROW)), tmp_path / "scene_gt.json"
+    estimates = read_results(written(tmp_path, HEADER, ROW))
+    path = tmp_path / "scene_gt.json"
     path.write_text('{"7": [\n', encoding="utf-8")
     with pytest.raises(InputError, match=r"scene_gt.json, line 2: this is not JSON"):
         read_truth(path, estimates)
@@ -246,7 +250,8 @@ def test_truth_that_is_too_large_or_no_json(tmp_path: Path, monkeypatch: pytest.
 def test_the_command_ends_with_2_and_one_sentence(
     case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    good, bad = written(tmp_path, HEADER, ROW), written(tmp_path, *BAD[case][0], name="bad.csv")
+    good = written(tmp_path, HEADER, ROW)
+    bad = written(tmp_path, *BAD[case][0], name="bad.csv")
     if case == "empty":
         bad.write_text("", encoding="utf-8")
     for estimates, truth in ((bad, good), (good, bad), (tmp_path / "none.csv", good), (tmp_path, good)):

@@ -212,7 +212,8 @@ def test_shared_errors_come_back_and_may_be_left_out(tmp_path: Path) -> None:
     for one, other in zip(back.shared, seen.shared, strict=True):
         assert (one.operations, one.local) == (other.operations, other.local)
         for name in ("covariance", "frame", "correlation"):
-            given, kept = getattr(other, name), getattr(one, name)
+            given = getattr(other, name)
+            kept = getattr(one, name)
             assert (given is None) == (kept is None)
             if given is not None:
                 np.testing.assert_allclose(kept, given, rtol=1e-9, atol=1e-13)
@@ -332,7 +333,8 @@ def test_text_that_is_no_document_is_refused(text: str, words: str, tmp_path: Pa
 def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
     document = form()
     del document["operations"][0]["covariance_mm_deg"]
-    first, second = document["operations"][1], document["operations"][2]
+    first = document["operations"][1]
+    second = document["operations"][2]
     del second["covariance_mm_deg"]
     second["deviation_mm"] = 3.0
     path = tmp_path / "some.json"

@@ -14,7 +14,8 @@ def cuboid(*half: float) -> Solid:
     return Solid("cuboid", {}, (Box("cuboid", np.zeros(3), np.array(half)),), np.zeros(3), 8 * float(np.prod(half)))
 
 
-SLAB, CUBE = cuboid(0.4, 0.4, 0.001), cuboid(0.02, 0.02, 0.02)
+SLAB = cuboid(0.4, 0.4, 0.001)
+CUBE = cuboid(0.02, 0.02, 0.02)
 
 
 @pytest.mark.parametrize("height", [0.0, 1e-5, 0.0123, 1.5])
@@ -33,6 +34,7 @@ def test_what_is_beside_or_below_is_passed_by(at: tuple[float, float, float]) ->
 
 def test_a_castle_stands_in_the_shadow_of_another_one_and_falls_past_it() -> None:
     """Boxes around both lie over one another, the cubes do not."""
-    T, other = pose.at((0.0, 0.0, 0.1), (0, 0, 45)), pose.at((0.035, 0.035, 0.0), (0, 0, 45))
+    T = pose.at((0.0, 0.0, 0.1), (0, 0, 45))
+    other = pose.at((0.035, 0.035, 0.0), (0, 0, 45))
     assert drop(CUBE, T, CUBE, other) == np.inf
     assert drop(CUBE, T, CUBE, pose.at((0.025, 0.025, 0.0), (0, 0, 45))) == pytest.approx(0.06, abs=3 * TOUCH_M)

@@ -22,7 +22,8 @@ from tests.round_contacts import CONTACTS, MM, part, pin, plate, ring, scene, tu
 
 def prism(corners: np.ndarray, height: float, at: np.ndarray | None = None, fit: tuple[str, ...] = ()) -> Solid:
     """An upright prism over a convex polygon, (n, 2), as one piece with its faces, moved to a pose."""
-    n, T = len(corners), np.eye(4) if at is None else at
+    n = len(corners)
+    T = np.eye(4) if at is None else at
     rings = [np.column_stack([corners, np.full(n, z)]) for z in (-height / 2, height / 2)]
     loops = {"bottom": rings[0][::-1], "top": rings[1]}
     for i in range(n):
@@ -113,8 +114,10 @@ def test_what_is_not_round_is_no_part_of_revolution():
 
 @pytest.mark.parametrize("seed", range(10))
 def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
-    rng, solid = np.random.default_rng(seed), bush()
-    T, expected = (np.eye(4), np.eye(4))
+    rng = np.random.default_rng(seed)
+    solid = bush()
+    T = np.eye(4)
+    expected = np.eye(4)
     T[:3, :3], expected[:3, :3] = (Rotation.random(random_state=rng).as_matrix() for _ in range(2))
     axis = revolution(solid)
     found = nearest_alike(solid, T, expected)
@@ -127,7 +130,8 @@ def test_the_nearest_pose_that_looks_alike_is_the_nearest_of_many(seed):
 
 
 def test_without_an_axis_it_is_the_nearest_of_the_symmetries():
-    solid, rng = scenes.block(), np.random.default_rng(1)
+    solid = scenes.block()
+    rng = np.random.default_rng(1)
     T = pose.exp(rng.standard_normal(6))
     expected = pose.exp(rng.standard_normal(6))
     known = T @ nearest_symmetry(symmetries(solid), (pose.inverse(expected) @ T)[None])[0]
@@ -144,7 +148,8 @@ def pinned():
 
 def test_noise_does_not_turn_a_part_of_revolution_about_its_axis():
     assembly, demonstration = pinned()
-    turned, stated = [], []
+    turned = []
+    stated = []
     for seed in range(200):
         seen = Symmetric(Level(1.0, 1.0))(assembly, demonstration, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.goals) @ demonstration.goals)

@@ -39,9 +39,11 @@ def fingers(
 ) -> tuple[Sequence[Box], np.ndarray]:
     """Both pads with what is above them, and the pose of their frame: x across, z up."""
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = np.column_stack([across, np.cross(hold_up, across), hold_up]), point
+    T[:3, :3] = np.column_stack([across, np.cross(hold_up, across), hold_up])
+    T[:3, 3] = point
     side, down, _ = PAD_M
-    half, high = np.array([0.006, side, 0.05]), 0.05 - down
+    half = np.array([0.006, side, 0.05])
+    high = 0.05 - down
     return [Box(f"f{s}", np.array([s * (opening + 0.006), 0.0, high]), half) for s in (-1, 1)], T
 
 

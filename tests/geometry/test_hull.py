@@ -36,7 +36,8 @@ def as_hull(box: Box) -> Hull:
 def test_a_box_as_a_hull_is_as_deep_in_another_one_as_the_box(seed: int):
     rng = np.random.default_rng(seed)
     a, b = (Box(name, rng.uniform(-0.02, 0.02, 3), rng.uniform(0.005, 0.03, 3)) for name in "ab")
-    T_a, T_b = posed(rng), posed(rng)
+    T_a = posed(rng)
+    T_b = posed(rng)
     wanted = intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
     found = intrusion_depths((as_hull(a),), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)
     if wanted[0] > 0.0:
@@ -60,7 +61,8 @@ def test_a_cylinder_is_as_wide_as_its_sagitta_allows():
 
 def wedges(radius: float, n: int) -> tuple[Hull, ...]:
     """A square plate of 40 x 40 x 20 mm with a round hole, as prisms."""
-    k, found = radius / np.cos(np.pi / n), []
+    k = radius / np.cos(np.pi / n)
+    found = []
     for i in range(n):
         turn = 2.0 * np.pi * (i + np.array([-0.5, 0.5])) / n
         ring = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -103,17 +105,16 @@ def test_pairs_that_are_not_looked_at_change_no_depth(seed: int):
         tuple(Hull(f"{i}", rng.uniform(-0.01, 0.01, (8, 3)) + rng.uniform(-0.02, 0.02, 3)) for i in range(6))
         for _ in range(2)
     )
-    T_a, T_b = posed(rng, 0.02), posed(rng, 0.02)
+    T_a = posed(rng, 0.02)
+    T_b = posed(rng, 0.02)
     at = T_a[:3, 3] + rng.uniform(-0.05, 0.05, (5, 3))
     found = intrusion_depths(a, T_a[:3, :3], at, b, T_b)
     for place, depth in zip(at, found, strict=True):
         every = []
         for p, q in product(a, b):
             axes = separating_axes(p, T_a[:3, :3], q, T_b[:3, :3])
-            low_p, low_q = (
-                (p.corners @ T_a[:3, :3].T + place) @ axes.T,
-                (q.corners @ T_b[:3, :3].T + T_b[:3, 3]) @ axes.T,
-            )
+            low_p = (p.corners @ T_a[:3, :3].T + place) @ axes.T
+            low_q = (q.corners @ T_b[:3, :3].T + T_b[:3, 3]) @ axes.T
             outs = np.minimum(low_p.max(0) - low_q.min(0), low_q.max(0) - low_p.min(0))
             every.append(outs.min())
         if max(every) > 0.0:

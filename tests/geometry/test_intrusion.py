@@ -25,7 +25,8 @@ def block(*half: float) -> Solid:
 @given(poses, poses)
 @settings(max_examples=100, deadline=None)
 def test_intrusion_is_symmetric_and_moves_with_the_pair(T: Array, T_both: Array):
-    a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
+    a = block(0.03, 0.02, 0.01)
+    b = block(0.05, 0.01, 0.04)
     depth = intrusion(a, np.eye(4), b, T)
     assert intrusion(b, T, a, np.eye(4)) == pytest.approx(depth, abs=1e-12)
     assert intrusion(a, T_both, b, T_both @ T) == pytest.approx(depth, abs=1e-9)
@@ -35,7 +36,8 @@ def test_intrusion_is_symmetric_and_moves_with_the_pair(T: Array, T_both: Array)
 @settings(max_examples=100, deadline=None)
 def test_intrusion_agrees_with_points(T: Array):
     """A common point well inside both boxes means intrusion; boxes pushed apart by the depth only touch."""
-    a, b = block(0.03, 0.02, 0.01), block(0.05, 0.01, 0.04)
+    a = block(0.03, 0.02, 0.01)
+    b = block(0.05, 0.01, 0.04)
     grid = np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 9)] * 3), axis=-1).reshape(-1, 3)
     inside = np.abs(pose.apply(pose.inverse(T), grid * a.pieces[0].half)) < 0.95 * b.pieces[0].half
     depth = intrusion(a, np.eye(4), b, T)
@@ -52,8 +54,10 @@ def test_the_depth_of_two_aligned_blocks(apart_mm: float, depth_mm: float):
 
 
 def test_depths_of_boxes_at_many_places_are_those_of_the_solids() -> None:
-    a, b = scenes.block("a"), scenes.block("b")
-    T_a, T_b = pose.at((0, 0, 0), (0, 0, 30)), pose.at((0.02, 0.01, 0.03), (10, 0, 0))
+    a = scenes.block("a")
+    b = scenes.block("b")
+    T_a = pose.at((0, 0, 0), (0, 0, 30))
+    T_b = pose.at((0.02, 0.01, 0.03), (10, 0, 0))
     at = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.01], [0.2, 0.0, 0.0]])
     found = intrusion_depths(a.pieces, T_a[:3, :3], at, b.pieces, T_b)
     for p, depth_m in zip(at, found, strict=True):

@@ -109,8 +109,10 @@ def test_two_holed_cubes_side_by_side_share_the_ring():
 @given(flat_poses, poses)
 @settings(max_examples=60, deadline=None)
 def test_moving_both_parts_together_moves_the_corners_and_keeps_the_area(T_face: Array, T: Array):
-    face, on = U_SHAPE, ring(0.04, 0.012)
-    before, after = overlap(face, T_face @ OVER, on, EYE), overlap(face, T @ T_face @ OVER, on, T)
+    face = U_SHAPE
+    on = ring(0.04, 0.012)
+    before = overlap(face, T_face @ OVER, on, EYE)
+    after = overlap(face, T @ T_face @ OVER, on, T)
     assert after.area == pytest.approx(before.area, abs=1e-12)
     if before and len(before.corners) == len(after.corners):
         gaps = np.linalg.norm(pose.apply(T, before.corners)[:, None] - after.corners[None], axis=-1).min(axis=0)
@@ -142,7 +144,8 @@ def test_the_area_is_that_of_counted_points(T_face: Array):
     x, y = (g.ravel() for g in np.meshgrid(*[np.arange(-0.0395, 0.04, step)] * 2))
     in_ring = np.maximum(abs(x), abs(y)) > 0.012
     local = pose.apply(pose.inverse(T_face @ OVER), np.column_stack([x, y, 0 * x]))
-    u, v = local[:, 0], local[:, 1]
+    u = local[:, 0]
+    v = local[:, 1]
     in_u = (np.maximum(abs(u), abs(v)) < 0.03) & ~((abs(u) < 0.01) & (v > 0))
     counted = step**2 * np.count_nonzero(in_ring & in_u)
     assert overlap(U_SHAPE, T_face @ OVER, ring(0.04, 0.012), EYE).area == pytest.approx(counted, abs=1.2e-4)

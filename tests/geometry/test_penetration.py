@@ -41,8 +41,10 @@ def overlap(a: np.ndarray, b: np.ndarray) -> bool:
 @pytest.mark.parametrize("seed", range(100))
 def test_random_pieces_are_as_deep_as_their_difference_says(seed: int):
     rng = np.random.default_rng(seed)
-    a, b = random_hull(rng), random_hull(rng)
-    T_a, T_b = moved(rng, 0.02), moved(rng, 0.005)
+    a = random_hull(rng)
+    b = random_hull(rng)
+    T_a = moved(rng, 0.02)
+    T_b = moved(rng, 0.005)
     corners = [hull.corners @ T[:3, :3].T + T[:3, 3] for hull, T in ((a, T_a), (b, T_b))]
     wanted = depth(*corners)
     found = float(intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)[0])
@@ -56,7 +58,8 @@ def test_so_are_cylinders(seed: int):
     rng = np.random.default_rng(seed)
     a = cylinder_hull("shaft", Cylinder(rng.normal(0.0, 0.002, 3), np.array([0.0, 0.6, 0.8]), 0.0006, 0.01))
     b = random_hull(rng)
-    T_a, T_b = moved(rng, 0.01), moved(rng, 0.005)
+    T_a = moved(rng, 0.01)
+    T_b = moved(rng, 0.005)
     corners = [hull.corners @ T[:3, :3].T + T[:3, 3] for hull, T in ((a, T_a), (b, T_b))]
     found = float(intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)[0])
     assert max(0.0, found) == pytest.approx(depth(*corners), abs=1e-9)

@@ -55,9 +55,11 @@ def test_a_shaft_with_one_fit_end_is_not_the_same_end_for_end() -> None:
 @settings(max_examples=30, deadline=None)
 def test_the_turn_is_the_least_there_is(seed: int, part: Solid) -> None:
     """No other turn about the axis, nor end for end where that is allowed, leaves less between the two poses."""
-    rng, found = np.random.default_rng(seed), revolution(part)
+    rng = np.random.default_rng(seed)
+    found = revolution(part)
     assert found is not None
-    T, true = pose.exp(rng.standard_normal(6)), pose.exp(rng.standard_normal(6))
+    T = pose.exp(rng.standard_normal(6))
+    true = pose.exp(rng.standard_normal(6))
     best = turned_alike(part, T, true)
 
     def turn(X: np.ndarray) -> float:

@@ -29,9 +29,12 @@ def boxes(rng: np.random.Generator) -> Posed:
 
 
 def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
-    rng, met = np.random.default_rng(1), 0
+    rng = np.random.default_rng(1)
+    met = 0
     for _ in range(250):
-        a, b, slack = boxes(rng), boxes(rng), rng.choice([5e-5, -5e-5])
+        a = boxes(rng)
+        b = boxes(rng)
+        slack = rng.choice([5e-5, -5e-5])
         way = rng.standard_normal(3) if rng.integers(2) else np.eye(3)[rng.integers(3)]
         way = way / np.linalg.norm(way)
         s = np.linspace(-0.3, 0.3, 301)
@@ -46,10 +49,13 @@ def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
 
 def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
     """The same without separating axes: by a programme for a point in both boxes."""
-    rng, met = np.random.default_rng(2), 0
+    rng = np.random.default_rng(2)
+    met = 0
     for _ in range(60):
-        a, b = boxes(rng), boxes(rng)
-        a, b = Posed(a.pieces[:1], a.T), Posed(b.pieces[:1], b.T)
+        a = boxes(rng)
+        b = boxes(rng)
+        a = Posed(a.pieces[:1], a.T)
+        b = Posed(b.pieces[:1], b.T)
         way = (b.T - a.T)[:3, 3] + rng.uniform(-0.02, 0.02, 3)
         way = way / np.linalg.norm(way)
         spans = overlap_intervals(a, way, b, 0.0)
@@ -62,10 +68,12 @@ def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
 
 
 def common_point(a: Posed, b: Posed) -> bool:
-    A, limits = [], []
+    A = []
+    limits = []
     for posed in (a, b):
         (box,) = posed.pieces
-        R, middle = posed.T[:3, :3], posed.T[:3, :3] @ box.center + posed.T[:3, 3]
+        R = posed.T[:3, :3]
+        middle = posed.T[:3, :3] @ box.center + posed.T[:3, 3]
         A += [R.T, -R.T]
         limits += [box.half + R.T @ middle, box.half - R.T @ middle]
     scale = 100.0
@@ -78,7 +86,8 @@ def posed(solid: Solid, T: Array) -> Posed:
 
 
 def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
-    stick, cube = posed(scenes.stick(), scenes.mm(0, 0, 25)), posed(scenes.cube(), scenes.mm(0, 0, 25))
+    stick = posed(scenes.stick(), scenes.mm(0, 0, 25))
+    cube = posed(scenes.cube(), scenes.mm(0, 0, 25))
     assert is_way_free([stick], X, 0.5, [cube])
     assert is_way_free([stick], -X, 0.5, [cube])
     assert not is_way_free([stick], Z, 0.05, [cube])
@@ -95,9 +104,12 @@ def test_touching_is_not_meeting_and_ends_where_the_parts_do() -> None:
 
 def test_the_end_of_the_overlap_is_the_same_for_all_kinds_of_pieces() -> None:
     """Looked for among boxes around pieces first; held against the intervals of all pairs, one chained to the next."""
-    rng, left = np.random.default_rng(5), 0
+    rng = np.random.default_rng(5)
+    left = 0
     for _ in range(40):
-        a, b, c = boxes(rng), boxes(rng), boxes(rng)
+        a = boxes(rng)
+        b = boxes(rng)
+        c = boxes(rng)
         near = [Posed(of.pieces, pose.at(rng.uniform(-0.02, 0.02, 3) - of.T[:3, 3]) @ of.T) for of in (b, c)]
         way = rng.standard_normal(3)
         way = way / np.linalg.norm(way)

@@ -116,7 +116,8 @@ def test_the_nearest_is_the_one_that_undoes_a_symmetry() -> None:
 
 def test_no_turn_is_farther_than_half_the_way_to_an_equal_pose() -> None:
     """Of a stick: 45 degrees about its axis; every rotation is within 90 degrees of one of the eight."""
-    group, rng = symmetries(scenes.stick()), np.random.default_rng(2)
+    group = symmetries(scenes.stick())
+    rng = np.random.default_rng(2)
     w = rng.standard_normal((500, 3)) * 2.0
     off = pose.exp(np.concatenate([np.zeros((500, 3)), w], axis=1))
     left = np.degrees(np.linalg.norm(pose.log(off @ nearest_symmetry(group, off))[:, 3:], axis=1))

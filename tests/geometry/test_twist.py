@@ -54,9 +54,12 @@ def test_the_exponential_is_that_of_poses(seed: int, angle: float) -> None:
 @settings(max_examples=50, deadline=None)
 def test_the_jacobian_is_its_power_series(seed: int, angle: float) -> None:
     xi = twist(seed, angle)
-    minus, power, series = -ad(xi), np.eye(6), np.zeros((6, 6))
+    minus = -ad(xi)
+    power = np.eye(6)
+    series = np.zeros((6, 6))
     for k in range(60):
-        series, power = series + power / factorial(k + 1), power @ minus
+        series = series + power / factorial(k + 1)
+        power = power @ minus
     assert_allclose(right_jacobian(xi), series, rtol=0, atol=1e-12)
 
 
@@ -67,7 +70,8 @@ def test_the_jacobian_is_the_difference_of_exponentials(seed: int, angle: float)
 
     With this one the largest error found is 2.6e-9.
     """
-    xi, by = twist(seed, angle), 5e-5
+    xi = twist(seed, angle)
+    by = 5e-5
     back = pose.inverse(pose.exp(xi))
     sides = [pose.log(back @ pose.exp(xi + sign * by * np.eye(6))) for sign in (1.0, -1.0)]
     assert_allclose(right_jacobian(xi), (sides[0] - sides[1]).T / (2 * by), rtol=0, atol=1e-8)

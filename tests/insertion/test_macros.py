@@ -198,7 +198,8 @@ def hole(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict
 
 def test_the_end_of_a_hole_that_is_free_is_taken() -> None:
     """Along the axis of the stick, forwards; backwards if something stands there, or above where it would begin."""
-    forwards, travel = arrival(hole()).line.direction, arrival(hole()).line.travel_m
+    forwards = arrival(hole()).line.direction
+    travel = arrival(hole()).line.travel_m
     assert (forwards.tolist(), travel) == ([1, 0, 0], 0.155)
     for x, z in ((-200, 0), (-250, 100)):
         found = arrival(hole(("stop", (), scenes.block(), scenes.mm(x, 0, z))))

@@ -43,7 +43,8 @@ def told(found: Arrival) -> list[tuple[str, list[float]]]:
     return [(macro.name, np.round(macro.direction, 6).tolist()) for macro in found.macros]
 
 
-DOWN, INTO = [0.0, 0.0, -1.0], "insert-into"
+DOWN = [0.0, 0.0, -1.0]
+INTO = "insert-into"
 
 
 @pytest.mark.parametrize(
@@ -131,7 +132,8 @@ def test_a_shaft_comes_by_the_end_of_its_bore_that_is_free() -> None:
 
 def trough(extent_deg: float) -> RoundFace:
     """A piece of the wall of a hole of 5 mm along x, open upwards."""
-    radii, far = (0.005, 0.005), np.radians(extent_deg)
+    radii = (0.005, 0.005)
+    far = np.radians(extent_deg)
     return RoundFace("bed", np.zeros(3), X, (-0.02, 0.02), radii, True, extent_rad=far, toward=-Z)
 
 
@@ -197,7 +199,9 @@ def test_what_closes_together_is_made_together() -> None:
 
 def test_how_deep_and_where_a_motion_turns_slow() -> None:
     made = built("through")
-    found, poses, way = last_of(made).after, poses_of(made), -Y
+    found = last_of(made).after
+    poses = poses_of(made)
+    way = -Y
     assert slow_before(made.assembly, found, poses, way) == pytest.approx(0.022)
     assert mouths(made.assembly, found, poses, way) == pytest.approx([0.1, 0.04])
     made = built("countersink")

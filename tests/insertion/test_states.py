@@ -80,7 +80,8 @@ def test_one_more_face_changes_a_state_only_as_it_can() -> None:
 def sphere(k: int) -> Array:
     """Points spread evenly over the unit sphere, (k, 3) (Fibonacci lattice)."""
     i = np.arange(k) + 0.5
-    z, turn = 1 - 2 * i / k, np.pi * (1 + 5**0.5) * i
+    z = 1 - 2 * i / k
+    turn = np.pi * (1 + 5**0.5) * i
     level = np.sqrt(1 - z * z)
     return np.column_stack([level * np.cos(turn), level * np.sin(turn), z])
 
@@ -114,7 +115,9 @@ def test_the_programme_agrees_with_directions_sampled_densely() -> None:
     Directions that close in on something by up to `thin` are let through, so that flat cones are sampled too. Of
     normals that are well apart, an equation then opens by a small multiple of that, and everything else by far more.
     """
-    rng, points, thin = np.random.default_rng(2), sphere(200_000), 0.012
+    rng = np.random.default_rng(2)
+    points = sphere(200_000)
+    thin = 0.012
     compared = []
     while len(compared) < 150:
         normals = random_contacts(rng)
@@ -155,7 +158,8 @@ def test_the_programme_agrees_with_the_corners_of_the_cone() -> None:
 def test_walls_that_are_seen_askew_are_still_walls() -> None:
     """Raw normals make a wedge of a slot, or hold it shut; within the angle of the noise they are the nominal ones."""
     rng = np.random.default_rng(5)
-    raw, kept = set(), set()
+    raw = set()
+    kept = set()
     for _ in range(50):
         turns = Rotation.from_rotvec(np.radians(1.5) * rng.standard_normal((3, 3)))
         askew = turns.apply(rows(TEN["D"]))

@@ -12,7 +12,9 @@ from apo_bench.cli.app import main
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is a device of Linux")
 RUN = f"{sys.executable} -m apo_bench.cli.app"
-FULL, BROKEN, CLOSED = "No space left on device", "Broken pipe", "standard output is closed"
+FULL = "No space left on device"
+BROKEN = "Broken pipe"
+CLOSED = "standard output is closed"
 CASES = {
     "a full device, a table": (f"{RUN} scenarios > /dev/full", FULL, 1),
     "a full device, one object": (f"{RUN} graph stick_in_tower --json > /dev/full", FULL, 1),

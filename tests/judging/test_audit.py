@@ -62,7 +62,8 @@ def test_a_part_whose_last_contact_another_part_broke_is_no_fixture() -> None:
 @pytest.mark.parametrize("name", scenes.ALL)
 def test_symmetries_and_the_place_on_the_table_do_not_matter(name: str) -> None:
     """Every part put in by any of its symmetries, all of it elsewhere, turned by up to 40 degrees."""
-    rng, scene = np.random.default_rng(7), scenes.ALL[name]()
+    rng = np.random.default_rng(7)
+    scene = scenes.ALL[name]()
     for _ in range(4):
         loose = scene.assembly.solids.keys() - scene.assembly.fixed
         edits = [turned(part, rng.choice(symmetries(scene.assembly.solids[part]))) for part in sorted(loose)]
@@ -94,7 +95,8 @@ def test_a_turn_that_is_no_symmetry_is_seen(name: str) -> None:
 @pytest.mark.parametrize("name", rounds.ALL)
 def test_a_part_of_revolution_is_the_same_after_any_turn_about_its_axis(name: str) -> None:
     """Turned anyhow when it was put, and again at the end; all of it elsewhere."""
-    rng, scene = np.random.default_rng(11), rounds.ALL[name]()
+    rng = np.random.default_rng(11)
+    scene = rounds.ALL[name]()
     round_ones = [part for part, solid in scene.assembly.solids.items() if revolution(solid) is not None]
     for _ in range(3):
         edits = [turned(part, pose.at((0, 0, 0), (0, 0, rng.uniform(-180, 180)))) for part in round_ones]

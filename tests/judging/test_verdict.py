@@ -462,7 +462,8 @@ def test_a_scenario_can_ask_for_what_was_demonstrated() -> None:
 @pytest.mark.parametrize("demonstrated", [True, False])
 def test_the_reason_is_that_of_the_rule_that_decides(finished: bool, demonstrated: bool) -> None:
     """Where the stricter rule is asked for, it is the reason unless only the finished assembly is wrong."""
-    good, bad = verdict(TOWER(), []), verdict(TOWER(), [shift("castle2", 2, 0, 6, 0)])
+    good = verdict(TOWER(), [])
+    bad = verdict(TOWER(), [shift("castle2", 2, 0, 6, 0)])
     rules = ((good if finished else bad).finished, (good if demonstrated else bad).demonstrated)
     assert [rule.holds for rule in rules] == [finished, demonstrated]
     assert Verdict("assembled", *rules).rests_on is rules[0]

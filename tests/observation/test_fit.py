@@ -49,7 +49,8 @@ def known_file(tmp_path_factory: pytest.TempPathFactory) -> Residuals:
 
 
 def test_known_parameters_are_recovered_within_five_percent(known_file: Residuals) -> None:
-    known, measured = Known(), fit_noise(known_file, "made")
+    known = Known()
+    measured = fit_noise(known_file, "made")
     for split, tails in ((measured.shift_mm, known.shift), (measured.turn_deg, known.turn)):
         assert_allclose([*split.across, *split.along], tails, rtol=0.05)
     assert_allclose([measured.missed, measured.outliers], [known.missed, known.outliers], rtol=0.05)
@@ -103,7 +104,8 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     made = made_of.draw(8000, Known(missed=0.0, outliers=0.0), rng)
     plain = fit_noise(compared_files(*made_of.files(tmp_path, made)), "")
-    part, n = made.where[:, 2], len(made.where)
+    part = made.where[:, 2]
+    n = len(made.where)
     angle = np.where(part == 2, 180.0 * (rng.random(n) < 0.5), np.where(part == 3, rng.uniform(-180.0, 180.0, n), 0.0))
     turned = Rotation.from_euler("z", angle[:, None], degrees=True).as_matrix()
     axis = np.where(part == 2, 20.0, 0.0)[:, None] * [1.0, 0.0, 0.0]
@@ -212,7 +214,8 @@ def test_the_preset_is_the_fit(name: str, request: pytest.FixtureRequest) -> Non
 
 def test_a_fit_to_quantiles_meets_them() -> None:
     """Of MegaPose on T-LESS, whatever it is turned by; a Student t meets p50, p75 and p90 within 10 %."""
-    across, along = {50: 0.8, 75: 1.2, 90: 2.3}, {50: 5.3, 75: 9.5, 90: 16.5}
+    across = {50: 0.8, 75: 1.2, 90: 2.3}
+    along = {50: 5.3, 75: 9.5, 90: 16.5}
     drawn = split_of_quantiles(across, along, 50.0).draw(200_000, np.random.default_rng(0))
     for sizes, given in ((np.linalg.norm(drawn[:, :2], axis=1), across), (np.abs(drawn[:, 2]), along)):
         assert_allclose(np.percentile(sizes, [*given]), [*given.values()], rtol=0.1)
@@ -233,7 +236,8 @@ def test_quantiles_that_make_no_sense_are_refused(across: Any, along: Any) -> No
 
 @pytest.mark.parametrize("name", ["megapose-lmo", "megapose-tless"])
 def test_presets_name_their_source_and_come_without_outliers_too(name: str) -> None:
-    whole, inliers = read_noise(presets()[name])[0], read_noise(presets()[f"{name}-inliers"])[0]
+    whole = read_noise(presets()[name])[0]
+    inliers = read_noise(presets()[f"{name}-inliers"])[0]
     assert "BOP toolkit (MIT)" in whole.source
     assert whole.missed > 0.1 < whole.outliers
     assert (inliers.missed, inliers.outliers) == (0.0, 0.0)
@@ -243,7 +247,9 @@ def test_presets_name_their_source_and_come_without_outliers_too(name: str) -> N
 def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = made_of.draw(1000, Known(), np.random.default_rng(2))
     estimates, truth = made_of.files(tmp_path, made)
-    out, picture, samples = tmp_path / "noise.toml", tmp_path / "fit.png", tmp_path / "residuals.csv"
+    out = tmp_path / "noise.toml"
+    picture = tmp_path / "fit.png"
+    samples = tmp_path / "residuals.csv"
     asked = ["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]
     written = ["--out", str(out), "--picture", str(picture), "--residuals", str(samples), "--source", 'a "new"\none']
     assert main([*asked, *written, "--json"]) == 0

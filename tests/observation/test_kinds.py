@@ -53,10 +53,12 @@ def test_the_default_camera_looks_at_the_middle_as_anisotropic_does() -> None:
 
 
 def test_frames_are_turned_the_shortest_way_onto_the_rays() -> None:
-    camera, rng = Camera(), np.random.default_rng(0)
+    camera = Camera()
+    rng = np.random.default_rng(0)
     goals = np.tile(np.eye(4), (200, 1, 1))
     goals[:, :3, 3] = camera.T_world_camera[:3, 3] + rng.standard_normal((200, 3))
-    F, R = camera.frames(goals), camera.T_world_camera[:3, :3]
+    F = camera.frames(goals)
+    R = camera.T_world_camera[:3, :3]
     assert_allclose(F @ np.swapaxes(F, 1, 2), np.tile(np.eye(3), (200, 1, 1)), atol=1e-12)
     assert_allclose(F[:, :, 2], camera.rays(goals), atol=1e-12)
     turned = np.arccos(np.clip((np.trace(R.T @ F, axis1=1, axis2=2) - 1) / 2, -1, 1))
@@ -77,7 +79,8 @@ def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
     """Positions that were seen, in the frames of the true rays: what the twist does to them is not used."""
     camera = Camera(pose.at((0.5, -0.4, 0.6), (-140.0, 10.0, 50.0)))
     noise = Sighted(Level(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
-    offsets, turns = [], []
+    offsets = []
+    turns = []
     for seed in range(600):
         goals = see(noise, seed).goals
         F = camera.frames(CYCLE.goals)
@@ -115,7 +118,10 @@ def test_heavy_tails_are_those_of_student() -> None:
 @cache
 def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
     """Errors in units of the level, whether they are outliers by construction, and whether they were seen."""
-    sigma, unit, gross, seen = np.repeat([2e-3, np.radians(2.0)], 3), [], [], []
+    sigma = np.repeat([2e-3, np.radians(2.0)], 3)
+    unit = []
+    gross = []
+    seen = []
     for seed in range(trials):
         made = see(Outliers(LEVEL), seed)
         rng = np.random.default_rng(seed)
@@ -169,7 +175,8 @@ def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
 
 
 def test_what_was_missed_stays_where_its_part_was_seen_last() -> None:
-    operations, start = CYCLE.assembly.operations, CYCLE.start
+    operations = CYCLE.assembly.operations
+    start = CYCLE.start
     seen = np.array([False, True, True, True, False])
     out = last_seen(CYCLE.assembly, start, CYCLE.goals, seen)
     assert [o.main for o in operations][4] == operations[2].main == "cube"
@@ -210,7 +217,8 @@ def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: 
 
 def test_errors_drift_from_operation_to_operation() -> None:
     """In the axes of the camera errors j operations apart are correlated by rho to the j."""
-    A, world = Camera().T_world_camera[:3, :3], []
+    A = Camera().T_world_camera[:3, :3]
+    world = []
     for seed in range(800):
         seen = see(Correlated(LEVEL), seed)
         xi = twists(seen)
@@ -240,7 +248,8 @@ def test_only_turns_about_axes_of_fourfold_symmetry_are_less_certain() -> None:
 
 def test_of_equal_poses_the_nearest_is_reported_and_what_is_stated_bounds_its_error() -> None:
     """At 40 degrees, 120 about the axis of a stick: no symmetry brings what was seen nearer to the truth."""
-    turns, stated = [], []
+    turns = []
+    stated = []
     for seed in range(300):
         seen = see(Symmetric(Level(1.0, 40.0)), seed)
         off = pose.inverse(CYCLE.goals) @ seen.goals
@@ -258,7 +267,8 @@ def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
     """It differs from `symmetric` by symmetries of the parts alone, and every one of them occurs."""
     found = set()
     for seed in range(120):
-        near, far = see(Symmetric(LEVEL), seed), see(AnyTurn(LEVEL), seed)
+        near = see(Symmetric(LEVEL), seed)
+        far = see(AnyTurn(LEVEL), seed)
         for k, operation in enumerate(CYCLE.assembly.operations):
             group = symmetries(CYCLE.assembly.solids[operation.main])
             off = np.abs(group - pose.inverse(near.goals[k]) @ far.goals[k]).max(axis=(1, 2))

@@ -34,7 +34,8 @@ NAMES = sorted(NOISES)
 LEVEL = Level(2.0, 2.0)
 CYCLE = scenes.turned(scenes.subassembly_on_castles(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
 """Five operations: castles with their origin off the centre, a cube that is moved twice, a stick."""
-TRIALS, BOUND = 700, 5.0
+TRIALS = 700
+BOUND = 5.0
 """Observations behind a law, and how many standard errors off a mean may be."""
 
 
@@ -153,7 +154,8 @@ def test_the_choice_of_the_world_frame_does_not_count(name: str, monkeypatch: py
 @pytest.mark.parametrize("name", NAMES)
 def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
     """Twists scale with the level, up to the turn by which the frame that is seen differs; so do deviations."""
-    seen, after = [], set()
+    seen = []
+    after = set()
     for factor in (1.0, 4.0):
         rng = np.random.default_rng(2)
         seen.append(observe(scenes.shown(CYCLE), make_noise(name, Level(0.5 * factor, 0.75 * factor)), rng))

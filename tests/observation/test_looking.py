@@ -38,7 +38,8 @@ def test_what_was_not_asked_for_is_not_seen():
 
 
 def test_a_look_does_not_depend_on_what_was_asked_before():
-    one, other = looks(2), looks(2)
+    one = looks(2)
+    other = looks(2)
     one([0])
     other([1, 2, 3])
     second = one([4])

@@ -39,9 +39,11 @@ from tests.bop_made import Known
 
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
 LEVEL = Level(0.8, 0.6)
-DRAWS, BOUND = 1200, 5.0
+DRAWS = 1200
+BOUND = 5.0
 """Observations behind a law, three operations each, and how many standard errors off a mean may be."""
-WHOLE, INLIERS = Known(), Known(missed=0.0, outliers=0.0)
+WHOLE = Known()
+INLIERS = Known(missed=0.0, outliers=0.0)
 
 
 def residuals_of(folder: Path, known: Known, n: int = 400) -> Residuals:
@@ -76,7 +78,8 @@ def see(name: str, seed: int, level: Level = LEVEL) -> Observation:
 
 def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
     """Body twists in units of what was stated, (draws, n, 6), and which were seen, (draws, n)."""
-    noise, shown = make_noise(name, LEVEL), scenes.shown(TOWER)
+    noise = make_noise(name, LEVEL)
+    shown = scenes.shown(TOWER)
     seen = [observe(shown, noise, np.random.default_rng(seed)) for seed in range(draws)]
     xi = pose.log(pose.inverse(TOWER.goals) @ np.array([one.goals for one in seen]))
     L = np.linalg.cholesky(np.array([one.covariance for one in seen]))
@@ -99,15 +102,18 @@ def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names:
     unit, there = whitened(names[0], 800)
     noise = make_noise(names[0], LEVEL)
     if isinstance(noise, Fitted):
-        missed, outliers = noise.measured.missed, noise.measured.outliers
+        missed = noise.measured.missed
+        outliers = noise.measured.outliers
     else:
         assert isinstance(noise, Empirical)
-        missed, outliers = noise.sample.missed, noise.sample.gross
+        missed = noise.sample.missed
+        outliers = noise.sample.gross
         assert_allclose([missed, outliers], [WHOLE.missed, WHOLE.outliers], rtol=0.35)
     assert abs(1.0 - there.mean() - missed) < 4.0 * np.sqrt(missed / there.size)
     gross = (unit[there] ** 2).sum(axis=1) > chi2(6).ppf(1.0 - 1e-6)
     assert outliers - 0.06 < gross.mean() < outliers + 0.08
-    clean, dirty = see(names[1], 0), see(names[0], 0)
+    clean = see(names[1], 0)
+    dirty = see(names[0], 0)
     assert np.trace(dirty.covariance[dirty.seen][0]) < 2.0 * np.trace(clean.covariance[0])
     assert dirty.outliers is not None
     assert dirty.outliers.gross == pytest.approx(outliers)
@@ -128,7 +134,8 @@ def test_the_choice_of_the_world_frame_does_not_count(names: tuple[str, str]) ->
 def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
     """The same operations are outliers and missed at every level but 0, at which all is seen as shown."""
     for seed in range(20):
-        seen, after = [], set()
+        seen = []
+        after = set()
         for level in (Level(0.2, 0.1), Level(0.8, 0.2)):
             rng = np.random.default_rng(seed)
             seen.append(observe(scenes.shown(TOWER), make_noise(names[0], level), rng))
@@ -169,7 +176,9 @@ def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]
 
 def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
     """Its pose is the one at which the part started or was seen last, and what is stated says that it is not known."""
-    noise, shown, missed = make_noise(names[0], LEVEL), scenes.shown(TOWER), 0
+    noise = make_noise(names[0], LEVEL)
+    shown = scenes.shown(TOWER)
+    missed = 0
     for seed in range(60):
         seen = observe(shown, noise, np.random.default_rng(seed))
         for k in np.flatnonzero(~seen.seen):
@@ -184,7 +193,8 @@ def test_empirical_noise_gives_the_measured_poses_back(folder: Path) -> None:
     """At level 1 every error is a row of the file, shift and turn, or of opposite sign, as far off and turned back."""
     rows = np.genfromtxt(folder / "whole.csv", delimiter=",", skip_header=1, usecols=range(4, 10))
     rows = rows[np.isfinite(rows[:, 0])]
-    camera, found = Camera(), []
+    camera = Camera()
+    found = []
     for seed in range(60):
         seen = see(f"empirical:{folder / 'whole.csv'}", seed, Level(1.0, 1.0))
         F = camera.frames(TOWER.goals)

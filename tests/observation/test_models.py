@@ -49,7 +49,8 @@ def test_draws_have_the_stated_covariance(model: Callable[[Level], Noise]) -> No
 
 def test_draws_differ_along_the_sight_and_across_it() -> None:
     """Empirical world covariance against the factors, whatever the part's frame."""
-    sight, world = line_of_sight(), []
+    sight = line_of_sight()
+    world = []
     for seed in range(1000):
         seen = see(Anisotropic(LEVEL), seed)
         R = seen.goals[:, :3, :3]
@@ -88,7 +89,8 @@ def test_the_geometric_mean_is_that_of_isotropic() -> None:
 
 def test_a_part_is_as_bad_in_every_operation() -> None:
     """The error of each operation is that of `isotropic` times the factor of the part it moves."""
-    plain, seen = see(Isotropic(LEVEL), 8), see(PerPart(LEVEL), 8)
+    plain = see(Isotropic(LEVEL), 8)
+    seen = see(PerPart(LEVEL), 8)
     ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)

@@ -26,13 +26,15 @@ CARELESS[1, 1, 1] = 0.0029**2
 
 def errors(level: Level, draws: int) -> Array:
     """Body twists of what was seen, from what was shown, (draws * n, 6)."""
-    rng, shown = np.random.default_rng(11), scenes.shown(TOWER)
+    rng = np.random.default_rng(11)
+    shown = scenes.shown(TOWER)
     seen = [Isotropic(level)(shown.assembly, shown, rng).goals for _ in range(draws)]
     return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
 
 
 def test_mean_is_zero_and_covariance_is_the_stated_one() -> None:
-    xi, level = errors(Level(2.0, 0.5), 500), Level(2.0, 0.5)
+    xi = errors(Level(2.0, 0.5), 500)
+    level = Level(2.0, 0.5)
     unit = xi / np.repeat([2e-3, np.radians(0.5)], 3)
     assert np.abs(unit.mean(axis=0)).max() < 4 / np.sqrt(len(unit))
     assert_allclose(unit.T @ unit / len(unit), np.eye(6), atol=5 / np.sqrt(len(unit)))
@@ -50,7 +52,8 @@ def test_errors_are_gaussian() -> None:
 def test_the_frame_of_the_part_counts_not_the_world() -> None:
     """The same draws in another world frame give the same observation, seen from there."""
     W = pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0))
-    here, there = scenes.shown(TOWER), scenes.shown(scenes.turned(TOWER, W))
+    here = scenes.shown(TOWER)
+    there = scenes.shown(scenes.turned(TOWER, W))
     noise = Isotropic(Level(3.0, 4.0))
     seen = observe(here, noise, np.random.default_rng(1))
     assert_allclose(observe(there, noise, np.random.default_rng(1)).goals, W @ seen.goals, atol=1e-12)
@@ -76,7 +79,8 @@ def test_levels_only_scale_the_same_unit_draws() -> None:
 
 
 def test_levels_consume_the_generator_alike() -> None:
-    shown, states = scenes.shown(TOWER), set()
+    shown = scenes.shown(TOWER)
+    states = set()
     for mm in (0.0, 1.0):
         rng = np.random.default_rng(3)
         observe(shown, Isotropic(Level(mm, mm)), rng)
@@ -127,7 +131,8 @@ def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
 
 
 def test_make_noise_by_name_class_function_and_object() -> None:
-    level, rng = Level(2.0, 1.0), np.random.default_rng(0)
+    level = Level(2.0, 1.0)
+    rng = np.random.default_rng(0)
 
     def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
         return scenes.seen(TOWER, shown.goals)

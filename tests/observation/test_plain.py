@@ -37,7 +37,8 @@ def with_deviations(function, mm: object, deg: object):
     def noise(goals, rng):
         return function(goals, rng)
 
-    noise.deviation_mm, noise.deviation_deg = mm, deg
+    noise.deviation_mm = mm
+    noise.deviation_deg = deg
     return noise
 
 
@@ -66,7 +67,8 @@ def test_what_is_declared_as_nothing_is_stated_as_the_floor_and_carelessness_is_
 def test_a_class_made_with_a_level_may_be_plain_too() -> None:
     class Mine:
         def __init__(self, level: Level) -> None:
-            self.deviation_mm, self.deviation_deg = 3 * level.mm, level.deg
+            self.deviation_mm = 3 * level.mm
+            self.deviation_deg = level.deg
 
         def __call__(self, goals: Array, rng: np.random.Generator) -> Array:
             return goals @ pose.exp(rng.standard_normal((len(goals), 6)) * self.deviation_mm * 1e-3)
@@ -79,7 +81,8 @@ def test_who_declares_deviations_is_plain_even_if_it_takes_more() -> None:
     def loose(goals, rng, scale=1.0):
         return goals
 
-    loose.deviation_mm, loose.deviation_deg = 1.0, 1.0
+    loose.deviation_mm = 1.0
+    loose.deviation_deg = 1.0
     assert observe(SHOWN, make_noise(loose, LEVEL), np.random.default_rng(0)).seen.all()
 
 
@@ -211,7 +214,8 @@ def test_no_level_reaches_a_plain_function() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    blind, out = tmp_path / "blind.toml", tmp_path / "blind.png"
+    blind = tmp_path / "blind.toml"
+    out = tmp_path / "blind.png"
     text = presets()["megapose-lmo"].read_text(encoding="utf-8")
     blind.write_text(re.sub("missed_rate = [0-9.]+", "missed_rate = 1", text), encoding="utf-8")
     assert main(["noise", "card", str(blind)]) == 0

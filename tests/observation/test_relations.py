@@ -47,7 +47,8 @@ def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
     scene = scenes.ALL[name]()
-    right, given = contacts(scene.assembly), (scene.assembly, scene.start, scene.goals)
+    right = contacts(scene.assembly)
+    given = (scene.assembly, scene.start, scene.goals)
     less = contacts(missed(*given, stream(seed, RELATIONS)))
     assert less < right
     assert len(right - less) == 1
@@ -120,7 +121,8 @@ def test_the_plan_and_those_who_do_not_ask_keep_the_right_relations() -> None:
     wrong = with_relations(seen, Shifted(3e-3), scene.goals, stream(4, RELATIONS))
     assert wrong.goals.tobytes() == seen.goals.tobytes()
     for method in ("oracle", "none"):
-        with_wrong, without = apply_method(method, seen, scene.goals, wrong), apply_method(method, seen, scene.goals)
+        with_wrong = apply_method(method, seen, scene.goals, wrong)
+        without = apply_method(method, seen, scene.goals)
         assert with_wrong.plan is not None
         assert without.plan is not None
         assert with_wrong.plan.goals.tobytes() == without.plan.goals.tobytes()

@@ -24,7 +24,8 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 @pytest.mark.parametrize("name", ["peg_in_plate", "nested", "through", "in_groove", "on_pins"])
 def test_exactly_one_contact_is_wrong(name: str) -> None:
     scene = SCENES[name]()
-    right, given = contacts(scene.assembly), (scene.assembly, scene.start, scene.goals)
+    right = contacts(scene.assembly)
+    given = (scene.assembly, scene.start, scene.goals)
     for seed in range(4):
         assert len(right - contacts(missed(*given, np.random.default_rng(seed)))) == 1
         off = contacts(Shifted()(*given, np.random.default_rng(seed)))
@@ -35,14 +36,16 @@ def test_exactly_one_contact_is_wrong(name: str) -> None:
 
 
 def test_a_round_face_is_off_across_its_axis() -> None:
-    scene, seen = rounds.through(), set[str]()
+    scene = rounds.through()
+    seen = set[str]()
     for seed in range(12):
         wrong = Shifted(2e-3)(scene.assembly, scene.start, scene.goals, np.random.default_rng(seed))
         ((_, contact),) = contacts(wrong) - contacts(scene.assembly)
         part, face = contact.environment
         seen.add(face)
         if face == "bore_shifted":
-            new, old = wrong.solids[part].rounds[face], wrong.solids[part].rounds["bore"]
+            new = wrong.solids[part].rounds[face]
+            old = wrong.solids[part].rounds["bore"]
             by = new.point - old.point
             assert np.linalg.norm(by) == pytest.approx(2e-3)
             assert by @ old.axis == pytest.approx(0.0, abs=1e-12)

@@ -32,7 +32,8 @@ from apo_bench.parts.making import (
 )
 from apo_bench.parts.making.outline import outline_moments, ring
 
-FREE_MM, SHARE = 0.005, 1e-3
+FREE_MM = 0.005
+SHARE = 1e-3
 SECTOR = [np.array([[1.0, tan], [-tan, 1.0]]) for tan in (-2.0, 2.0)]
 """To both sides of a direction, somewhat less than a quarter of a turn."""
 
@@ -57,22 +58,29 @@ def cone(r: float, c: float) -> float:
 
 def random_plate(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
     """A rectangle or an L with round corners, and up to four bores, some with chamfers."""
-    w, d, h, corner = rng.uniform(60, 90), rng.uniform(50, 80), rng.uniform(5, 25), rng.uniform(2, 5)
+    w = rng.uniform(60, 90)
+    d = rng.uniform(50, 80)
+    h = rng.uniform(5, 25)
+    corner = rng.uniform(2, 5)
     sides: dict = {}
     if rng.random() < 0.5:
         outline = rectangle(w, d, names=("ny", "px", "py", "nx"))
         flats = {"ny": ((0, -1, 0), d / 2), "px": ((1, 0, 0), w / 2), "py": ((0, 1, 0), d / 2)}
-        area, places = w * d - (4 - np.pi) * corner**2, [(x, y) for x in (-w / 4, w / 4) for y in (-d / 4, d / 4)]
+        area = w * d - (4 - np.pi) * corner**2
+        places = [(x, y) for x in (-w / 4, w / 4) for y in (-d / 4, d / 4)]
     else:
-        a, b = (w / 2, d / 2)
+        a = w / 2
+        b = d / 2
         outline = polygon((0, 0), (w, 0), (w, b), (a, b), (a, d), (0, d), names=("foot", "", "ledge", "step"))
         flats = {"foot": ((0, -1, 0), 0.0), "ledge": ((0, 1, 0), b), "step": ((1, 0, 0), a)}
         area = w * b + a * (d - b) - 4 * (4 - np.pi) / 4 * corner**2
         places = [(a / 2, b / 2), (1.5 * a, b / 2), (a / 2, 1.5 * b)]
     flats |= {"top": ((0, 0, 1), h), "bottom": ((0, 0, -1), 0.0)}
-    bores, volume = [], area * h
+    bores = []
+    volume = area * h
     for i, at in enumerate(places[: int(rng.integers(1, len(places) + 1))]):
-        r, c = rng.uniform(1.0, 4.0), rng.choice([0.0, 0.5, 1.0])
+        r = rng.uniform(1.0, 4.0)
+        c = rng.choice([0.0, 0.5, 1.0])
         bores.append(bore(at, r, 0, h, f"bore{i}", chamfer_high=c))
         volume -= np.pi * r**2 * h + cone(r, c)
         sides[f"bore{i}"] = (at, r, 0.0, h - c, True)
@@ -86,8 +94,12 @@ def random_plate(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
 
 def random_bush(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
     """A flanged bush with a bore of two widths."""
-    r, wide, h, low = rng.uniform(1.5, 4), rng.uniform(0.5, 2), rng.uniform(10, 40), rng.uniform(2, 8)
-    R, flange = r + wide + rng.uniform(1, 3), rng.uniform(1, 3)
+    r = rng.uniform(1.5, 4)
+    wide = rng.uniform(0.5, 2)
+    h = rng.uniform(10, 40)
+    low = rng.uniform(2, 8)
+    R = r + wide + rng.uniform(1, 3)
+    flange = rng.uniform(1, 3)
     outer = [Step(0, low, R + flange, name="flange"), Step(low, h, R, name="outer")]
     inner = [Step(0, h / 2, r, name="bore"), Step(h / 2, h, r + wide, name="wide")]
     volume = np.pi * (low * (R + flange) ** 2 + (h - low) * R**2 - h / 2 * (r**2 + (r + wide) ** 2))
@@ -103,7 +115,10 @@ def random_bush(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
 
 def random_slotted(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
     """A disc with a slot with round ends and a round hole that is no bore."""
-    R, h, width, r = rng.uniform(22, 28), rng.uniform(4, 12), rng.uniform(4, 8), rng.uniform(2, 6)
+    R = rng.uniform(22, 28)
+    h = rng.uniform(4, 12)
+    width = rng.uniform(4, 8)
+    r = rng.uniform(2, 6)
     length = width + rng.uniform(4, 12)
     holes = [slot(length, width, (0, -12), names=("low", "right", "high", "left")), circle(r, (0, 12), "hole")]
     flat = np.pi * R**2 - (length - width) * width - np.pi * width**2 / 4 - np.pi * r**2
@@ -119,7 +134,8 @@ def random_slotted(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
 def random_solid(seed: int) -> Wanted:
     rng = np.random.default_rng(seed)
     body, volume, walls, flats = (random_plate, random_bush, random_slotted)[seed % 3](rng)
-    at, turn = rng.uniform(-100, 100, 3), rng.uniform(-180, 180, 3)
+    at = rng.uniform(-100, 100, 3)
+    turn = rng.uniform(-180, 180, 3)
     return Wanted(body.moved(at, turn), volume, walls, flats, at, turn)
 
 
@@ -139,7 +155,8 @@ def free_radius(solid: Solid, origin: np.ndarray, R: np.ndarray, length: float, 
 
 
 def check_walls(solid: Solid, wanted: Wanted) -> None:
-    R, t = Rotation.from_euler("xyz", wanted.turn, degrees=True).as_matrix(), 1e-3 * wanted.at
+    R = Rotation.from_euler("xyz", wanted.turn, degrees=True).as_matrix()
+    t = 1e-3 * wanted.at
     for name, (place, radius, low, high, hole) in wanted.walls.items():
         wall = solid.rounds[name]
         ends = [R @ (1e-3 * np.array([*place, z])) + t for z in (low, high)]

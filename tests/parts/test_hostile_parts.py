@@ -32,7 +32,9 @@ PART = """<mujoco model="thing">
   </worldbody>
 </mujoco>
 """
-GEOM, SITE, END = '<geom name="low" ', '<site name="foot" ', "</mujoco>"
+GEOM = '<geom name="low" '
+SITE = '<site name="foot" '
+END = "</mujoco>"
 ELEMENTS = {
     "gravity": ('<option gravity="0 0 -1"/>', "<option> stands in <mujoco>"),
     "time step": ('<option timestep="1e-9"/>', "<option>"),
@@ -207,8 +209,10 @@ def test_many_faces_are_refused(tmp_path: Path) -> None:
     boxes = ""
     for axis in range(3):
         for k in range(33):
-            size, at = ["0.05"] * 3, ["0"] * 3
-            size[axis], at[axis] = "0.0005", f"{0.003 * (k - 16):.4f}"
+            size = ["0.05"] * 3
+            at = ["0"] * 3
+            size[axis] = "0.0005"
+            at[axis] = f"{0.003 * (k - 16):.4f}"
             boxes += f'<geom name="b{axis}_{k}" size="{" ".join(size)}" pos="{" ".join(at)}"/>'
     body = PART.partition("<geom name")[0] + boxes + "</body></worldbody></mujoco>"
     assert f"more than {MOST_FACES} faces" in refusal(body, tmp_path)
@@ -260,7 +264,8 @@ def test_a_mesh_of_the_same_boxes_agrees(spans: list[tuple[int, ...]]) -> None:
 def test_parts_of_the_package_keep_to_the_table(name: str) -> None:
     """And what a scene is told of them is all that the file says, with density and friction of the file beside it."""
     file = read_part(part_path(name))
-    told, said = ElementTree.fromstring(file.xml), ElementTree.parse(part_path(name)).getroot()
+    told = ElementTree.fromstring(file.xml)
+    said = ElementTree.parse(part_path(name)).getroot()
     beside = {"density", "friction"} if part_path(name).with_suffix(".toml").exists() else set()
     own = [(e.tag, {k: v for k, v in e.attrib.items() if e.tag != "geom" or k not in beside}) for e in told.iter()]
     assert own == [(e.tag, e.attrib) for e in said.iter()]

@@ -31,7 +31,8 @@ MADE = _script().PARTS
 @pytest.mark.parametrize("name", MADE)
 def test_a_part_file_says_what_the_script_makes(name: str) -> None:
     """To a nanometre: files have a finite number of digits, and other machines round differently."""
-    written, made = load_part(Path(folder("assets") / "parts" / f"{name}.xml")), solid_of(name, MADE[name])
+    written = load_part(Path(folder("assets") / "parts" / f"{name}.xml"))
+    made = solid_of(name, MADE[name])
     assert set(written.faces) == set(made.faces)
     assert set(written.rounds) == set(made.rounds)
     assert written.volume == pytest.approx(made.volume, rel=1e-6)

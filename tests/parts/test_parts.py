@@ -121,13 +121,15 @@ def test_a_union_is_what_counted_cells_say(spans: list[tuple[int, ...]]):
     boxes = []
     for k, (x, y, z, dx, dy, dz) in enumerate(spans):
         full[x + 1 : x + dx + 1, y + 1 : y + dy + 1, z + 1 : z + dz + 1] = True
-        low, size = 0.01 * np.array([x, y, z]), 0.01 * np.array([dx, dy, dz])
+        low = 0.01 * np.array([x, y, z])
+        size = 0.01 * np.array([dx, dy, dz])
         boxes.append(Box(f"b{k}", low + size / 2, size / 2))
     union = unite(boxes)
     assert union.volume == pytest.approx(1e-6 * full.sum(), rel=1e-9)
     assert union.centroid == pytest.approx(0.01 * (np.argwhere(full).mean(axis=0) - 0.5), abs=1e-9)
     for side in range(len(SIDES)):
-        axis, step = side // 2, 1 - 2 * (side % 2)
+        axis = side // 2
+        step = 1 - 2 * (side % 2)
         bare = full & ~np.roll(full, -step, axis=axis)
         areas = sum(surface.shape.area for surface in union.surfaces if surface.side == side)
         assert areas == pytest.approx(1e-4 * bare.sum(), abs=1e-10)

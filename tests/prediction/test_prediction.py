@@ -27,7 +27,8 @@ pytestmark = pytest.mark.numeric
 
 CLEARANCE_MM = 0.25
 ALLOWED_MM = CLEARANCE_MM + Thresholds().fit_margin_mm
-DOWN, AWAY = (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
+DOWN = (0.0, 0.0, -1.0)
+AWAY = (0.0, 0.0, 1.0)
 ALONG = (1.0, 0.0, 0.0)
 
 
@@ -207,7 +208,8 @@ def test_the_frame_of_the_world_does_not_matter_and_nothing_is_changed() -> None
     turned = scenes.turned(scene, pose.at((0.1, -0.2, 0.0), (0, 0, 35.0)))
     goals = off(turned, 2, scenes.mm(1, 0, 0))
     kept = goals.copy()
-    found, plain = said(turned, goals), said(scene, off(scene, 2, scenes.mm(1, 0, 0)))
+    found = said(turned, goals)
+    plain = said(scene, off(scene, 2, scenes.mm(1, 0, 0)))
     assert (found.operation, found.code) == (plain.operation, plain.code) == (5, "residual")
     assert found.size_mm == pytest.approx(plain.size_mm)
     np.testing.assert_array_equal(goals, kept)
@@ -321,7 +323,7 @@ def test_walls_may_be_apart_by_the_play_of_all_faces_together(low_mm: float, fai
 def test_a_shaft_comes_to_rest_on_both_sides_of_its_groove() -> None:
     scene = rounds.in_groove()
     operation = scene.assembly.operations[1]
-    (before, _) = placements(scene.assembly, scene.start, scene.goals)
+    before, _ = placements(scene.assembly, scene.start, scene.goals)
     brought = {**before, "peg": scene.goals[1] @ scenes.mm(-0.7, 0.6, 0, (0.4, 1.0, 0))}
     rests = resting_poses(scene.assembly, operation, brought)
     for contact in operation.contacts:
@@ -335,7 +337,7 @@ def test_a_plate_comes_to_rest_on_a_shaft() -> None:
     block_on = Operation("block", touch("block", "peg", "nz-wall"))
     goals = [scenes.mm(0, 0, 5, (0, 90, 0)), scenes.mm(25, 0, 35)]
     scene = scenes.scene([scenes.table(), rounds.peg(), scenes.block()], [peg_on, block_on], goals)
-    (before, _) = placements(scene.assembly, scene.start, scene.goals)
+    before, _ = placements(scene.assembly, scene.start, scene.goals)
     brought = {**before, "block": goals[1] @ scenes.mm(0, 0, 0.8, (0, 1.0, 0))}
     rests = resting_poses(scene.assembly, block_on, brought)
     assert residual(scene.assembly, block_on.contacts[0], rests)[0] == pytest.approx(np.zeros(2), abs=1e-9)

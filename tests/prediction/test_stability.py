@@ -32,7 +32,8 @@ def test_the_examples_of_the_paper_stand(build, yaw: float) -> None:
 
 @pytest.mark.parametrize("build", [scenes.stick_in_tower, scenes.stick_on_castles])
 def test_noise_alone_topples_nothing(build) -> None:
-    scene, rng = build(), np.random.default_rng(0)
+    scene = build()
+    rng = np.random.default_rng(0)
     for _ in range(8):
         goals = scenes.noisy(scene.goals, rng, 2.0, 2.0)
         assert first_unstable(scene.assembly, scene.start, goals) is None
@@ -135,7 +136,8 @@ def test_round_and_tilted_parts_stand(name: str, yaw: float) -> None:
 
 @pytest.mark.parametrize("name", rounds.ALL)
 def test_noise_alone_topples_no_round_part(name: str) -> None:
-    scene, rng = rounds.ALL[name](), np.random.default_rng(0)
+    scene = rounds.ALL[name]()
+    rng = np.random.default_rng(0)
     for _ in range(6):
         goals = scenes.noisy(scene.goals, rng, 1.0, 1.0)
         assert first_unstable(scene.assembly, scene.start, goals) is None

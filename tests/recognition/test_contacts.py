@@ -115,7 +115,8 @@ def test_the_world_frame_does_not_matter(name: str) -> None:
     for seed in (7, 8):
         here = seen_at(scene, seed, 1.0)
         there = seen_at(scenes.turned(scene, T), seed, 1.0)
-        found, again = recognise(here).evidence, recognise(there).evidence
+        found = recognise(here).evidence
+        again = recognise(there).evidence
         assert [(e.made, e.contact) for e in found] == [(e.made, e.contact) for e in again]
         assert_allclose([e.gap_m for e in found], [e.gap_m for e in again], rtol=0, atol=1e-7)
         assert_allclose([e.most for e in found], [e.most for e in again], rtol=1e-4, atol=1e-7)
@@ -183,7 +184,8 @@ def test_recognised_twice_sees_as_much_as_once() -> None:
     for name in ("stick_in_tower", "pockets"):
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 2, 1.0, play_m=0.25e-3)
-        once, twice = recognise_by(seen), recognise_by(seen, "recognised-twice")
+        once = recognise_by(seen)
+        twice = recognise_by(seen, "recognised-twice")
         assert contacts(twice.assembly) == contacts(scene.assembly)
         assert max(abs(e.gap_m) for e in twice.evidence) < 1e-4  # looked at where the correction put the parts
         assert [e.seen_gap_m for e in twice.evidence] == [e.seen_gap_m for e in once.evidence]
@@ -234,7 +236,8 @@ def test_rules_are_checked_at_the_door(rule: dict[str, float], words: str) -> No
 def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, Facing]]:
     """Faces that look at each other, between all parts at the end of a noisy demonstration."""
     goals = scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)
-    at, solids = placements(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
+    at = placements(scene.assembly, scene.start, goals)[-1]
+    solids = scene.assembly.solids
     return [
         (a, b, pair)
         for a in solids
@@ -250,11 +253,14 @@ def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
     """Central differences. Where parts turn the overlap changes too, so the gap is taken where its middle was."""
     scene = scenes.ALL[name]()
     goals = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
-    at, solids = placements(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
-    h, found = 1e-6, pairs(scene, 3)
+    at = placements(scene.assembly, scene.start, goals)[-1]
+    solids = scene.assembly.solids
+    h = 1e-6
+    found = pairs(scene, 3)
     assert len(found) > 10
     for a, b, pair in found:
-        corner, normal = solids[a].faces[pair.a].outline[:1], solids[a].faces[pair.a].normal
+        corner = solids[a].faces[pair.a].outline[:1]
+        normal = solids[a].faces[pair.a].normal
         middle = middle_of(pair, at[a], corner, normal)
         for i in range(6):
             posed = [pose.exp(sign * h * np.eye(6)[i]) @ at[a] for sign in (1.0, -1.0)]
@@ -279,7 +285,8 @@ def same(pair: Facing, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> 
 def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
     scene = scenes.ALL[name]()
     belief = initial_belief(seen_at(scene, 4, 1.0))
-    rng, h = np.random.default_rng(0), 1e-6
+    rng = np.random.default_rng(0)
+    h = 1e-6
     for k in range(len(scene.assembly)):
         now = belief.standing(k)
         for part, T in placements(scene.assembly, scene.start, belief.goals)[k].items():
@@ -308,7 +315,8 @@ def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
     after = belief
     for J in rows:
         after = after.given(np.zeros(3), J, noise)
-    J, R = np.concatenate(rows), np.kron(np.eye(2), noise)
+    J = np.concatenate(rows)
+    R = np.kron(np.eye(2), noise)
     P = belief.covariance
     expected = P - P @ J.T @ np.linalg.solve(J @ P @ J.T + R, J @ P)
     scale = np.sqrt(np.outer(np.diag(P), np.diag(P)))

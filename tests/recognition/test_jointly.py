@@ -69,14 +69,16 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
     for name in NAMES:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 1, 1.0)
-        found, made = estimate(seen, scene.assembly, seen.goals), ContactCorrector(compiled=False)(seen)
+        found = estimate(seen, scene.assembly, seen.goals)
+        made = ContactCorrector(compiled=False)(seen)
         assert np.abs(equations(scene.assembly, seen.start, found.goals).residual(found.goals)).max() < 5e-4
         assert_allclose(found.goals, made.goals, atol=2e-2)
 
 
 def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:
     """A block 2 mm above the table: only the vertical and two tilts are asked for."""
-    level, seen = 1.0, block_at(0, 0, 27)
+    level = 1.0
+    seen = block_at(0, 0, 27)
     found = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.goals)
     s = np.array([level * 1e-3, np.radians(level), np.radians(level)])
     room = np.hypot(s, [40e-3, np.radians(23.0), np.radians(23.0)])
@@ -124,7 +126,8 @@ def test_near_faces_touch_if_the_noise_explains_the_gap() -> None:
 
 
 def test_probabilities_say_what_is_not_certain() -> None:
-    sure, unsure = recognise_jointly(beside(30.0, 1.0)), recognise_jointly(beside(4.0, 1.5))
+    sure = recognise_jointly(beside(30.0, 1.0))
+    unsure = recognise_jointly(beside(4.0, 1.5))
     assert sure.probability is not None
     assert sure.probability > 0.99
     assert unsure.probability is not None
@@ -141,7 +144,8 @@ def test_what_is_let_go_of_lies_on_something_however_far_it_was_seen_above() -> 
 
 def test_parts_that_are_seen_inside_each_other_touch() -> None:
     """5.3 mm apart may be a gap, 5.3 mm inside each other cannot be: touching is likelier there."""
-    apart, within = recognise_jointly(beside(5.3, 1.0)), recognise_jointly(beside(-5.3, 1.0))
+    apart = recognise_jointly(beside(5.3, 1.0))
+    within = recognise_jointly(beside(-5.3, 1.0))
     assert "B.nx on A.px" not in names(apart.assembly)
     assert "B.nx on A.px" in names(within.assembly)
 
@@ -154,10 +158,12 @@ def test_operations_that_were_not_seen_make_no_contact() -> None:
 
 @pytest.mark.parametrize("hulls", [False, True])
 def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None:
-    a, b = scenes.block("A"), scenes.block("B")
+    a = scenes.block("A")
+    b = scenes.block("B")
     if hulls:
         a = replace(a, pieces=tuple(Hull(piece.name, piece_corners(piece)) for piece in a.pieces))
-    T_a, T_b = scenes.mm(45, 3, 26), scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
+    T_a = scenes.mm(45, 3, 26)
+    T_b = scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
     (way,) = ways_out(a, T_a, b, T_b, 1e-4)
     best = int(way.lengths.argmin())
     assert way.lengths[best] == pytest.approx(intrusion(a, T_a, b, T_b))

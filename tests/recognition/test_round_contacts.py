@@ -52,7 +52,8 @@ def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:
     seen = seen_at(scene, 4, 0.5)
     goals = np.array(seen.goals)
     goals[2] = goals[2] @ pose.exp([0, 0, 0, 0, 0, 2.1])
-    found, again = recognise(seen), recognise(replace(seen, goals=goals))
+    found = recognise(seen)
+    again = recognise(replace(seen, goals=goals))
     assert contacts(again.assembly) == contacts(scene.assembly)
     assert_allclose([e.gap_m for e in again.evidence], [e.gap_m for e in found.evidence], rtol=0, atol=5e-5)
     assert_allclose([e.seen_gap_m for e in again.evidence], [e.seen_gap_m for e in found.evidence], rtol=0, atol=5e-5)
@@ -60,7 +61,8 @@ def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:
 
 @pytest.mark.parametrize(("radius", "fits"), [(4.3, False), (4.5, True), (5.0, True), (5.05, True), (5.2, False)])
 def test_radii_must_fit(radius: float, fits: bool) -> None:
-    plate, peg = rounds.plate(), rounds.peg(radius=radius)
+    plate = rounds.plate()
+    peg = rounds.peg(radius=radius)
     pairs = {(a.name, b.name) for a, b in round_pairs(peg, plate)}
     assert (("wall", "bore") in pairs) is fits
 
@@ -89,7 +91,8 @@ def pairs_of(name: str, turned_deg: float = 1.0) -> list[Pair]:
     """Those that look at each other at the end of a noisy demonstration, in both orders."""
     scene = built(name)
     goals = scenes.noisy(scene.goals, np.random.default_rng(3), 0.5, turned_deg)
-    at, solids = placements(scene.assembly, scene.start, goals)[-1], scene.assembly.solids
+    at = placements(scene.assembly, scene.start, goals)[-1]
+    solids = scene.assembly.solids
     faces = {part: {**solid.faces, **solid.rounds} for part, solid in solids.items()}
     return [
         Pair(faces[a][pair.a], at[a], faces[b][pair.b], at[b], pair)

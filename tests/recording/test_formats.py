@@ -30,7 +30,8 @@ def tracked() -> dict[str, Tracked]:
 
 @pytest.mark.parametrize("name", FORMS)
 def test_every_format_gives_the_poses_that_were_written(name: str, tmp_path: Path) -> None:
-    form, written = FORMS[name], tracked()
+    form = FORMS[name]
+    written = tracked()
     form.write(written, tmp_path / form.file)
     (tmp_path / "camera.toml").write_text(f'schema = "apo-bench/camera/1"\n[log]\n{form.log}\n', encoding="utf-8")
     log = read_log(tmp_path / form.file, form.format, read_camera(tmp_path / "camera.toml").conventions)
@@ -139,7 +140,8 @@ JSON: dict[str, tuple[Callable[[dict], object], str]] = {
 @pytest.mark.parametrize("what", JSON)
 def test_what_is_wrong_with_a_message_is_one_sentence(what: str, tmp_path: Path) -> None:
     change, sentence = JSON[what]
-    turn, stamp = {"x": 0, "y": 0, "z": 0, "w": 1}, {"stamp": {"sec": 1, "nanosec": 5}}
+    turn = {"x": 0, "y": 0, "z": 0, "w": 1}
+    stamp = {"stamp": {"sec": 1, "nanosec": 5}}
     message = {"header": stamp, "pose": {"position": {"x": 0, "y": 0, "z": 1}, "orientation": turn}}
     (tmp_path / "log.json").write_text(json.dumps([message]), encoding="utf-8")
     assert list(read_log(tmp_path / "log.json", "ros-json", Conventions()).tracks) == ["log"]

@@ -71,7 +71,8 @@ def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
         part: Track((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
         for part, (t, T) in tracks.items()
     }
-    found, plain = imported(often), imported(tracks)
+    found = imported(often)
+    plain = imported(tracks)
     off = pose.log(pose.inverse(goals(NAME)) @ found.observation.goals)
     assert np.abs(off[:, :3]).max() < 1e-3
     means = ([one.rest.mean.covariance for one in each.operations if one.rest] for each in (found, plain))
@@ -175,7 +176,8 @@ def test_euler_angles_about_other_axes_and_in_radians_are_named() -> None:
     for other, sentence in (("ZYX", 'state `euler = "ZYX"`'), ("radians", "radians that were read as degrees")):
         tracks = {}
         for part, (t, T) in seen(NAME, 0.1).items():
-            R, wrong = Rotation.from_matrix(T[:, :3, :3]), T.copy()
+            R = Rotation.from_matrix(T[:, :3, :3])
+            wrong = T.copy()
             angles = np.radians(R.as_euler("xyz")) if other == "radians" else R.as_euler(other)
             wrong[:, :3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
             tracks[part] = Track(t, wrong)

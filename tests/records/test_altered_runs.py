@@ -22,7 +22,8 @@ from tests.altered import FILES, altered
 
 KEPT = Path(__file__).parents[1] / "kept" / "row7"
 """2 scenarios, 2 levels, 3 methods, 2 seeds."""
-CASES, WHOLE = 300, 5
+CASES = 300
+WHOLE = 5
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
 
 

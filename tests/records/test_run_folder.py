@@ -151,7 +151,8 @@ def test_twenty_kills_lose_no_row_and_leave_no_wrong_one(tmp_path: Path) -> None
 def test_the_last_line_may_be_cut_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "fsync", lambda file: None)
     write(tmp_path, range(3))
-    path, aside = tmp_path / "trials.jsonl", tmp_path / "torn.txt"
+    path = tmp_path / "trials.jsonl"
+    aside = tmp_path / "torn.txt"
     whole = path.read_bytes()
     begin = len(line(0) + line(1))
     for left in sorted({*range(begin, len(whole), 5), *range(begin, begin + 9), *range(len(whole) - 9, len(whole))}):

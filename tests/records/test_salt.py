@@ -34,7 +34,8 @@ from apo_bench.trial.stages import ARM, OBSERVATION, observe_recording, record_d
 from tests import pages
 from tests.statistics.test_rates import row, write
 
-HERE, THERE = Salt(bytes(range(16))), Salt(bytes(range(1, 33)))
+HERE = Salt(bytes(range(16)))
+THERE = Salt(bytes(range(1, 33)))
 HEX = "8d217488cd5974580ccd50092e6d071ae625d86a6e19b8fc95ab5f4914f76f02"
 """What a salt may look like; the same in every process, so that workers collect the same tests."""
 HOPELESS = 40.0
@@ -65,7 +66,8 @@ def test_a_salt_makes_every_stream_another_one() -> None:
 
 def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
     noise = make_noise("isotropic", Level(1.0, 1.0))
-    plain, salted = record_demonstration(tower, 1.0, 3), record_demonstration(tower, 1.0, 3, salt=HERE)
+    plain = record_demonstration(tower, 1.0, 3)
+    salted = record_demonstration(tower, 1.0, 3, salt=HERE)
     assert not np.array_equal(plain.layout.goals, salted.layout.goals)
     off = [shown.demonstration.goals[1] - shown.layout.goals[1] for shown in (plain, salted)]
     assert not np.allclose(*off, rtol=0, atol=1e-5)
@@ -186,7 +188,8 @@ def of_salt(salt: str | None, methods: tuple[str, ...] = ("none",)) -> list[dict
 
 
 def test_rows_of_different_salts_are_neither_counted_nor_paired(tmp_path: Path) -> None:
-    plain, salted = of_salt(None), of_salt(HERE.hash)
+    plain = of_salt(None)
+    salted = of_salt(HERE.hash)
     with pytest.raises(InputError, match=f"drawn without a salt and with the salt {HERE.hash}; count"):
         tally([*plain, *({**one, "seed": one["seed"] + 10} for one in salted)])
     assert tally(salted)[0].trials == tally(plain)[0].trials == 6
@@ -222,7 +225,9 @@ def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest
 
 def test_a_salted_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same rows in this process and in another one; resumed and replayed with its salt, which nothing shows."""
-    file, here, there = tmp_path / "salt", tmp_path / "here", tmp_path / "there"
+    file = tmp_path / "salt"
+    here = tmp_path / "here"
+    there = tmp_path / "there"
     rows = run_sweep(GRID, here, salt_file=file)
     salt = read_salt(file)
     assert len(rows) == 4

@@ -48,7 +48,8 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
     here = {field.name for field in fields(SweepSettings)}
     for name, info in SETTINGS.items():
-        level, alone = name.startswith("level_"), name in ("seed", "salt")
+        level = name.startswith("level_")
+        alone = name in ("seed", "salt")
         assert bool(info.axis) + info.shared + level + alone == 1
         assert (LEVEL.axis if level else info.axis or name) in here | {"salt"}
         assert not info.axis or info.axis in KEYS

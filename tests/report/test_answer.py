@@ -30,7 +30,8 @@ def at_levels(method: str, seed: int, successes: tuple[bool, ...]) -> list[dict[
 
 def test_one_trial_a_seed_has_the_intervals_of_the_tables() -> None:
     rows = [row("contact", i, i > 0) for i in range(20)] + [row("none", i, i > 11) for i in range(20)]
-    (low, high), (least, most) = wilson(19, 20), tango(11, 0, 20)
+    low, high = wilson(19, 20)
+    least, most = tango(11, 0, 20)
     assert said(rows) == (
         f"`contact` succeeds in 19 of 20 trials (95.0 %; 95 % interval {100 * low:.1f} to {100 * high:.1f} %). `none` "
         "succeeds in 8 of the same 20: `contact` succeeds more often, by 55.0 points (95 % interval "
@@ -98,7 +99,7 @@ def test_it_says_where_the_curve_falls_to_one_half() -> None:
         for m in ("contact", "paper")
         for i in range(30)
     ]
-    (half, _) = summary(rows).half_levels
+    half, _ = summary(rows).half_levels
     words = f"Its curve over the level falls to one half at level {half.text} (95 % interval: {half.interval_text})."
     assert words in said(rows)
 
@@ -155,7 +156,8 @@ def tables(draw: st.DrawFn) -> list[dict[str, Any]]:
     excluded = draw(st.sets(st.integers(0, seeds - 1), max_size=2))
     made = []
     for method in methods:
-        rate, kept = draw(st.sampled_from((0.0, 0.1, 0.5, 0.95, 1.0))), draw(st.sampled_from((0.6, 1.0)))
+        rate = draw(st.sampled_from((0.0, 0.1, 0.5, 0.95, 1.0)))
+        kept = draw(st.sampled_from((0.6, 1.0)))
         luck = draw(st.randoms(use_true_random=False))
         for seed in range(seeds):
             for level in range(1, levels + 1):

@@ -59,7 +59,8 @@ def second() -> list[dict[str, Any]]:
 
 @pytest.fixture
 def folders(tmp_path: Path) -> tuple[Path, Path]:
-    one, two = write(tmp_path / "one", first()), write(tmp_path / "two", second())
+    one = write(tmp_path / "one", first())
+    two = write(tmp_path / "two", second())
     (one / "run.json").write_text(json.dumps({"versions": {"mujoco": "3.17.0", "numpy": "2.0"}}), encoding="utf-8")
     (two / "run.json").write_text(json.dumps({"versions": {"mujoco": "3.18.0", "numpy": "2.0"}}), encoding="utf-8")
     return one, two
@@ -96,7 +97,7 @@ def test_a_sweep_is_the_same_as_itself(folders: tuple[Path, Path]) -> None:
 def test_trials_of_one_seed_count_once_where_independence_is_asked_for(tmp_path: Path) -> None:
     ours = [row(method, seed, True) for method in ("paper", "contact") for seed in range(10)]
     theirs = [row(r["method"], r["seed"], r["seed"] != 4) for r in ours]
-    (a, _) = compare(write(tmp_path / "a", ours), write(tmp_path / "b", theirs)).agreements
+    a, _ = compare(write(tmp_path / "a", ours), write(tmp_path / "b", theirs)).agreements
     assert (a.same, a.same_everywhere) == ((18, 20), (9, 10))
 
 
@@ -143,7 +144,8 @@ def test_one_run_file_that_is_not_there_is_one_difference(folders: tuple[Path, P
 
 
 def test_the_sides_change_places(folders: tuple[Path, Path]) -> None:
-    there, back = compare(*folders), compare(*folders[::-1])
+    there = compare(*folders)
+    back = compare(*folders[::-1])
     assert [a.same for a in there.agreements] == [a.same for a in back.agreements]
     assert [(a.only_first, a.only_second) for a in there.agreements] == [
         (a.only_second, a.only_first) for a in back.agreements
@@ -159,7 +161,7 @@ def test_the_command_writes_a_page_and_exits_with_0(
     said = capsys.readouterr().out
     assert "Verdicts agree in 46 of 48 (95.83 %): 1 right in the first alone, 1 in the second alone." in said
     assert "versions: mujoco, rows: fidelity" in said
-    (line, _) = csv.DictReader((out / "changed.csv").open(encoding="utf-8"))
+    line, _ = csv.DictReader((out / "changed.csv").open(encoding="utf-8"))
     assert line["command of the first"] == "apo-bench replay stick_in_tower --clearance 0.25 --method contact --seed 0"
     assert line["command of the second"].endswith("--method contact --fidelity contact --seed 0")
     page = pages.lines(out / "compare.html")

@@ -195,7 +195,8 @@ def test_pictures_that_are_missing_are_said_in_sentences(
     "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_level.svg"]
 )
 def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> None:
-    folder, target = write(tmp_path / "run", [row("contact")]), tmp_path / "target"
+    folder = write(tmp_path / "run", [row("contact")])
+    target = tmp_path / "target"
     (folder / name).parent.mkdir(exist_ok=True)
     target.mkdir() if name in ("tables", "figures") else target.write_text("mine", encoding="utf-8")
     (folder / name).symlink_to(target)
@@ -208,7 +209,8 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
 def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
     from apo_bench.records.run.run_folder import RunFolder
 
-    folder, target = tmp_path / "run", tmp_path / "target"
+    folder = tmp_path / "run"
+    target = tmp_path / "target"
     folder.mkdir()
     target.write_bytes(b"")
     if name == "torn.txt":

@@ -38,7 +38,8 @@ def test_commands_of_a_page_give_identical_rows(
 ) -> None:
     made = report(write(tmp_path / "run", trials))
     kept = pages.trials(made.page)
-    words, columns = kept["words"], kept["columns"]
+    words = kept["words"]
+    columns = kept["columns"]
     for i, seed in enumerate(columns["seed"]):
         command = shlex.split(f"{words['command'][columns['command'][i]]} --seed {seed}")
         assert cli.main([*command[1:], "--json"]) == 0

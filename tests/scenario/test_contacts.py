@@ -125,7 +125,8 @@ def test_what_makes_no_sense_is_refused_in_one_sentence(old: str, new: str, word
 def test_a_contact_that_is_made_twice_is_asked_for_once(tmp_path: Path) -> None:
     """Example 5.3: the cube stands on the table before and after castle 2 is pushed against it."""
     text = (folder("scenarios") / "vanished_fixture.toml").read_text(encoding="utf-8")
-    pair, path = '["nz", "table.top"]', tmp_path / "mine.toml"
+    pair = '["nz", "table.top"]'
+    path = tmp_path / "mine.toml"
     assert text.count(pair) == 2
     loose = f'{{ faces = {pair}, kind = "clearance", gap_mm = [-1, 1] }}'
     path.write_text(text.replace(pair, loose, 1), encoding="utf-8")
@@ -152,7 +153,8 @@ def test_card_and_graph_say_what_is_not_centred(tmp_path: Path) -> None:
 
 def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> None:
     scenario = load(tmp_path, (PAIR, WALLS))
-    assembly, rng = scenario.assembly, np.random.default_rng(0)
+    assembly = scenario.assembly
+    rng = np.random.default_rng(0)
     for wrong in (missed, false):
         assert wrong(assembly, scenario.start, scenario.goals, rng).gaps == assembly.gaps
     assert assembly.first(2).gaps == assembly.gaps
@@ -167,11 +169,13 @@ def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> Non
 
 
 def test_correctors_that_know_no_walls_are_not_moved_by_them(tmp_path: Path) -> None:
-    walls, plain = load(tmp_path, (PAIR, WALLS)), load_scenario("stick_on_castles")
+    walls = load(tmp_path, (PAIR, WALLS))
+    plain = load_scenario("stick_on_castles")
     goals = plain.goals @ np.eye(4)
     goals[2, 1, 3] += 1e-3
     for corrector in ("paper", no_history):
-        a, b = correct(seen(walls, goals), corrector), correct(seen(plain, goals), corrector)
+        a = correct(seen(walls, goals), corrector)
+        b = correct(seen(plain, goals), corrector)
         np.testing.assert_array_equal(a.goals, b.goals)
 
 

@@ -35,14 +35,16 @@ FINGERS_M = (0.06, 0.025)
 
 def gap_m(assembly: Assembly, contact: Contact, poses: Poses) -> float:
     """The largest distance of a corner of the upper face from the plane of the lower one."""
-    face, on = assembly.face(contact.manipulated), assembly.face(contact.environment)
+    face = assembly.face(contact.manipulated)
+    on = assembly.face(contact.environment)
     corners = pose.apply(poses[contact.manipulated.part], face.outline)
     local = pose.apply(pose.inverse(poses[contact.environment.part]), corners)
     return float(np.abs(local @ on.plane[:3] + on.plane[3]).max())
 
 
 def overlap_m2(assembly: Assembly, contact: Contact, poses: Poses) -> float:
-    face, on = assembly.face(contact.manipulated), assembly.face(contact.environment)
+    face = assembly.face(contact.manipulated)
+    on = assembly.face(contact.environment)
     return overlap(face, poses[contact.manipulated.part], on, poses[contact.environment.part]).area
 
 
@@ -59,7 +61,8 @@ EXAMPLES = {
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_scenes_of_the_paper_are_those_of_the_paper(name: str):
     """Who moves, whom it carries, which faces meet and where: as written out by hand."""
-    scenario, example = SCENARIOS[name], EXAMPLES[name]()
+    scenario = SCENARIOS[name]
+    example = EXAMPLES[name]()
     assert [o.moves for o in scenario.assembly.operations] == [o.moves for o in example.assembly.operations]
     for mine, paper in zip(scenario.assembly.operations, example.assembly.operations, strict=True):
         assert set(mine.contacts) == set(paper.contacts)
@@ -114,7 +117,8 @@ def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
                     part = overlap_m2(assembly, contact, stages[k]) / overlap_m2(assembly, contact, nominal[k])
                     assert part >= 0.6
             for other in set(assembly.solids) - {operation.main} if seed < 40 else ():
-                a, b = assembly.solids[operation.main], assembly.solids[other]
+                a = assembly.solids[operation.main]
+                b = assembly.solids[other]
                 assert intrusion(a, stages[k][operation.main], b, stages[k][other]) < 1e-9
 
 
@@ -202,7 +206,8 @@ def extremes(scenario: Scenario):
     """Layouts at the ends and the middle of everything that is drawn."""
     site = scenario.site
     for u, v, yaw in product((-1, 0, 1), (-1, 0, 1), np.linspace(*site.yaw_rad, 5)):
-        x, y = site.center_m[0] + u * site.spread_m[0], site.center_m[1] + v * site.spread_m[1]
+        x = site.center_m[0] + u * site.spread_m[0]
+        y = site.center_m[1] + v * site.spread_m[1]
         for end in ("low_m", "high_m"):
             yield layout_at(scenario, x, y, yaw, [getattr(shift, end) for shift in scenario.shifts])
 
@@ -227,7 +232,8 @@ def test_no_start_is_in_the_way_of_the_assembly(name: str):
         waiting = set(assembly.solids) - assembly.fixed
         for k, operation in enumerate(assembly.operations):
             waiting -= set(operation.moves)
-            T, attach = layout.goals[k], scenario.attach[k]
+            T = layout.goals[k]
+            attach = scenario.attach[k]
             back = T @ pose.at(-attach.travel_m * attach.direction) @ pose.inverse(T)
             fingers = open_fingers(scenario.grasps[k], T)
             here = open_fingers(scenario.grasps[k], stages[k][operation.main])
@@ -280,12 +286,14 @@ def test_a_turn_is_one_about_its_point_and_leaves_what_shifts_draw(point: tuple[
     turn = Turn(0, np.array([0.0, 0.0, 1.0]), np.array(point), -0.2, 0.4)
     turned = replace(plain, turns=(turn,))
     for angle in (-0.2, 0.4):
-        layout, before = layout_at(turned, 0.1, 0.0, 0.3, turns_rad=[angle]), layout_at(plain, 0.1, 0.0, 0.3)
+        layout = layout_at(turned, 0.1, 0.0, 0.3, turns_rad=[angle])
+        before = layout_at(plain, 0.1, 0.0, 0.3)
         moved = pose.inverse(before.goals[0]) @ layout.goals[0]
         np.testing.assert_allclose(pose.apply(moved, np.array([point])), [point], rtol=0, atol=1e-12)
         assert np.arctan2(moved[1, 0], moved[0, 0]) == pytest.approx(angle)
         assert (layout.goals[1:] == before.goals[1:]).all()
-    found, drawn = [], [draw_layout(s, np.random.default_rng([7, 0])) for s in (plain, turned)]
+    found = []
+    drawn = [draw_layout(s, np.random.default_rng([7, 0])) for s in (plain, turned)]
     assert (drawn[0].goals[1:] == drawn[1].goals[1:]).all()
     for seed in GENERATOR_SEEDS:
         each = [draw_layout(s, np.random.default_rng([seed, 0])).goals[0] for s in (plain, turned)]

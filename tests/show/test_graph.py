@@ -63,7 +63,8 @@ def test_arrows_begin_and_end_at_their_parts(name: str, step: int) -> None:
     graph = graph_of(name, step)
     layout = arrange(graph, [arc.name for arc in graph.arcs])
     for arc, route in zip(graph.arcs, layout.routes, strict=True):
-        above, below = layout.boxes[arc.manipulated], layout.boxes[arc.environment]
+        above = layout.boxes[arc.manipulated]
+        below = layout.boxes[arc.environment]
         assert abs(route[0, 0] - above.x) < above.width / 2
         assert abs(route[-1, 0] - below.x) < below.width / 2
         assert route[0, 1] == pytest.approx(above.y - above.height / 2)

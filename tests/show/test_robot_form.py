@@ -17,7 +17,8 @@ from apo_bench.scenario.layout import layout_at
 from apo_bench.show.plan_text import plan_lines
 from apo_bench.show.robot_form import robot_form, tip_in_part
 
-BASE, TOOL = pose.at((-0.4, 0.1, 0.02), (0.0, 0.0, 30.0)), pose.at((0.0, 0.01, 0.15), (0.0, 0.0, 45.0))
+BASE = pose.at((-0.4, 0.1, 0.02), (0.0, 0.0, 30.0))
+TOOL = pose.at((0.0, 0.01, 0.15), (0.0, 0.0, 45.0))
 
 
 def form(name: str, frames: RobotFrames) -> dict[str, Any]:
@@ -58,7 +59,8 @@ def test_motions_follow_each_other_and_end_with_the_part_at_its_goal(name: str) 
 def test_a_reader_rebuilds_the_plan_from_the_file_alone(name: str, frames: RobotFrames) -> None:
     """Nothing but the file and the scenario that it names; grasps and motions then follow from it again."""
     said = json.loads(json.dumps(form(name, frames)))
-    base, scenario = matrix(said["poses"]["base_in_world"]), load_scenario(said["scenario"])
+    base = matrix(said["poses"]["base_in_world"])
+    scenario = load_scenario(said["scenario"])
     start = {part: base @ matrix(one["starts"]) for part, one in said["parts"].items()}
     goals = np.array([base @ matrix(step["part_at_goal"]) for step in said["steps"]])
     plan = Plan(scenario.assembly, start, goals)

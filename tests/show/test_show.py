@@ -66,7 +66,8 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert said[0].startswith("as seen: largest gap 5.466 mm; open: ")
     assert said[1:] == ["corrected by contact-robust: largest gap 0.000 mm; all hold", f"Wrote {out}"]
     drawn = imageio.imread(out)
-    left, right = drawn[60:530, :620], drawn[60:530, 620:1240]
+    left = drawn[60:530, :620]
+    right = drawn[60:530, 620:1240]
     assert left.std() > 10.0
     assert (np.abs(left.astype(int) - right) > 40).any(axis=-1).mean() > 0.005
 

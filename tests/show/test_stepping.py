@@ -92,7 +92,8 @@ def test_shapes_are_as_large_as_what_they_stand_for(tower: Scene) -> None:
     chapter = asked_for(tower).chapters[0]
     data = initial_state(tower.work, chapter.start)
     show_moment(tower, data, chapter, chapter.moments[-1])
-    poses, found = body_poses(tower, data), shapes(tower.work)
+    poses = body_poses(tower, data)
+    found = shapes(tower.work)
     assert len(poses) == tower.work.model.nbody
     assert {shape.part for shape in found} == {None, *tower.scenario.assembly.solids}
     for shape in found:
@@ -103,10 +104,12 @@ class Window:
     """What MuJoCo's window is asked for; keys are pressed one a picture, then it is closed."""
 
     def __init__(self, model: Any, key_callback: Any, codes: list[int]) -> None:
-        self.user_scn, self.cam = mujoco.MjvScene(model, maxgeom=2000), mujoco.MjvCamera()
+        self.user_scn = mujoco.MjvScene(model, maxgeom=2000)
+        self.cam = mujoco.MjvCamera()
         self.texts: list[str] = []
         self.drawn: list[int] = []
-        self._press, self._codes = key_callback, codes
+        self._press = key_callback
+        self._codes = codes
 
     def __enter__(self) -> Window:
         return self

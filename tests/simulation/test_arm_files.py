@@ -15,7 +15,8 @@ from apo_bench.simulation.arms.loading import check_surroundings, compiled, file
 from apo_bench.simulation.arms.tree import read_model_tree
 
 ARMS = folder("assets") / "arms"
-WORLD, END = "<worldbody>", "</mujoco>"
+WORLD = "<worldbody>"
+END = "</mujoco>"
 BALL = "<body><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>{}</body>"
 
 
@@ -131,7 +132,8 @@ def test_an_arm_in_parts_with_materials_in_its_classes_is_built_in_a_process_of_
     (tmp_path / "parts" / "rest.xml").write_text((ARMS / "ur5e_primitive.xml").read_text())
     (tmp_path / "link.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
     path = with_gripper(tmp_path, FEATURES)
-    arm, plain = read_arm(path), read_arm(ARMS / "ur5e_primitive.toml")
+    arm = read_arm(path)
+    plain = read_arm(ARMS / "ur5e_primitive.toml")
     assert arm.joints == plain.joints
     assert arm.opening_m == pytest.approx(plain.opening_m, abs=1e-4)
     names = {each.name for each in files_of(tmp_path / "arm.xml")}

@@ -37,15 +37,18 @@ PANDA = ((0, 0, 0.333), (0, -90, 0), (0, 90, 0.316), (0.0825, 90, 0), (-0.0825, 
 
 
 def about(axis: int, angle: float) -> Array:
-    T, (i, j) = np.eye(4), ((1, 2), (2, 0), (0, 1))[axis]
+    T = np.eye(4)
+    i, j = ((1, 2), (2, 0), (0, 1))[axis]
     T[i, i] = T[j, j] = np.cos(angle)
-    T[i, j], T[j, i] = -np.sin(angle), np.sin(angle)
+    T[i, j] = -np.sin(angle)
+    T[j, i] = np.sin(angle)
     return T
 
 
 def by(x: float = 0.0, z: float = 0.0) -> Array:
     T = np.eye(4)
-    T[0, 3], T[2, 3] = x, z
+    T[0, 3] = x
+    T[2, 3] = z
     return T
 
 
@@ -54,13 +57,16 @@ def flange(name: str, q: Array) -> Array:
     data = mujoco.MjData(model)
     data.qpos[:] = q
     mujoco.mj_kinematics(model, data)
-    site, T = data.site("flange"), np.eye(4)
-    T[:3, :3], T[:3, 3] = site.xmat.reshape(3, 3), site.xpos
+    site = data.site("flange")
+    T = np.eye(4)
+    T[:3, :3] = site.xmat.reshape(3, 3)
+    T[:3, 3] = site.xpos
     return T
 
 
 def test_the_primitive_arms_have_the_published_kinematics() -> None:
-    q, expected = np.random.default_rng(1).uniform(-2.0, 2.0, 7), np.eye(4)
+    q = np.random.default_rng(1).uniform(-2.0, 2.0, 7)
+    expected = np.eye(4)
     for angle, (d, a, alpha) in zip(q, UR5E, strict=False):
         expected = expected @ about(2, angle) @ by(x=a, z=d) @ about(0, np.radians(alpha))
     np.testing.assert_allclose(flange("ur5e_primitive", q[:6]), expected, atol=1e-8)
@@ -84,7 +90,8 @@ def test_what_is_measured_of_a_known_gripper_is_what_its_file_says(six_axis_file
 
     Fingers at rest stand up to 20 um beside each other, and so does the middle between them.
     """
-    arm, known = read_arm(six_axis_file), find_arm("six_axis")
+    arm = read_arm(six_axis_file)
+    known = find_arm("six_axis")
     assert arm.hand is not None
     assert arm.control == "own position actuators"
     assert arm.joints == known.joints
@@ -93,7 +100,8 @@ def test_what_is_measured_of_a_known_gripper_is_what_its_file_says(six_axis_file
     assert arm.hand.force_n == pytest.approx(20.0, rel=0.03)
     assert arm.hand.friction == 1.2
     q = np.radians([10, 20, 50, 5, 30, 40])
-    mine, theirs = Kinematics(arm).forward(q), Kinematics(known).forward(q)
+    mine = Kinematics(arm).forward(q)
+    theirs = Kinematics(known).forward(q)
     np.testing.assert_allclose(mine[:3, 3], theirs[:3, 3], atol=4e-5)
     np.testing.assert_allclose(np.abs(mine[:3, :3]), np.abs(theirs[:3, :3]), atol=1e-5)
 
@@ -102,7 +110,8 @@ def test_a_linkage_opens_as_its_geometry_says() -> None:
     """Half of 85 mm: 30.6 + 57.1 sin(41.2 degrees - q) - 25.4 mm; the command is the angle of its drivers."""
     hand = find_arm("ur5e_primitive").hand
     assert hand is not None
-    length, angle = np.hypot(37.6, 43.0), np.arctan2(37.6, 43.0)
+    length = np.hypot(37.6, 43.0)
+    angle = np.arctan2(37.6, 43.0)
     expected = 30.6 + length * np.sin(angle - hand.commands[:, 0]) - 25.4
     np.testing.assert_allclose(1e3 * hand.opening, expected, atol=0.1)
     assert hand.graded
@@ -114,7 +123,8 @@ def test_a_linkage_opens_as_its_geometry_says() -> None:
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])
 def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) -> None:
     arm = find_arm(name)
-    kinematics, q = Kinematics(arm), np.array(arm.home)
+    kinematics = Kinematics(arm)
+    q = np.array(arm.home)
     home = kinematics.forward(q)
     for shift in (0.1, -0.1, 0.0):
         T = np.array(home)
@@ -134,7 +144,8 @@ def test_fingers_are_as_fast_as_the_file_says() -> None:
     }
     scene = build_scene(load_scenario("block_on_block"), arm=find_arm("panda_primitive"))
     robot = Robot(scene, scene.scenario.start)
-    before, opening = robot.data.time, robot.opening()
+    before = robot.data.time
+    opening = robot.opening()
     robot.fingers(opening - 0.02)
     assert opening - robot.opening() > 0.019
     assert robot.data.time - before >= 0.02 / 0.05
@@ -142,10 +153,12 @@ def test_fingers_are_as_fast_as_the_file_says() -> None:
 
 def test_a_line_takes_as_long_as_the_joints_need() -> None:
     arm = find_arm("ur5e_primitive")
-    kinematics, q = Kinematics(arm), np.array(arm.home)
+    kinematics = Kinematics(arm)
+    q = np.array(arm.home)
     end = kinematics.forward(q)
     end[:3, 3] += (0.1, 0.2, -0.1)
-    line, most = smooth(kinematics.forward(q), end, 5.0), np.full(6, 0.5)
+    line = smooth(kinematics.forward(q), end, 5.0)
+    most = np.full(6, 0.5)
     slower = within_speed(kinematics, line, q, most)
     t = np.linspace(0.0, 1.0, 201)
     path = along(kinematics, slower, slower.progress(t), q)
@@ -270,7 +283,8 @@ def test_fingers_that_turn_on_hinges_hold_by_their_edges_and_this_is_said(tmp_pa
 def test_an_arm_waits_with_no_joint_wound_up() -> None:
     """A Panda's tip may wait at any of four turns: the usual posture, elbow up, is among those."""
     arm = replace(find_arm("panda_primitive"), base=(-0.48, 0.0, 0.0))
-    q, kinematics = find_home(arm), Kinematics(arm)
+    q = find_home(arm)
+    kinematics = Kinematics(arm)
     low, high = kinematics.range_of_joints
     assert (np.minimum(q - low, high - q) > np.radians(15.0)).all()
     assert (np.abs(q) <= np.pi).all()
@@ -328,7 +342,8 @@ def test_a_strangers_stated_gripper_is_read_like_the_usual_arm(tmp_path: Path) -
     """In a process of its own, as the models of strangers are."""
     model = tmp_path / "copy.xml"
     model.write_bytes((ARMS / "six_axis.xml").read_bytes())
-    mine, usual = read_arm(stated(tmp_path, model=model)), find_arm("six_axis")
+    mine = read_arm(stated(tmp_path, model=model))
+    usual = find_arm("six_axis")
     assert mine.model == usual.model
     assert (mine.joints, mine.fingers, mine.grip) == (usual.joints, usual.fingers, usual.grip)
 
@@ -336,7 +351,8 @@ def test_a_strangers_stated_gripper_is_read_like_the_usual_arm(tmp_path: Path) -
 def test_the_base_of_a_stated_arm_may_be_turned(tmp_path: Path) -> None:
     turned = read_arm(stated(tmp_path, ("[-420, 0, 0] }", "[0, 420, 0], turn_deg = [0, 0, -90] }")))
     scene = build_scene(load_scenario("block_on_block"), arm=turned)
-    there, usual = scene.kinematics.forward(turned.home), Kinematics(read_arm(stated(tmp_path))).forward(turned.home)
+    there = scene.kinematics.forward(turned.home)
+    usual = Kinematics(read_arm(stated(tmp_path))).forward(turned.home)
     x, y, z = usual[:3, 3]
     np.testing.assert_allclose(there[:3, 3], [y, -x, z], atol=1e-12)
     robot = Robot(scene, scene.scenario.start)

@@ -125,7 +125,8 @@ def test_an_inserted_stick_can_be_pulled_out(tower: Scene) -> None:
     schedule = (Step(0), Step(1), Step(2), Step(2, undo=True))
     result, _ = run(tower, 2, layout(tower, 2).goals, schedule)
     assert result.outcome.code == "ok"
-    start, end = layout(tower, 2).start, result.reached.final.poses
+    start = layout(tower, 2).start
+    end = result.reached.final.poses
     assert np.linalg.norm(end["stick"][:3, 3] - start["stick"][:3, 3]) < 0.005
     assert np.linalg.norm(end["castle2"][:3, 3] - layout(tower, 2).goals[1][:3, 3]) < 0.001
 

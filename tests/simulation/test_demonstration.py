@@ -131,14 +131,16 @@ class Pictures:
     period_s = 0.05
 
     def __init__(self, at: int) -> None:
-        self.at, self.seen = at, list[tuple[float, Array]]()
+        self.at = at
+        self.seen = list[tuple[float, Array]]()
 
     def __call__(self, data: Any) -> None:
         self.seen.append((float(data.time), data.qpos[self.at : self.at + 3].copy()))
 
 
 def test_who_watches_sees_a_picture_every_period_also_of_what_is_left_out():
-    its, layout = scene("stick_in_tower"), shown("stick_in_tower", 1.0, 2).layout
+    its = scene("stick_in_tower")
+    layout = shown("stick_in_tower", 1.0, 2).layout
     pictures = Pictures(its.shown.qpos["stick"])
     hands = Hands(its, layout.start, pictures)
     lift = smooth(hands.grab(0, "stick"), shifted(layout.start["stick"], (0, 0, 1), 0.4), 0.9)

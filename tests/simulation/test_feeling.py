@@ -13,7 +13,8 @@ from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import place, sleeping
 
-DOWN, NORTH = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
+DOWN = np.array([0.0, 0.0, -1.0])
+NORTH = np.array([0.0, 1.0, 0.0])
 HARDEST_N = 40.0
 """An arm pushes with 100 to 200 N per mm, and at 4 mm/s goes 0.08 mm between two looks: up to 16 N on top of 20 N."""
 
@@ -32,7 +33,8 @@ def hand_at(scene: Scene, x: float, y: float, z: float) -> Robot:
 
 def push_on_table(scene: Scene, robot: Robot) -> float:
     """What the table and the arm really exert on each other, [N], from the forces of all their contacts."""
-    total, force = np.zeros(3), np.zeros(6)
+    total = np.zeros(3)
+    force = np.zeros(6)
     names = [scene.work.model.geom(g).name for g in range(scene.work.model.ngeom)]
     for i, contact in enumerate(robot.data.contact):
         if {names[contact.geom1].split("/")[0], names[contact.geom2].split("/")[0]} == {"arm", "table"}:

@@ -69,10 +69,8 @@ def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
 
 
 def test_a_replay_that_was_the_same_is_not_run_again(monkeypatch):
-    cache, plan = (
-        ReplayCache(),
-        Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals),
-    )
+    cache = ReplayCache()
+    plan = Plan(load_scenario("stick_in_tower").assembly, shown().layout.start, shown().layout.goals)
     first = replay(plan, scene(), fidelity="contact", cache=cache)
     monkeypatch.setattr(Robot, "__init__", lambda *_: pytest.fail("run again"))
     assert replay(plan, scene(), fidelity="contact", cache=cache) is first
@@ -95,7 +93,8 @@ def test_marks_differ_where_anything_that_led_there_differs():
 @pytest.mark.parametrize("name", ["stick_in_tower", "vanished_fixture"])
 def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
     """A full replay, in which every stretch that `contact` would leave out is looked at for contacts of what moves."""
-    its, met = scene(name), []
+    its = scene(name)
+    met = []
     left_out: list[tuple[float, float]] = []
     follow = Robot.follow
 
@@ -150,13 +149,17 @@ def test_contact_simulates_less_and_passes_as_much_time():
 
 def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
     its = scene()
-    data, kinematics = initial_state(its.work, shown().layout.start), its.kinematics
+    data = initial_state(its.work, shown().layout.start)
+    kinematics = its.kinematics
     model = its.work.model
     joints = [model.joint(f"arm/{name}").id for name in its.arm.joints]
-    at, dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    at = model.jnt_qposadr[joints]
+    dof = model.jnt_dofadr[joints]
     data.qpos[at] = its.arm.home
-    held, others = ("stick",), [part for part in its.work.free if part != "stick"]
-    before, rest = kinematics.forward(data.qpos[at]), [part_pose(its.work, data, part) for part in others]
+    held = ("stick",)
+    others = [part for part in its.work.free if part != "stick"]
+    before = kinematics.forward(data.qpos[at])
+    rest = [part_pose(its.work, data, part) for part in others]
     in_hand = pose.inverse(before) @ part_pose(its.work, data, "stick")
     velocity = np.array([0.3, -0.2, 0.1, 0.4, -0.5, 0.6])
     fast_forward(its.work, data, kinematics.forward, (at, dof), np.full(6, 0.05), velocity, held)
@@ -199,15 +202,18 @@ def test_what_is_near_is_told_from_what_is_far():
 
 
 def test_no_turn_that_comes_near_anything_is_left_out():
-    its, rng = scene(), np.random.default_rng(5)
+    its = scene()
+    rng = np.random.default_rng(5)
     data = initial_state(its.work, shown().layout.start)
     others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
     hand = [near.Moving(its.pieces["stick"], np.eye(4))]
-    came, left_out = 0, 0
+    came = 0
+    left_out = 0
     for _ in range(60):
         start = pose.at(rng.uniform((-0.1, -0.1, 0.03), (0.1, 0.1, 0.2)), rng.uniform(-30.0, 30.0, 3))
         end = shifted(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
-        line, s = Trajectory(start, end, 0.2, np.asarray), np.linspace(0.0, 1.0, 201)
+        line = Trajectory(start, end, 0.2, np.asarray)
+        s = np.linspace(0.0, 1.0, 201)
         spans = near.near_spans(its, data, hand, ("stick",), line, s)
         for i, T in enumerate(line.poses(s)):
             depths = [
@@ -259,12 +265,10 @@ class Restless:
     """A robot beside parts that move for so many waits."""
 
     def __init__(self, waits: float):
-        self.scene, self.data, self.waits, self.parts = (
-            scene(),
-            initial_state(scene().work, shown().layout.start),
-            waits,
-            [],
-        )
+        self.scene = scene()
+        self.data = initial_state(scene().work, shown().layout.start)
+        self.waits = waits
+        self.parts = []
         self.data.qvel[self.scene.work.dof["stick"]] = 1.0
 
     def wait(self, seconds, parts=1):
@@ -275,7 +279,8 @@ class Restless:
 
 
 def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
-    forever, soon = Restless(np.inf), Restless(3)
+    forever = Restless(np.inf)
+    soon = Restless(3)
     for one in (forever, soon):
         _until_rest(one)
     assert len(forever.parts) == round(PATIENCE_S / LOOK_S)

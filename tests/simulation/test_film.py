@@ -31,7 +31,9 @@ def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
 def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     scene = build_scene(load_scenario("block_on_block"))
     layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
-    assembly, track, hands = scene.scenario.assembly, Track(), Track()
+    assembly = scene.scenario.assembly
+    track = Track()
+    hands = Track()
     plan = Plan(assembly, layout.start, layout.goals)
     assert replay(plan, scene, track.hooks, fidelity="contact").outcome.code == "ok"
     assert track.plan is plan
@@ -52,7 +54,8 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
 
 
 def test_words_stand_around_the_picture() -> None:
-    picture, inset = np.zeros((240, 480, 3), np.uint8), np.full((40, 60, 3), 128, np.uint8)
+    picture = np.zeros((240, 480, 3), np.uint8)
+    inset = np.full((40, 60, 3), 128, np.uint8)
     plain = captioned(picture, inset, Caption("a", "x 2", ("done",), ""))
     failed = captioned(picture, inset, Caption("a", "x 2", ("done",), "", good=False))
     assert plain.shape == (240 + ABOVE_PX + BELOW_PX, 480, 3)

@@ -90,7 +90,8 @@ def test_a_long_stick_is_pushed_then_pulled(pockets: Scene) -> None:
 def test_pulling_out_is_pushing_in_backwards(pockets: Scene) -> None:
     schedule = (*(Step(k) for k in range(5)), Step(4, undo=True))
     done = moves(nominal(pockets, schedule), pockets)
-    into, out = done[4].transfer, done[5].transfer
+    into = done[4].transfer
+    out = done[5].transfer
     assert out.out.left == into.into.left
     assert [g.T_part_tip[0, 3] for g in out.grips] == [g.T_part_tip[0, 3] for g in reversed(into.grips)]
     np.testing.assert_allclose(out.T_world_goal, into.T_world_start)
@@ -145,7 +146,8 @@ def test_a_part_that_matters_both_ways_is_centred_once_more(pockets: Scene) -> N
     """Cube 2 of Fig. 6: its place along the stick and across it; cube 3 is settled by fingers and slide."""
     done = moves(nominal(pockets), pockets)
     assert [len(move.transfer.centring) for move in done] == [0, 1, 0, 0, 0, 0]
-    held, centred = done[1].transfer.grips[0].T_part_tip, done[1].transfer.centring[0].T_part_tip
+    held = done[1].transfer.grips[0].T_part_tip
+    centred = done[1].transfer.centring[0].T_part_tip
     assert abs(held[:3, 0] @ centred[:3, 0]) < 1e-9
 
 

@@ -63,7 +63,8 @@ BOTH_STEPS = [
 
 
 def test_a_replay_calls_its_hooks_before_and_after_each_step_and_each_tick(scene: Scene, layout: Layout) -> None:
-    calls, plan = Calls(), Plan(scene.scenario.assembly, layout.start, layout.goals)
+    calls = Calls()
+    plan = Plan(scene.scenario.assembly, layout.start, layout.goals)
     assert replay(plan, scene, calls.hooks, fidelity="contact").outcome.code == "ok"
     assert calls.order == [("replay", plan), *BOTH_STEPS]
 
@@ -77,7 +78,8 @@ def test_a_demonstration_calls_the_same_hooks_but_for_that_of_the_plan(scene: Sc
 
 def test_a_step_that_fails_has_no_end(scene: Scene, layout: Layout) -> None:
     """The first part stands 40 mm beside where the plan has it, and the fingers close on nothing."""
-    calls, plan = Calls(), Plan(scene.scenario.assembly, layout.start, layout.goals)
+    calls = Calls()
+    plan = Plan(scene.scenario.assembly, layout.start, layout.goals)
     first = scene.scenario.assembly.operations[0].main
     aside = {**layout.start, first: pose.at((0.0, 0.04, 0.0)) @ layout.start[first]}
     assert replay(plan, scene, calls.hooks, parts_at=aside, fidelity="contact").outcome.code != "ok"

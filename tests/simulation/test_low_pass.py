@@ -37,7 +37,8 @@ def test_a_steady_push_is_shown_as_it_is_and_fades() -> None:
 
 def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     layout = draw_layout(tower.scenario, np.random.default_rng([2, 0]), tower.clearance_mm)
-    plan, single = Plan(tower.scenario.assembly, layout.start, layout.goals), [0.0]
+    plan = Plan(tower.scenario.assembly, layout.start, layout.goals)
+    single = [0.0]
     net_force = Robot._net_force
 
     def look(robot: Robot) -> list[float]:
@@ -46,7 +47,8 @@ def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypat
         return force
 
     monkeypatch.setattr(Robot, "_net_force", look)
-    peaks, singles = [], []
+    peaks = []
+    singles = []
     for scene in (tower, build_scene(tower.scenario, timestep_s=0.0005)):
         single[0] = 0.0
         peaks.append(replay(plan, scene, fidelity="contact").peak_force_n)

@@ -37,8 +37,10 @@ def corners_in(world: World, data: mujoco.MjData, geom: str) -> np.ndarray:
     """The corners of a mesh as it collides, (k, 3), world."""
     found = world.model.geom(geom)
     k = int(found.dataid[0])
-    first, count = int(world.model.mesh_vertadr[k]), int(world.model.mesh_vertnum[k])
-    R, p = data.geom_xmat[found.id].reshape(3, 3), data.geom_xpos[found.id]
+    first = int(world.model.mesh_vertadr[k])
+    count = int(world.model.mesh_vertnum[k])
+    R = data.geom_xmat[found.id].reshape(3, 3)
+    p = data.geom_xpos[found.id]
     return np.asarray(world.model.mesh_vert[first : first + count] @ R.T + p)
 
 
@@ -70,7 +72,8 @@ def test_a_shaft_is_a_true_cylinder(scene: Scene):
 
 @pytest.mark.parametrize("part", ["peg", "plate"])
 def test_mass_and_inertia_are_those_of_the_exact_solid(scene: Scene, part: str):
-    model, solid = scene.work.model, scene.scenario.assembly.solids[part]
+    model = scene.work.model
+    solid = scene.scenario.assembly.solids[part]
     body = model.body(f"{part}/{part}")
     R = np.zeros(9)
     mujoco.mju_quat2Mat(R, body.iquat)
@@ -129,11 +132,9 @@ def test_flat_ends_that_graze_a_round_part_are_not_found_deep_inside_of_it(tmp_p
     grasps = [Grasp(np.array([0.0, 0.0, 0.02]), np.array([1.0, 0.0, 0.0]))] * 2
     bodies = {"plate": PLATE, "stub": shaft(11, 0, 40, "wall", bottom="bottom", top="top")}
     its = build_scene(scenario(tmp_path, bodies, operations, [np.eye(4), pose.at((0, 0, 0.04))], start, grasps)).shown
-    data, rng, stub = (
-        initial_state(its, start | {"table": np.eye(4)}),
-        np.random.default_rng(0),
-        pose.at((0.3, 0.2, 0.3)),
-    )
+    data = initial_state(its, start | {"table": np.eye(4)})
+    rng = np.random.default_rng(0)
+    stub = pose.at((0.3, 0.2, 0.3))
     place(its, data, "stub", stub)
     for _ in range(200):
         at = (*rng.normal(scale=1e-6, size=2), 0.04 - SAGITTA_M + rng.normal(scale=1e-8))

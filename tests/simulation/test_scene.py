@@ -82,7 +82,8 @@ def test_what_cannot_be_built_is_refused_in_one_sentence(tower: Scene, how: dict
 
 
 def test_inverse_kinematics_inverts_the_forward() -> None:
-    kinematics, rng = Kinematics(find_arm("six_axis")), np.random.default_rng(3)
+    kinematics = Kinematics(find_arm("six_axis"))
+    rng = np.random.default_rng(3)
     home = find_arm("six_axis").home
     for _ in range(50):
         q = home + rng.uniform(-0.4, 0.4, 6)

@@ -37,7 +37,8 @@ def layout(name):
 
 def aside(name, mm):
     """The true plan, but for its last operation, which is this far off across the walls of its fit."""
-    truth, goals = layout(name), np.array(layout(name).goals)
+    truth = layout(name)
+    goals = np.array(layout(name).goals)
     goals[-1, :3, 3] += 1e-3 * mm * goals[-1, :3, 1]
     return Plan(scene(name).scenario.assembly, truth.start, goals)
 
@@ -56,7 +57,8 @@ def driven(law, push):
 
 
 def test_a_peg_off_by_more_than_the_play_finds_its_hole_only_by_searching():
-    name, plan = "vanished_fixture", aside("vanished_fixture", 0.6)
+    name = "vanished_fixture"
+    plan = aside("vanished_fixture", 0.6)
     blind, felt = (carried_out(plan, name, searches) for searches in (False, True))
     assert not blind.verdict.success
     assert felt.verdict.success
@@ -81,7 +83,8 @@ def row(method, level, cache=None):
 
 
 def test_where_no_hole_is_missed_nothing_changes():
-    plain, felt = row("oracle", 0.0), row("oracle+search", 0.0)
+    plain = row("oracle", 0.0)
+    felt = row("oracle+search", 0.0)
     assert plain.pop("method") == "oracle"
     assert felt.pop("method") == "oracle+search"
     assert json.dumps(felt) == json.dumps(plain)
@@ -160,7 +163,8 @@ def test_easing_gives_way_and_stops():
 def test_the_tip_goes_where_a_law_says():
     its = scene("stick_in_tower")
     robot = Robot(its, layout("stick_in_tower").start)
-    before, asked = robot.T, iter([np.array([1e-3, -1e-3, 1e-3]) * s for s in np.linspace(0.0, 1.0, 200)])
+    before = robot.T
+    asked = iter([np.array([1e-3, -1e-3, 1e-3]) * s for s in np.linspace(0.0, 1.0, 200)])
     robot.servo(lambda _: next(asked, None))
     assert robot.T[:3, 3] - before[:3, 3] == pytest.approx([1e-3, -1e-3, 1e-3])
     reached = its.kinematics.forward(robot.q)

@@ -31,7 +31,8 @@ def round_scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def plan(scene: Scene, undo_last: bool = False) -> Plan:
-    layout, last = draw_layout(scene.scenario, np.random.default_rng([1, 0])), len(scene.scenario.assembly) - 1
+    layout = draw_layout(scene.scenario, np.random.default_rng([1, 0]))
+    last = len(scene.scenario.assembly) - 1
     steps = (*(Step(k) for k in range(last + 1)), *([Step(last, undo=True)] if undo_last else []))
     return Plan(scene.scenario.assembly, layout.start, layout.goals, steps)
 
@@ -58,7 +59,9 @@ def test_what_is_carried_does_not_creep(
 def test_nothing_is_put_back_that_is_put_in_or_pulled_out_or_touches(
     shape: str, tower: Scene, round_scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene, looks, robots = tower if shape == "boxes" else round_scene, list[tuple[str, float, bool]](), list[Robot]()
+    scene = tower if shape == "boxes" else round_scene
+    looks = list[tuple[str, float, bool]]()
+    robots = list[Robot]()
     init = Robot.__init__
 
     def begin(robot: Robot, *args: Any, **more: Any) -> None:
@@ -68,7 +71,8 @@ def test_nothing_is_put_back_that_is_put_in_or_pulled_out_or_touches(
     def look(world: World, data: Any, tip: Array, carried: Carried) -> Carried:
         before = data.qpos.copy()
         after = steadied(world, data, tip, carried)
-        main, whole = carried.parts[0], {"stick": "castle1", "peg": "plate"}
+        main = carried.parts[0]
+        whole = {"stick": "castle1", "peg": "plate"}
         if main in whole:
             inside = pose.inverse(part_pose(world, data, whole[main])) @ part_pose(world, data, main)
             moved = bool((data.qpos != before).any())
@@ -87,10 +91,12 @@ def test_nothing_is_put_back_that_is_put_in_or_pulled_out_or_touches(
 
 def test_a_group_is_put_back_as_one_and_what_touches_is_left_alone() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
-    world, start = scene.work, scene.scenario.start
+    world = scene.work
+    start = scene.scenario.start
     data = initial_state(world, start)
     mujoco.mj_step(world.model, data, 100)
-    tip, parts = pose.at((0.0, 0.0, 0.4)), ("stick", "castle1")
+    tip = pose.at((0.0, 0.0, 0.4))
+    parts = ("stick", "castle1")
     resting = steadied(world, data, tip, Carried(parts, tip))
     assert resting.T_tip_part is None, "it stands on the table"
     place(world, data, "stick", pose.at((0.1, 0.0, 0.3), (0.0, 0.0, 20.0)))

@@ -51,7 +51,8 @@ def test_a_seed_without_all_levels_is_left_out() -> None:
 
 
 def test_what_both_seeds_share_cancels() -> None:
-    ours, theirs = drawn(3, "contact", 0.0, 200), drawn(3, "paper", 0.2, 200)
+    ours = drawn(3, "contact", 0.0, 200)
+    theirs = drawn(3, "paper", 0.2, 200)
     found = {(d.setting.method, d.reference): d for d in area_differences([ours, theirs, drawn(3, "none", 9.0, 200)])}
     assert set(found) == {("contact", "paper"), ("contact", "none"), ("paper", "none"), ("none", "paper")}
     pair = found["contact", "paper"]
@@ -69,7 +70,8 @@ def test_none_is_the_reference_of_methods_that_were_told_otherwise() -> None:
 
 
 def test_only_levels_that_both_have_are_compared() -> None:
-    ours, theirs = drawn(5), drawn(5, "paper")
+    ours = drawn(5)
+    theirs = drawn(5, "paper")
     fewer = Curve(theirs.setting, LEVELS[[0, 1, 3]], theirs.seeds, theirs.success[:, [0, 1, 3]])
     assert {d.levels for d in area_differences([ours, fewer])} == {(0.1, 1.0)}
     one = Curve(theirs.setting, LEVELS[[1]], theirs.seeds, theirs.success[:, [1]])

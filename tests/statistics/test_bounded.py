@@ -77,6 +77,7 @@ def test_its_ends_are_where_the_surprise_passes_its_threshold(steps: list[int]) 
 @given(steps=STEPS)
 def test_the_same_again_narrows_it(steps: list[int]) -> None:
     x = np.array(steps) / 20
-    once, twice = mean_interval(x), mean_interval(np.r_[x, x])
+    once = mean_interval(x)
+    twice = mean_interval(np.r_[x, x])
     assert once.low - 1e-6 <= twice.low
     assert twice.high <= once.high + 1e-6

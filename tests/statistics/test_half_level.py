@@ -82,7 +82,8 @@ def test_many_seeds_find_the_truth(half: float) -> None:
 def test_luck_that_levels_share_is_noticed() -> None:
     """If a seed's luck is nearly the same at every level, the half level varies more than independent trials say."""
     rng = np.random.default_rng(3)
-    levels, half = np.log(LEVELS[1:]), np.array([0.0])
+    levels = np.log(LEVELS[1:])
+    half = np.array([0.0])
     p = expit(1.5 * -levels)
     luck = rng.standard_normal((2000, 1))
     alike = (0.95 * luck + 0.31 * rng.standard_normal((2000, 6)) < ndtri(p)) * 1.0

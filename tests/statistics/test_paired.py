@@ -58,13 +58,15 @@ def test_the_limits_solve_the_score_equation(n: int, data: st.DataObject) -> Non
     """At a limit d the statistic is z, its variance from the likeliest shares (p, q), p - q = d, found by search."""
     from scipy.optimize import minimize_scalar
 
-    b, c = data.draw(st.integers(1, max(1, n // 3))), data.draw(st.integers(1, max(1, n // 3)))
+    b = data.draw(st.integers(1, max(1, n // 3)))
+    c = data.draw(st.integers(1, max(1, n // 3)))
     for d in tango(b, c, n):
 
         def minus_log_likelihood(q: float, d: float = d) -> float:
             return -b * math.log(q + d) - c * math.log(q) - (n - b - c) * math.log(max(1 - 2 * q - d, 1e-300))
 
-        least, most = max(0.0, -d), (1 - d) / 2
+        least = max(0.0, -d)
+        most = (1 - d) / 2
         q = minimize_scalar(
             minus_log_likelihood,
             (least + 1e-12, most - 1e-12),
@@ -78,7 +80,8 @@ def test_the_limits_solve_the_score_equation(n: int, data: st.DataObject) -> Non
 @pytest.mark.parametrize(("p", "q"), [(0.02, 0.02), (0.1, 0.02), (0.1, 0.1), (0.3, 0.1), (0.25, 0.25), (0.6, 0.05)])
 def test_tango_covers_in_95_of_100(p: float, q: float) -> None:
     """Exactly, over every table of 60 pairs: near the nominal 95 %, conservative where pairs are rarely discordant."""
-    n, covered = 60, 0.0
+    n = 60
+    covered = 0.0
     for b in range(n + 1):
         for c in range(n + 1 - b):
             weight = multinomial.pmf([b, c, n - b - c], n, [p, q, 1 - p - q])

@@ -50,7 +50,8 @@ def test_published_power_of_the_exact_test() -> None:
 
 @pytest.mark.parametrize(("pairs", "win", "lose"), [(12, 0.5, 0.1), (25, 0.3, 0.3), (30, 0.0, 0.4), (9, 0.0, 0.0)])
 def test_power_is_the_sum_over_every_table(pairs: int, win: float, lose: float) -> None:
-    better, worse = max(win, lose), min(win, lose)
+    better = max(win, lose)
+    worse = min(win, lose)
     expected = sum(
         multinomial.pmf([b, c, pairs - b - c], pairs, [better, worse, 1 - better - worse])
         for b, c in product(range(pairs + 1), repeat=2)
@@ -100,7 +101,8 @@ def test_what_a_hundred_show() -> None:
 @settings(max_examples=50, deadline=None)
 @given(rate=st.floats(0.0, 1.0), reference=st.floats(0.0, 1.0), part=st.floats(0.0, 1.0))
 def test_shares_give_the_rates_back(rate: float, reference: float, part: float) -> None:
-    least, most = abs(1 - rate - reference), 1 - abs(rate - reference)
+    least = abs(1 - rate - reference)
+    most = 1 - abs(rate - reference)
     agree = least + part * (most - least)
     for win, lose in (shares(rate, reference, agree), shares(rate, reference)):
         assert win - lose == pytest.approx(rate - reference, abs=1e-9)

@@ -213,7 +213,7 @@ def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | N
 
 
 def test_without_an_executed_trial_nothing_agrees() -> None:
-    (_, everything) = confusions([row(success=None)])
+    _, everything = confusions([row(success=None)])
     assert (everything.agreement, everything.excluded) == (None, 1)
     assert "nothing" in prediction_summary(everything)
 

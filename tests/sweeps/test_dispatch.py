@@ -71,7 +71,8 @@ def test_a_trial_is_late_after_its_limit_and_the_next_one_begins_anew(watch: Dis
 
 def test_what_a_late_row_says() -> None:
     """One that tells of a lost worker says why already; every other one becomes a trial that took too long."""
-    died, raised = lost(TRIAL, "", "worker_died"), misbehaved(TRIAL, "", "ok", "it raised")
+    died = lost(TRIAL, "", "worker_died")
+    raised = misbehaved(TRIAL, "", "ok", "it raised")
     took = {name: timing(row, 0.1, 4.0, 7.0, {}) for name, row in (("died", died), ("raised", raised))}
     assert in_time(raised, took["raised"], 11.0) is raised
     assert in_time(raised, took["raised"], 10.9) == lost(TRIAL, "", "time_limit")

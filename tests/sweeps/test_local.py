@@ -234,7 +234,8 @@ def test_a_replay_has_no_limit_below_zero(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_films_and_observations_work_with_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    film, seen = tmp_path / "film.gif", tmp_path / "seen.json"
+    film = tmp_path / "film.gif"
+    seen = tmp_path / "seen.json"
     trial = ["replay", "block_on_block", "--careless", "0", "--fidelity", "contact", "--method", "none"]
     written = ["--video", str(film), "--save-observation", str(seen)]
     assert main([*trial, *written, "--level", "0.1", "--trial-limit", "500", "--json"]) == 0
@@ -299,7 +300,8 @@ def test_a_corrector_that_hangs_is_ended_with_what_it_started(tmp_path: Path) ->
 
 def test_rows_of_lost_trials_have_every_column_and_no_clock() -> None:
     spec = TrialSettings("block_on_block", method="paper", seed=4)
-    died, late = lost(spec, "abc", "worker_died"), lost(spec, "abc", "time_limit")
+    died = lost(spec, "abc", "worker_died")
+    late = lost(spec, "abc", "time_limit")
     raised = misbehaved(spec, "abc", "ok", "it raised <thing at 0x7f3c12ab>; " + "x" * 5000)
     assert list(died) == list(late) == list(raised)
     assert died["spec_hash"] == raised["spec_hash"]
@@ -338,7 +340,8 @@ class Deadly:
 
 
 def test_processes_that_cannot_begin_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked, lock = grid("raises"), EnvironmentLock({}, versions())
+    asked = grid("raises")
+    lock = EnvironmentLock({}, versions())
     real = pool.Process
     monkeypatch.setattr(pool, "Process", lambda *given: real(Deadly()))  # type: ignore[arg-type]
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
@@ -481,7 +484,9 @@ def test_the_first_signal_asks_and_the_second_raises() -> None:
 
 
 def test_handlers_of_the_callers_own_stay() -> None:
-    mine, before = lambda number, frame: None, signal.getsignal(signal.SIGTERM)
+    def mine(number, frame): ...
+
+    before = signal.getsignal(signal.SIGTERM)
     signal.signal(signal.SIGTERM, mine)
     try:
         with listening() as check:

@@ -311,7 +311,10 @@ class Nodes:
     """Stands for Ray: `tasks` says what each next task answers."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, tasks: list[list[Any]], spec: SweepSettings = SPEC) -> None:
-        self.tasks, self.taken, self.cancelled, self.rows = list(tasks), list[int](), 0, list[Any]()
+        self.tasks = list(tasks)
+        self.taken = list[int]()
+        self.cancelled = 0
+        self.rows = list[Any]()
         names = {"NodeDiedError": NodeGone, "ObjectLostError": NodeGone, "RayError": Gone, "RayTaskError": KeyError}
         monkeypatch.setitem(sys.modules, "ray", self)
         monkeypatch.setitem(sys.modules, "ray.exceptions", SimpleNamespace(**names))

@@ -164,7 +164,8 @@ BAD: list[tuple[str | bytes, str]] = [
 
 @pytest.mark.parametrize(("text", "words"), BAD, ids=range(len(BAD)))
 def test_one_sentence_for_what_is_wrong(text: str | bytes, words: str, tmp_path: Path) -> None:
-    path, out = written(tmp_path, text), tmp_path / "out"
+    path = written(tmp_path, text)
+    out = tmp_path / "out"
     with pytest.raises(InputError) as refused:
         run_sweep(read_sweep(path), out)
     assert words in str(refused.value)

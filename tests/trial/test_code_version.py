@@ -37,7 +37,8 @@ def imported(file: Path, *, tables: bool = True) -> set[str]:
 
 def reached(start: Path, *, tables: bool = True) -> set[str]:
     """Every file of the package that a file can come to import, relative to it; the front door leads everywhere."""
-    todo, seen = [start], {PACKAGE / "__init__.py"}
+    todo = [start]
+    seen = {PACKAGE / "__init__.py"}
     while todo:
         file = todo.pop()
         if file in seen:

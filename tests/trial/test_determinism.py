@@ -43,7 +43,8 @@ def test_a_demonstration_is_the_same_after_others(scene: Scene) -> None:
 
 
 def test_layout_and_hand_do_not_depend_on_carelessness(scene: Scene) -> None:
-    careful, careless = record_demonstration(scene, 0.0, 4), record_demonstration(scene, 1.0, 4)
+    careful = record_demonstration(scene, 0.0, 4)
+    careless = record_demonstration(scene, 1.0, 4)
     np.testing.assert_array_equal(careful.layout.goals, careless.layout.goals)
     np.testing.assert_array_equal(careful.demonstration.goals[0], careless.demonstration.goals[0])
 
@@ -63,7 +64,8 @@ def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
 
     That 1 and 2 processes give the same, also where correctors misbehave, see `tests/sweeps/test_local.py`.
     """
-    methods, replayed = ("none", "paper"), 0.5
+    methods = ("none", "paper")
+    replayed = 0.5
     grids = (
         SweepSettings(("stick_on_castles",), (HOPELESS,), (1.0,), methods, trials=4),
         SweepSettings(("block_on_block", "stick_on_castles"), (replayed,), (1.0,), methods, trials=1, seed=21),

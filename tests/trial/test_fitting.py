@@ -64,7 +64,8 @@ def planned(name: str, seed: int, corrector: Any = plain) -> tuple[Correction, F
     ],
 )
 def test_a_plan_that_would_fail_is_moved_so_that_it_fits(name: str, seed: int, why: str) -> None:
-    scene, seen = scene_named(name), seen_at(name, seed)
+    scene = scene_named(name)
+    seen = seen_at(name, seed)
     correction, found = planned(name, seed)
     assert foretold(correction.plan(seen), scene).fails
     assert not foretold(found.plan, scene).fails
@@ -94,7 +95,8 @@ def test_a_plan_that_fits_stays_as_it_is_bit_for_bit(name: str, seed: int) -> No
 
 def test_contacts_that_are_off_are_left_alone() -> None:
     """No free direction mends them."""
-    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    seen = seen_at("carried_bridge", 96)
+    scene = scene_named("carried_bridge")
     torn = np.array(correct(seen, plain).goals)
     torn[3] = torn[3] @ pose.at((0.0, 0.002, 0.0), (0.0, 0.0, 0.0))
     correction = correct(seen, lambda _: torn)
@@ -103,7 +105,8 @@ def test_contacts_that_are_off_are_left_alone() -> None:
 
 
 def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
-    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    seen = seen_at("carried_bridge", 96)
+    scene = scene_named("carried_bridge")
     correction, first = planned("carried_bridge", 96)
     for where in (scene, scene.scenario):
         again = fitting_plan(correction, seen, where)
@@ -113,7 +116,8 @@ def test_the_same_plan_comes_twice_and_from_the_scenario_too() -> None:
 
 def test_nothing_nearer_on_the_way_back_fits_with_room() -> None:
     """The cube that would strike a castle is moved no further than for 2 mm of room."""
-    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    seen = seen_at("carried_bridge", 96)
+    scene = scene_named("carried_bridge")
     correction, found = planned("carried_bridge", 96)
     deep_mm = foretold(correction.plan(seen), scene).size_mm
     assert deep_mm is not None
@@ -136,7 +140,8 @@ def test_it_is_the_same_for_every_corrector(method: str) -> None:
 
 @pytest.mark.parametrize("method", ["none", "oracle"])
 def test_what_was_not_corrected_is_not_moved(method: str) -> None:
-    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    seen = seen_at("carried_bridge", 96)
+    scene = scene_named("carried_bridge")
     truth = scene.scenario.goals
     made = apply_method(method, seen, truth, where=scene)
     assert made.plan is not None
@@ -146,7 +151,8 @@ def test_what_was_not_corrected_is_not_moved(method: str) -> None:
 
 def test_schedules_that_take_work_apart_move_with_their_goals() -> None:
     """Targets that are the final goals follow them; earlier ones stay, and their contacts hold as before."""
-    seen, scene = seen_at("carried_bridge", 96), scene_named("carried_bridge")
+    seen = seen_at("carried_bridge", 96)
+    scene = scene_named("carried_bridge")
     correction = correct(seen, plain)
     schedule = (*map(Step, range(5)), Step(4, undo=True), Step(4))
     targets = np.array([correction.goals[step.operation] for step in schedule])

@@ -32,7 +32,8 @@ def space_of(scene: scenes.Scene) -> FreeSpace:
 def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) -> None:
     """By its optimality: it is a combination of the rows that it just meets, with factors that are not negative."""
     rng = np.random.default_rng(seed)
-    G, h = rng.normal(size=(rows, 5)), rng.normal(size=rows)
+    G = rng.normal(size=(rows, 5))
+    h = rng.normal(size=rows)
     x = shortest(G, h)
     assert x is not None
     assert (G @ x >= h - 1e-8).all()
@@ -59,7 +60,8 @@ def test_even_points_come_nearest_first_and_are_spread_as_a_normal_distribution(
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "subassembly_on_castles", "pockets"])
 def test_contacts_hold_wherever_free_directions_lead(name: str) -> None:
-    scene, rng = scenes.ALL[name](), np.random.default_rng(3)
+    scene = scenes.ALL[name]()
+    rng = np.random.default_rng(3)
     space = space_of(scene)
     np.testing.assert_allclose(space.tangent(np.zeros(len(space))), scene.goals, atol=1e-15)
     for _ in range(3):

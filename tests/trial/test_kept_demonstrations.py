@@ -37,7 +37,8 @@ def scene() -> Scene:
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The seeds of the demonstrations that were simulated, one entry each."""
-    made, seeds = kept_demonstrations.record_demonstration, list[int]()
+    made = kept_demonstrations.record_demonstration
+    seeds = list[int]()
 
     def counted(scene: Scene, careless: float, seed: int, *more: Any) -> Recording:
         seeds.append(seed)
@@ -49,7 +50,8 @@ def once(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def content(recording: Recording) -> list[Any]:
     """All of a recording but the assembly; poses as bytes, parts in their order."""
-    human, layout = recording.demonstration, recording.layout
+    human = recording.demonstration
+    layout = recording.layout
     arrays = [layout.goals, human.goals, human.careless]
     named = [[(part, T.tobytes()) for part, T in poses.items()] for poses in (layout.start, human.start, human.final)]
     return [*(a.tobytes() for a in arrays), *named, human.code, human.why, human.gap_m, human.play_m]

@@ -70,7 +70,8 @@ def test_planned_goals_and_poses_that_reach_them_have_the_same_errors(build) -> 
 
 def test_the_fixed_part_is_what_the_contacts_would_take_back() -> None:
     """To first order the shortest correction is the error in fixed directions, and nothing else."""
-    scene, error = scenes.stick_on_castles(), scenes.mm(0, 0.3, 0)
+    scene = scenes.stick_on_castles()
+    error = scenes.mm(0, 0.3, 0)
     fixed, free = errors(scene, {2: error})
     goals = scene.goals.copy()
     goals[1] = goals[1] @ error

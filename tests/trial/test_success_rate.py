@@ -50,7 +50,8 @@ METHODS |= dict.fromkeys(OTHERS, ("oracle", "none", "paper"))
 HEADLINE_METHODS = ("none", "paper", "contact")
 HEADLINE_SEEDS = range(1, 5)
 """Four of those that are simulated where things may touch, as the headline is."""
-LEVEL, CARELESS = 1.0, 1.0
+LEVEL = 1.0
+CARELESS = 1.0
 NOT_COMPARED = ("spec_hash", "reached", "thresholds", "schema", "chi_square", "p_value")
 """The headline is older than the test of `contact` that adds play up along what is carried."""
 OTHERWISE = (
@@ -140,7 +141,8 @@ def bits(name: str) -> str:
 
 @pytest.mark.slow
 def test_success_rates_are_what_they_were(all_ended: Ended) -> None:
-    recorded, verdict = json.loads(RECORD.read_text())[all_ended.name], all_ended.verdicts
+    recorded = json.loads(RECORD.read_text())[all_ended.name]
+    verdict = all_ended.verdicts
     if bits(all_ended.name) == recorded["bits"]:
         assert verdict == {method: recorded["verdicts"][method][: len(found)] for method, found in verdict.items()}
     for method, found in verdict.items():
@@ -167,7 +169,8 @@ def test_a_part_of_the_headline_runs_again_to_the_same_rows(all_ended: Ended) ->
                 left_out = (*left_out, *(name for name in NEW if recorded.get(name) is None))
                 same = {name: value for name, value in ours.items() if name not in left_out}
                 assert same == {name: value for name, value in recorded.items() if name not in left_out}
-        won, rate = sum(row["as_demonstrated"] for row in mine), rate_of(all_ended.name, method)
+        won = sum(row["as_demonstrated"] for row in mine)
+        rate = rate_of(all_ended.name, method)
         assert binom.cdf(won, len(mine), rate) > SURPRISE, f"{method} succeeded only {won} times"
         assert binom.sf(won - 1, len(mine), rate) > SURPRISE, f"{method} succeeded {won} times"
 

@@ -341,7 +341,8 @@ def test_a_measured_observation_has_no_truth(scene: Scene, shown: Recording) -> 
 
 
 def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown: Recording) -> None:
-    layout, nominal = shown.layout.goals, scene.scenario.goals
+    layout = shown.layout.goals
+    nominal = scene.scenario.goals
     exact = replace(observed(scene, shown), goals=layout)
     reference = nominal_where_seen(nominal, exact)
     np.testing.assert_allclose(reference[0], layout[0], rtol=0, atol=1e-12)

@@ -11,7 +11,10 @@ from apo_bench.io.default_looks import default_looks
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""
-_FLAT, _ROUND, _PLAIN, _REFUSED = "#8fb3d9", "#e0b070", "#cfcfcf", "#d98f8f"
+_FLAT = "#8fb3d9"
+_ROUND = "#e0b070"
+_PLAIN = "#cfcfcf"
+_REFUSED = "#d98f8f"
 _MOST_DRAWN = 30_000
 
 
@@ -54,8 +57,10 @@ def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None
             at = mesh.corners[mesh.triangles[seen[int(weight.argmax())]]].mean(axis=0) + 0.02 * mesh.extent * eye
             box = {"facecolor": "white", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
             axes.text(*at, region.name, ha="center", fontsize=9, zorder=1000, bbox=box)
-    low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
-    middle, half = (low + high) / 2.0, mesh.extent / 2.0
+    low = mesh.corners.min(axis=0)
+    high = mesh.corners.max(axis=0)
+    middle = (low + high) / 2.0
+    half = mesh.extent / 2.0
     for name, m in zip("xyz", middle, strict=True):
         getattr(axes, f"set_{name}lim")(m - half, m + half)
         getattr(axes, f"set_{name}label")(f"{name} [mm]")

@@ -24,7 +24,8 @@ def unit_line(file: CadFile) -> str:
 def import_lines(done: Imported) -> Iterator[str]:
     """One part."""
     raw = done.raw
-    low, high = raw.mesh.corners.min(axis=0), raw.mesh.corners.max(axis=0)
+    low = raw.mesh.corners.min(axis=0)
+    high = raw.mesh.corners.max(axis=0)
     yield f"{done.path.stem}: {_numbers(high - low, ' x ')} mm, {len(raw.mesh.triangles):,} triangles, watertight"
     for said in raw.said:
         yield f"  mended: {said}"

@@ -41,14 +41,16 @@ def meeting(assembly: Assembly, system: Equations) -> Meeting:
     Args:
         system: All equations, in the order of `assembly.relations()`.
     """
-    contacts, first = [r.contact for r in assembly.relations()], np.array([arc[0] for arc in assembly.arcs()], np.intp)
+    contacts = [r.contact for r in assembly.relations()]
+    first = np.array([arc[0] for arc in assembly.arcs()], np.intp)
     pairs = [
         (w, a, b)
         for w, i in enumerate(first)
         for a in _boxes(assembly, contacts[i].manipulated.part)
         for b in _boxes(assembly, contacts[i].environment.part)
     ]
-    letters, inverse = system.letters[first], system.inverse[first]
+    letters = system.letters[first]
+    inverse = system.inverse[first]
     words = Equations(
         start=system.start,
         letters=np.concatenate([letters, letters[:, ::-1]]),
@@ -75,8 +77,11 @@ def intruding(meetings: Meeting, goals: Array) -> Equations:
     T = _between(meetings.words, goals)[meetings.word]
     depth, axis, sign, reversed_ = _shortest(meetings, T)
     inside = np.flatnonzero(depth > 0)
-    side, axis, sign = reversed_[inside].astype(np.intp), axis[inside], sign[inside]
-    plane, rows = np.zeros((len(inside), 4)), np.arange(len(inside))
+    side = reversed_[inside].astype(np.intp)
+    axis = axis[inside]
+    sign = sign[inside]
+    plane = np.zeros((len(inside), 4))
+    rows = np.arange(len(inside))
     plane[rows, axis] = sign
     plane[:, 3] = -sign * meetings.centers[side, inside, axis] - meetings.halves[side, inside, axis]
     R = np.where(side[:, None, None], np.swapaxes(T[inside, :3, :3], 1, 2), T[inside, :3, :3])
@@ -107,7 +112,8 @@ def _between(words: Equations, goals: Array) -> Array:
 
 def _shortest(meetings: Meeting, T: Array) -> tuple[Array, NDArray[np.intp], Array, NDArray[np.bool_]]:
     """Depth along the shortest way out, (q,), its axis, its sign, and whether it is a side of b that is left behind."""
-    (a, b), (half_a, half_b) = meetings.centers, meetings.halves
+    a, b = meetings.centers
+    half_a, half_b = meetings.halves
     R = T[:, :3, :3]
     way_a = np.einsum("qij,qj->qi", R, b) + T[:, :3, 3] - a
     way_b = -np.einsum("qij,qi->qj", R, way_a)
@@ -115,6 +121,7 @@ def _shortest(meetings: Meeting, T: Array) -> tuple[Array, NDArray[np.intp], Arr
     depth_a = half_a + np.einsum("qij,qj->qi", spread, half_b) - np.abs(way_a)
     depth_b = half_b + np.einsum("qij,qi->qj", spread, half_a) - np.abs(way_b)
     depth = np.concatenate([depth_a, depth_b], axis=1)
-    best, rows = depth.argmin(axis=1), np.arange(len(depth))
+    best = depth.argmin(axis=1)
+    rows = np.arange(len(depth))
     way = np.concatenate([way_a, way_b], axis=1)[rows, best]
     return depth[rows, best], best % 3, np.where(way < 0, -1.0, 1.0), best >= 3

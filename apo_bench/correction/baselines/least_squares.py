@@ -44,7 +44,8 @@ def least_squares(observation: Observation, *, contact_m: float = CONTACT_M) -> 
 def _solved(observation: Observation, contact_m: float) -> Array:
     from scipy.optimize import least_squares as minimised
 
-    space, system = whitened(observation), equations(observation.assembly, observation.start, observation.goals)
+    space = whitened(observation)
+    system = equations(observation.assembly, observation.start, observation.goals)
     prior = np.eye(6 * len(observation.goals))
 
     def residual(z: Array) -> Array:

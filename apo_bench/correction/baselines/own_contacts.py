@@ -20,5 +20,6 @@ def solve_own_contacts(system: Equations, goals: Array, k: int, gap_m: float) ->
     """
     own = system.among(system.made == k)
     found = solve_newton(own, goals, (k,))
-    held, holds = system.gaps(goals) <= gap_m, system.gaps(found.goals) <= gap_m
+    held = system.gaps(goals) <= gap_m
+    holds = system.gaps(found.goals) <= gap_m
     return found.goals if found.finite and (holds | ~held).all() else goals

@@ -31,7 +31,9 @@ PENALTY_CONTACT_M = 1e-4
 ADAM_STEPS = 600
 LENGTH = 0.2
 """Step of Adam at the beginning, in standard deviations, tuned likewise."""
-_MEAN, _SQUARE, _TINY = 0.9, 0.999, 1e-8
+_MEAN = 0.9
+_SQUARE = 0.999
+_TINY = 1e-8
 """Adam's memory of the gradient and of its square, as its authors recommend, and what keeps it from dividing by 0."""
 
 
@@ -68,7 +70,8 @@ class Loss:
     def __call__(self, z: Array) -> tuple[float, Array]:
         """The loss and its gradient, (6 n,)."""
         goals = self.space.goals(z)
-        value, gradient = float(z @ z), 2 * z
+        value = float(z @ z)
+        gradient = 2 * z
         for system in (self.contacts, intruding(self.meetings, goals)):
             e, J = system.linearised(goals)
             value += float(e @ e) / self.contact_m**2
@@ -85,10 +88,12 @@ def loss(observation: Observation, contact_m: float = PENALTY_CONTACT_M) -> Loss
 def _descended(observation: Observation, contact_m: float, length: float) -> Array:
     down = loss(observation, contact_m)
     z = np.zeros(6 * len(observation.goals))
-    m, v = np.zeros_like(z), np.zeros_like(z)
+    m = np.zeros_like(z)
+    v = np.zeros_like(z)
     for t in range(1, ADAM_STEPS + 1):
         _, g = down(z)
-        m, v = _MEAN * m + (1 - _MEAN) * g, _SQUARE * v + (1 - _SQUARE) * g**2
+        m = _MEAN * m + (1 - _MEAN) * g
+        v = _SQUARE * v + (1 - _SQUARE) * g**2
         step = length * np.cos(0.5 * np.pi * t / ADAM_STEPS)
         z = z - step * (m / (1 - _MEAN**t)) / (np.sqrt(v / (1 - _SQUARE**t)) + _TINY)
     return down.space.goals(z)

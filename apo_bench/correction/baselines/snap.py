@@ -33,7 +33,8 @@ def snap(observation: Observation) -> Correction:
 
 
 def _snapped(observation: Observation) -> Array:
-    goals, space = np.array(observation.goals), whitened(observation)
+    goals = np.array(observation.goals)
+    space = whitened(observation)
     system = equations(observation.assembly, observation.start, goals)
     for k in range(len(goals)):
         goals[k] = _put(system.among(system.made == k), goals, k, space)
@@ -48,7 +49,8 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
     V)^-1 (c + V^t xi).
     """
     one = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
-    now, z = np.array(goals), np.zeros(6)
+    now = np.array(goals)
+    z = np.zeros(6)
     for _ in range(_TURNS):
         e, J = own.linearised(now)
         if not e.size:

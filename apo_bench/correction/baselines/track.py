@@ -62,7 +62,9 @@ def track_operations(observation: Observation, sets: _Sets) -> Correction:
     observation = lowered_observation(observation)
     if not observation.seen.all():
         return refused_correction(observation)
-    now, schedule, targets = np.array(observation.goals), list[Step](), list[Array]()
+    now = np.array(observation.goals)
+    schedule = list[Step]()
+    targets = list[Array]()
     steps = list[TrackedOperation]()
     for n in range(len(now)):
         steps.append(_next(observation, now[: n + 1], sets))
@@ -88,7 +90,9 @@ def _next(observation: Observation, goals: Array, sets: _Sets) -> TrackedOperati
     failing = ~(system.gaps(goals) <= observation.gap_m)
     if not failing[system.made == n].any():
         return TrackedOperation(solve_own_contacts(system, goals, n, observation.gap_m), "converged")
-    chosen, tried, last = candidates(observation.assembly.first(n + 1), failing), list[Try](), None
+    chosen = candidates(observation.assembly.first(n + 1), failing)
+    tried = list[Try]()
+    last = None
     for free in sets(chosen):
         last, left_m = _trial(system, goals, free, failing)
         if not last.finite:

@@ -49,7 +49,8 @@ def readings(observation: Observation, goals: Array, sets: Iterable[Collection[i
     Args:
         goals: (n, 4, 4), corrected, consistent with every contact.
     """
-    observation, n = lowered_observation(observation), len(goals)
+    observation = lowered_observation(observation)
+    n = len(goals)
     system = compact_equations(equations(observation.assembly, observation.start, goals), n)
     _, blocks = system.blocks(goals, np.broadcast_to(np.diag(UNITS), (n, 6, 6)))
     J = system.gathered(blocks).T

@@ -26,8 +26,10 @@ RANGE = 300.0
 """R: how far a gross error may lead in one direction, [mm] and [deg]."""
 SMALLEST = 1e-3
 """The least deviation of a component, [mm] or [deg]: none."""
-_LEAST_RATE, _MOST_RATE = 1e-4, 0.6
-_DROP, _WIDE = 1.92, 1.96
+_LEAST_RATE = 1e-4
+_MOST_RATE = 0.6
+_DROP = 1.92
+_WIDE = 1.96
 """The logarithm of the likelihood falls by this from its largest value to the end of a 95 % interval, which is so many
 standard deviations wide on either side."""
 _NUDGE = 1e-3
@@ -82,7 +84,9 @@ def learn_noise(shown: Sequence[Shown], start: Sequence[float], constant: bool) 
     """
     from scipy.optimize import minimize
 
-    k, c, C = len(start), np.zeros(6), np.zeros((6, 6))
+    k = len(start)
+    c = np.zeros(6)
+    C = np.zeros((6, 6))
     x = np.array([*(2.0 * np.log(np.maximum(start, SMALLEST))), _logit(0.05)])
     low = [2.0 * np.log(SMALLEST)] * k + [_logit(_LEAST_RATE)]
     bounds = list(zip(low, [2.0 * np.log(RANGE)] * k + [_logit(_MOST_RATE)], strict=True))
@@ -91,7 +95,8 @@ def learn_noise(shown: Sequence[Shown], start: Sequence[float], constant: bool) 
         best = minimize(_surprise, x, args=(prepared, c), jac=True, bounds=bounds, method="L-BFGS-B")
         x = np.asarray(best.x)
         if constant:
-            before, (c, C) = c, _constant(prepared, x)
+            before = c
+            c, C = _constant(prepared, x)
             if np.abs(c - before).max() < 1e-3:
                 break
     ends = _intervals(x, prepared, c, *np.array(bounds).T)
@@ -135,7 +140,9 @@ def _prepared(shown: Shown) -> _Prepared:
 
 def _surprise(x: Array, prepared: Sequence[_Prepared], c: Array) -> tuple[float, Array]:
     """-log likelihood and its derivative by log s_i^2 and the logit of the rate."""
-    total, slope, rate = 0.0, np.zeros(len(x)), _expit(x[-1])
+    total = 0.0
+    slope = np.zeros(len(x))
+    rate = _expit(x[-1])
     for one in prepared:
         logs, slopes = _by_set(x, one, c)
         top = logs.max()
@@ -149,8 +156,10 @@ def _surprise(x: Array, prepared: Sequence[_Prepared], c: Array) -> tuple[float,
 
 def _by_set(x: Array, one: _Prepared, c: Array) -> tuple[Array, Array]:
     """The logarithm of the weight of each set, (m,), and its derivative by log s_i^2, (m, k)."""
-    variance, rate = np.exp(x[:-1]), _expit(x[-1])
-    logs, slopes = np.empty(len(one.readings)), np.zeros((len(one.readings), len(x) - 1))
+    variance = np.exp(x[:-1])
+    rate = _expit(x[-1])
+    logs = np.empty(len(one.readings))
+    slopes = np.zeros((len(one.readings), len(x) - 1))
     for j, ready in enumerate(one.readings):
         logs[j] = (
             ready.gross * np.log(rate) + (one.n - ready.gross) * np.log1p(-rate) - ready.fixed_less * np.log(RANGE)
@@ -169,13 +178,16 @@ def _by_set(x: Array, one: _Prepared, c: Array) -> tuple[Array, Array]:
 
 def _constant(prepared: Sequence[_Prepared], x: Array) -> tuple[Array, Array]:
     """The most likely constant error given the rest, (6,), and its covariance, (6, 6), each set by its weight."""
-    H, g, variance = np.eye(6) / RANGE**2, np.zeros(6), np.exp(x[:-1])
+    H = np.eye(6) / RANGE**2
+    g = np.zeros(6)
+    variance = np.exp(x[:-1])
     for one in prepared:
         logs, _ = _by_set(x, one, np.zeros(6))
         ready = one.readings[int(np.argmax(logs))]
         S = np.tensordot(variance, ready.parts, 1) + ready.play + SMALLEST**2 * np.eye(len(ready.known))
         W = np.linalg.solve(S, ready.constant)
-        H, g = H + ready.constant.T @ W, g + W.T @ ready.known
+        H = H + ready.constant.T @ W
+        g = g + W.T @ ready.known
     C = np.linalg.inv(H)
     return C @ g, (C + C.T) / 2
 
@@ -193,13 +205,15 @@ def _intervals(x: Array, prepared: Sequence[_Prepared], c: Array, low: Array, hi
     C = np.linalg.pinv((H + H.T)[np.ix_(inside, inside)] / 2, hermitian=True)
     wide = np.zeros(m)
     wide[inside] = _WIDE * np.sqrt(np.maximum(np.diag(C), 0.0))
-    value, found = _surprise(x, prepared, c)[0], list[tuple[float, float]]()
+    value = _surprise(x, prepared, c)[0]
+    found = list[tuple[float, float]]()
     for j in range(m):
         without = np.where(np.arange(m) == j, low, x)
         if inside[j] and _surprise(without, prepared, c)[0] - value > _DROP:
             found.append((max(x[j] - wide[j], low[j]), min(x[j] + wide[j], high[j])))
             continue
-        near, far = x[j], high[j]
+        near = x[j]
+        far = high[j]
         while far - near > _NUDGE and x[j] < high[j] - _NUDGE:
             at = x.copy()
             at[j] = (near + far) / 2

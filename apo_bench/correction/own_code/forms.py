@@ -22,7 +22,8 @@ from apo_bench.geometry.solid import Box, Face, Piece, Solid
 
 def observation_message(observation: Observation) -> CorrectorMessage:
     """All that a corrector may use."""
-    assembly, parts = observation.assembly, list(observation.start)
+    assembly = observation.assembly
+    parts = list(observation.start)
     form = {
         "solids": [[part, _solid_form(solid)] for part, solid in assembly.solids.items()],
         "operations": [

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 FRAME_HEADER = struct.Struct("!II")
 _TYPES = ("float64", "bool")
-_LARGEST_JSON, _LARGEST_NUMBERS = 1 << 24, 1 << 26
+_LARGEST_JSON = 1 << 24
+_LARGEST_NUMBERS = 1 << 26
 """Bytes; beyond, nothing is read."""
 _CHUNK = 1 << 20
 
@@ -68,7 +69,8 @@ def receive(of: socket.socket, wait: _Wait = lambda: None) -> CorrectorMessage:
     size, length = FRAME_HEADER.unpack(_read(of, FRAME_HEADER.size, wait))
     if size > _LARGEST_JSON or length > _LARGEST_NUMBERS:
         raise GarbledMessage("the message is too large")
-    text, numbers = _read(of, size, wait), _read(of, length, wait)
+    text = _read(of, size, wait)
+    numbers = _read(of, length, wait)
     try:
         form = json.loads(text)
         return form, _arrays(form.pop("arrays"), numbers)
@@ -77,7 +79,8 @@ def receive(of: socket.socket, wait: _Wait = lambda: None) -> CorrectorMessage:
 
 
 def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
-    found, at = {}, 0
+    found = {}
+    at = 0
     for name, (kind, shape) in stated.items():
         if kind not in _TYPES or not all(type(size) is int and size >= 0 for size in shape):
             raise GarbledMessage("an array of another type")

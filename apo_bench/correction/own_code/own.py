@@ -118,8 +118,10 @@ class _OwnCorrector:
     """Stands for a function in another process: `Observation -> Correction`."""
 
     def __init__(self, name: str, server: Server, limit_s: float) -> None:
-        self.__name__, self.__module__ = name, name.partition(":")[0]
-        self._server, self._limit_s = server, limit_s
+        self.__name__ = name
+        self.__module__ = name.partition(":")[0]
+        self._server = server
+        self._limit_s = limit_s
 
     def __call__(self, observation: Observation) -> Correction:
         """Ask it.

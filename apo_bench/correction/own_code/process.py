@@ -56,7 +56,8 @@ class Server:
         process, control = self._running()
         here, there = _pair()
         deadline = time.monotonic() + limit_s
-        self._asked, self._code = self._asked + 1, None
+        self._asked = self._asked + 1
+        self._code = None
         whole = False
         try:
             with here:
@@ -148,7 +149,8 @@ class Server:
 
     def _exit_code(self) -> int | None:
         """The exit code of the fork that is gone; None if the process of the module is gone too, or does not say."""
-        deadline, control = time.monotonic() + _NOTICE_S, self._control
+        deadline = time.monotonic() + _NOTICE_S
+        control = self._control
         assert control is not None
         try:
             while self._code is None and connection.wait([control], max(0.0, deadline - time.monotonic())):

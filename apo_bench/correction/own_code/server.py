@@ -28,7 +28,8 @@ from apo_bench.names import admit, own_modules_in
 NOTICE = struct.Struct("!Ii")
 """To the process that asks: how many requests there were, and the exit code of the one that ended; first 0, 0."""
 _TURN_S = 0.02
-_DEATH_SIGNAL, _SUBREAPER = 1, 36
+_DEATH_SIGNAL = 1
+_SUBREAPER = 36
 """Two options of `prctl`, on Linux."""
 _LARGEST_FILE = 1 << 30
 """Bytes; also of a file that standard error goes to, so that endless output does not fill the disk."""
@@ -83,7 +84,8 @@ def _answer(request: socket.socket) -> None:
 
 def _serve(asking: socket.socket, fork: bool) -> None:
     """Do request after request, until nobody asks."""
-    number, child = 0, 0
+    number = 0
+    child = 0
     with suppress(OSError):
         asking.send(NOTICE.pack(0, 0))
         while True:

@@ -80,7 +80,8 @@ class Hypothesis:
     @cached_property
     def badness(self) -> float:
         """-2 log of how likely states and views are together, but for a constant; infinite if there is no solution."""
-        made, observation = self.correction, self.observation
+        made = self.correction
+        observation = self.observation
         if not made.ok or made.test is None or not self._faces_oppose():
             return np.inf
         wide = np.array(observation.covariance)
@@ -89,7 +90,8 @@ class Hypothesis:
         xi = pose.log(pose.inverse(observation.goals) @ made.goals)
         L = noise_factor(replace(observation, covariance=wide))
         _, Jt = linearised_by(system, made.goals, right_jacobian(xi) @ L)
-        soft, false = soft_deviation(observation), np.zeros(Jt.shape[1])
+        soft = soft_deviation(observation)
+        false = np.zeros(Jt.shape[1])
         if self.dropped:
             wrong = np.repeat(~observation.assembly.without(self.dropped), 3)
             each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
@@ -97,7 +99,8 @@ class Hypothesis:
             false = np.where(wrong, system.residual(made.goals) / each, 0.0)
         S = Jt.T @ Jt + np.diag(soft * soft)
         unlikely = made.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
-        model, states = self.case.model, zip(self.case.views, self.states, strict=True)
+        model = self.case.model
+        states = zip(self.case.views, self.states, strict=True)
         surprise = sum(merged(views, state, model).surprise for views, state in states)
         return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
 
@@ -145,14 +148,17 @@ def as_stated(observation: Observation) -> Correction:
 def believed_observation(case: Case, states: States) -> Observation:
     """Views merged, and what is not believed inferred; shared errors and tails of several views are not kept."""
     first = case.observation
-    goals, covariance, unknown = np.array(first.goals), np.array(first.covariance), list[int]()
+    goals = np.array(first.goals)
+    covariance = np.array(first.covariance)
+    unknown = list[int]()
     for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
         found = merged(views, state, case.model)
         if found.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN
         else:
-            goals[k], covariance[k] = found.goal, found.covariance
+            goals[k] = found.goal
+            covariance[k] = found.covariance
     seen = np.ones(len(states), dtype=np.bool_)
     believed = replace(first, goals=goals, covariance=covariance, seen=seen)
     if any(len(views) > 1 for views in case.views):

@@ -87,7 +87,9 @@ class Inferred(NamedTuple):
 
 def inferred_goals(observation: Observation, unknown: Collection[int]) -> Inferred:
     """The goals of an observation, those of `unknown` operations, counted from 0, replaced by what contacts say."""
-    goals, left, baseless = np.array(observation.goals), set(unknown), list[int]()
+    goals = np.array(observation.goals)
+    left = set(unknown)
+    baseless = list[int]()
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
     for k in left:
         if not np.isfinite(goals[k]).all():
@@ -110,7 +112,8 @@ def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
     Args:
         assembly: As `lowered` makes it.
     """
-    found, told = list[Ends | None](), set[tuple[int, Contact]]()
+    found = list[Ends | None]()
+    told = set[tuple[int, Contact]]()
     for contact, made, _ in assembly.relations():
         given = assembly.given(contact)
         ends = _flat_ends(assembly, contact) if given is contact else _round_ends(assembly, contact, given)
@@ -129,7 +132,8 @@ def _flat_ends(assembly: Assembly, contact: Contact) -> Ends:
 
 def _round_ends(assembly: Assembly, contact: Contact, given: Contact) -> Ends | None:
     """What a contact of sheets tells of that of round faces; of cones the one that says where they sit tells all."""
-    kind, ends = contact_kind(*map(assembly.face_of, given)), _flat_ends(assembly, contact)
+    kind = contact_kind(*map(assembly.face_of, given))
+    ends = _flat_ends(assembly, contact)
     own = {of.part: of.face for of in given}
     a, b = (assembly.solids[of.part].rounds.get(own[of.part]) for of in contact)
     assert b is not None
@@ -143,18 +147,18 @@ def _round_ends(assembly: Assembly, contact: Contact, given: Contact) -> Ends | 
 
 def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collection[int]) -> list[_Said]:
     """What contacts say of operation k that depend on no other operation of those left."""
-    p, poses, found = len(start), np.concatenate([start, goals]), list[_Said]()
+    p = len(start)
+    poses = np.concatenate([start, goals])
+    found = list[_Said]()
     others = {p + other for other in left if other != k}
     for word, ends in zip(pattern(assembly).words, contact_ends(assembly), strict=True):
         letters = [letter for letter, _ in word]
         if ends is None or letters.count(p + k) != 1 or others.intersection(letters):
             continue
         j = letters.index(p + k)
-        before, behind, inverted = (
-            pose.inverse(product(word[:j], poses)),
-            product(word[j + 1 :], poses),
-            word[j].inverse,
-        )
+        before = pose.inverse(product(word[:j], poses))
+        behind = product(word[j + 1 :], poses)
+        inverted = word[j].inverse
         a = before[:3, :3] @ ends.directions[0], pose.apply(before, ends.middles[0][None])[0]
         b = behind[:3, :3] @ ends.directions[1], pose.apply(behind, ends.middles[1][None])[0]
         (own, at), (other, there) = (a, b) if inverted else (b, a)
@@ -179,9 +183,13 @@ def _placed(told: Sequence[_Said], seen: Array) -> Array:
     T = np.eye(4)
     T[:3, :3] = R = _turned(told, seen[:3, :3])
     exact = [one.exact(R) for one in told]
-    A, b, fixed = np.zeros((3, 3)), np.zeros(3), _across(np.concatenate(exact))
+    A = np.zeros((3, 3))
+    b = np.zeros(3)
+    fixed = _across(np.concatenate(exact))
     for one, known in zip(told, exact, strict=True):
-        off, across, along = one.there - R @ one.at, 1.0 / one.ends.reach_m**2, 1.0 / _PLANE_M**2
+        off = one.there - R @ one.at
+        across = 1.0 / one.ends.reach_m**2
+        along = 1.0 / _PLANE_M**2
         ways = [fixed @ way for way in known]
         A += sum(along * np.outer(way, way) for way in ways) + across * np.eye(3)
         b += sum(along * way * (way @ off) for way in ways) + across * off

@@ -57,17 +57,21 @@ class RobustCorrector:
 
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
-        given, observation = observation, lowered_observation(observation)
+        given = observation
+        observation = lowered_observation(observation)
         model = self.outliers or observation.outliers or OutlierModel()
         if look is None and observation.seen.all() and model.surprises[INLIER] < model.surprises[GROSS]:
             # One view of each operation, an inlier more likely than not: nothing is searched while the test holds.
             made = as_stated(observation)
             if made.ok and made.test is not None and made.test.p_value >= self.level:
                 return replace(made, sentence=made.sentence + _unexplained(made))
-        views, again, first = views_of(observation), list[int](), None
+        views = views_of(observation)
+        again = list[int]()
+        first = None
         while True:
             case = Case(observation, views, model)
-            search, baseless = Search(case, self.level), _baseless(observation, views)
+            search = Search(case, self.level)
+            baseless = _baseless(observation, views)
             found = None if baseless else search.likeliest()
             first = first or search.first
             asked = baseless or unsure(search, found)
@@ -101,7 +105,8 @@ def unsure(search: Search, found: Hypothesis | None) -> tuple[int, ...]:
 
 def with_room(found: Hypothesis) -> Hypothesis:
     """A hypothesis whose left-out operations lead to where there is room for their parts."""
-    unknown, covariance = found.left_out, found.correction.covariance
+    unknown = found.left_out
+    covariance = found.correction.covariance
     if not unknown or covariance is None or not np.isfinite(found.badness):
         return found
 

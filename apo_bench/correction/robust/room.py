@@ -22,11 +22,13 @@ from apo_bench.geometry.overlap import face_area, overlap_area
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face
 
-TRIED, LEAST_TRIED = 24, 8
+TRIED = 24
+LEAST_TRIED = 8
 """Places that are tried for all operations together, and for each at least."""
 _COVERED = 0.02
 """Faces that touch cover at least this part of the smaller one."""
-_FREE_M, _WEIGHTS = 2e-3, np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
+_FREE_M = 2e-3
+_WEIGHTS = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
 """A direction is free if the goal may be off by more than this along it, [m]; a radian weighs as much as 50 mm."""
 _DEEP_M = 5e-4
 """Parts that should not touch may be so deep in each other before another place is tried."""
@@ -45,7 +47,10 @@ class Crowding(NamedTuple):
 
 def crowding(observation: Observation, goals: Array) -> Crowding:
     """How much parts are in each other's way, or beside each other, if the goals, (n, 4, 4), are reached exactly."""
-    assembly, depth, bare, missed = observation.assembly, 0.0, 0.0, 0
+    assembly = observation.assembly
+    depth = 0.0
+    bare = 0.0
+    missed = 0
     for operation, at in zip(assembly.operations, placements(assembly, observation.start, goals), strict=True):
         touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
         for part in operation.moves:
@@ -55,7 +60,8 @@ def crowding(observation: Observation, goals: Array) -> Crowding:
                     depth += deep if deep > _DEEP_M else 0.0
         for m, e in dict.fromkeys(map(assembly.given, operation.contacts)):
             covered = _covered(assembly.face_of(m), at[m.part], assembly.face_of(e), at[e.part])
-            bare, missed = bare + 1.0 - covered, missed + (covered < _COVERED)
+            bare = bare + 1.0 - covered
+            missed = missed + (covered < _COVERED)
     return Crowding(missed, depth, bare)
 
 
@@ -101,7 +107,8 @@ def least_crowded(
     Returns:
         None if the given goals are as good as any that were tried, or nothing is wrong with them.
     """
-    best, found = crowding(observation, goals), None
+    best = crowding(observation, goals)
+    found = None
     for k in doubted:
         if best.missed == 0 and best.depth == 0.0:
             break
@@ -111,5 +118,6 @@ def least_crowded(
             moved[k] = T
             made = solve(moved)
             if made is not None and (now := crowding(observation, made)) < best:
-                best, found = now, made
+                best = now
+                found = made
     return found

@@ -53,7 +53,8 @@ class Search:
         """Args:
         level: As of `RobustCorrector`.
         """
-        self._case, self._level = case, level
+        self._case = case
+        self._level = level
         self._beliefs = [beliefs(views, case.model) for views in case.views]
         self._solved: dict[tuple[States, tuple[str, ...]], Hypothesis] = {}
         self.operations = len(case.views)
@@ -115,7 +116,8 @@ class Search:
 
     def _sets(self, start: States) -> Iterator[list[States]]:
         """States in which some operations are in another than at the start, size by size, the best agreeing first."""
-        rest, seen = Rest(self._case, start), [k for k, views in enumerate(self._case.views) if views]
+        rest = Rest(self._case, start)
+        seen = [k for k, views in enumerate(self._case.views) if views]
         other = {k: [state for _, state in self._beliefs[k] if state != start[k]] for k in seen}
         size = {k: self._size(k, start[k]) for k in other}
         for some in self._grown(size, rest):
@@ -166,7 +168,8 @@ class Search:
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
         """Relations, or those that depend on an operation, without which the rest agrees."""
-        assembly, rest = self._case.observation.assembly, Rest(self._case, states)
+        assembly = self._case.observation.assembly
+        rest = Rest(self._case, states)
         letters = pattern(assembly).letters - len(assembly.solids)
         for i, arc in enumerate(assembly.arcs()):
             if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:
@@ -196,14 +199,16 @@ class Rest:
     """How well contacts agree that none of some operations has a part in, linearised once at what was seen."""
 
     def __init__(self, case: Case, states: States) -> None:
-        seen, self._unknown = believed_observation(case, states), unbelieved(states)
+        seen = believed_observation(case, states)
+        self._unknown = unbelieved(states)
         system = seen_system(seen)
         self._e, self._Jt = linearised_by(system, seen.goals, noise_factor(seen))
         known = np.delete(seen.covariance, self._unknown, axis=0)
         turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
         soft = np.hypot(soft_deviation(seen), turned * turned * _LEVER_M)
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
-        letters, c = pattern(seen.assembly).letters - len(seen.assembly.solids), len(system)
+        letters = pattern(seen.assembly).letters - len(seen.assembly.solids)
+        c = len(system)
         self._uses = (letters[..., None] == np.arange(len(seen.goals))).any(axis=1)
         each = self._e.reshape(c, 3, 1), self._S.reshape(c, 3, c, 3)[np.arange(c), :, np.arange(c)]
         self._alone = (each[0] * np.linalg.solve(each[1], each[0])).sum(axis=(1, 2))

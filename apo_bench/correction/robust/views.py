@@ -18,7 +18,9 @@ from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-INLIER, BROAD, GROSS = 0, 1, 2
+INLIER = 0
+BROAD = 1
+GROSS = 2
 State = tuple[int, ...]
 """One of these for each view of an operation; empty if it was never seen."""
 ROOM = np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi))
@@ -115,7 +117,8 @@ def _mean(views: Sequence[View]) -> tuple[Array, Array, float]:
     """The most likely pose, its covariance, and the squared length of all deviations from it."""
     goals = np.array([view.goal for view in views])
     W = np.linalg.inv([view.covariance for view in views])
-    C, T = np.linalg.inv(W.sum(axis=0)), goals[-1]
+    C = np.linalg.inv(W.sum(axis=0))
+    T = goals[-1]
     for _ in range(_TURNS):
         T = T @ pose.exp(C @ np.einsum("kij,kj->i", W, pose.log(pose.inverse(T) @ goals)))
     xi = pose.log(pose.inverse(T) @ goals)

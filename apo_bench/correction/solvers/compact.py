@@ -26,7 +26,8 @@ from apo_bench.geometry.twist import GENERATORS
 
 _GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
 _ONE = np.eye(4)
-ROUNDING, SMALLEST = 1e-15, 1e-300
+ROUNDING = 1e-15
+SMALLEST = 1e-300
 """Pivots of vertices on a line, as part of the mean square of their ways, and of vertices that coincide."""
 
 
@@ -115,7 +116,8 @@ class CompactEquations:
 
     def gathered(self, blocks: Array) -> Array:
         """The transposed Jacobian (*, 6 n, 3 c) out of its blocks (*, c, w, 6, 3)."""
-        lead, c = blocks.shape[:-4], len(self)
+        lead = blocks.shape[:-4]
+        c = len(self)
         J = np.zeros((*lead, self.n + 1, c, 6, 3))
         if self._once:
             J[..., self.columns, np.arange(c)[:, None], :, :] = blocks
@@ -158,16 +160,20 @@ class CompactEquations:
     @cached_property
     def _constants(self) -> Array:
         """(2 (p + n + 1), 4, 4): all matrices and then their inverses, of the goals only the last row."""
-        p, n = len(self.start), self.n
+        p = len(self.start)
+        n = self.n
         stack = np.zeros((2, p + n + 1, 4, 4))
-        stack[:, p:, 3, 3], stack[:, p + n] = 1.0, _ONE
-        stack[0, :p], stack[1, :p] = self.start, pose.inverse(self.start)
+        stack[:, p:, 3, 3] = 1.0
+        stack[:, p + n] = _ONE
+        stack[0, :p] = self.start
+        stack[1, :p] = pose.inverse(self.start)
         return stack.reshape(-1, 4, 4)
 
     def _behind(self, F: Array) -> Array:
         """(everything from letter j on) v, (*, w + 1, c, 3, 4)."""
         c, w = self.letters.shape
-        points, transposed = np.empty((*F.shape[:-4], w + 1, c, 3, 4)), np.swapaxes(F, -1, -2)
+        points = np.empty((*F.shape[:-4], w + 1, c, 3, 4))
+        transposed = np.swapaxes(F, -1, -2)
         points[..., w, :, :, :] = self.points
         for j in reversed(range(w)):
             np.matmul(points[..., j + 1, :, :, :], transposed[..., j, :, :], out=points[..., j, :, :, :])
@@ -175,10 +181,12 @@ class CompactEquations:
 
     def _factors(self, T: Array) -> Array:
         """Every letter of every word, (*, c, w, 4, 4)."""
-        p, n = len(self.start), self.n
+        p = len(self.start)
+        n = self.n
         stack = np.empty((*T.shape[:-3], 2 * (p + n + 1), 4, 4))
         stack[:] = self._constants
-        stack[..., p : p + n, :, :], back = T, stack[..., 2 * p + n + 1 : 2 * (p + n) + 1, :, :]
+        back = stack[..., 2 * p + n + 1 : 2 * (p + n) + 1, :, :]
+        stack[..., p : p + n, :, :] = T
         back[..., :3, :3] = np.swapaxes(T[..., :3, :3], -1, -2)
         back[..., :3, 3:] = -back[..., :3, :3] @ T[..., :3, 3:]
         return stack.take(self._rows, axis=-3)
@@ -251,7 +259,8 @@ def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) 
         start: (p, 4, 4).
         plane: (c, 4), shifted to where contacts are asked to be.
     """
-    known, base = pattern(assembly), _words_alone(assembly)
+    known = pattern(assembly)
+    base = _words_alone(assembly)
     system = base.placed(start, plane, base.points)
     words = system.words(goals)
     maps = np.where(known.laid[:, None, None], _drops(assembly) @ pose.inverse(words), _ONE)
@@ -273,9 +282,12 @@ def _drops(assembly: Assembly) -> Array:
 @remembered
 def _words_alone(assembly: Assembly) -> CompactEquations:
     """The words of an assembly, all parts at the origin, and its corners as they are."""
-    known, p, n = pattern(assembly), len(assembly.solids), len(assembly)
+    known = pattern(assembly)
+    p = len(assembly.solids)
+    n = len(assembly)
     k = known.letters - p
-    columns, start = np.where((k >= 0) & (k < n), k, n), np.tile(_ONE, (p, 1, 1))
+    columns = np.where((k >= 0) & (k < n), k, n)
+    start = np.tile(_ONE, (p, 1, 1))
     points = moments(known.corners[:, :3], known.contact, len(known.letters))
     return CompactEquations(start, known.letters, columns, known.inverse, known.plane, points, n)
 
@@ -295,9 +307,11 @@ def moments(vertex: Array, contact: NDArray[np.intp], c: int) -> Array:
     center = np.add.reduceat(vertex, begin) / count[:, None]
     off = vertex - center[contact]
     S = np.add.reduceat(off[:, :, None] * off[:, None, :], begin)
-    points[:, 0, :3], points[:, 0, 3] = center, 1.0
+    points[:, 0, :3] = center
+    points[:, 0, 3] = 1.0
     points[:, 0] *= np.sqrt(count)[:, None]
-    at, least = np.arange(c), ROUNDING * S.reshape(c, 9)[:, ::4].sum(axis=1) + SMALLEST
+    at = np.arange(c)
+    least = ROUNDING * S.reshape(c, 9)[:, ::4].sum(axis=1) + SMALLEST
     for k in (1, 2):
         pivot = S.reshape(c, 9)[:, ::4].argmax(axis=1)
         a = S[at, pivot]

@@ -36,8 +36,12 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
         e, Jt = _linearised(system, observed, L, z)
         U, w, Vt = np.linalg.svd(Jt)
         rank = int(np.count_nonzero(w > _RANK * w[0]))
-        N, U, w, Vt = U[:, rank:], U[:, :rank], w[:rank], Vt[:rank]
-        multipliers, towards = -Vt.T @ (U.T @ z / w), -U @ (Vt @ e / w)
+        N = U[:, rank:]
+        U = U[:, :rank]
+        w = w[:rank]
+        Vt = Vt[:rank]
+        multipliers = -Vt.T @ (U.T @ z / w)
+        towards = -U @ (Vt @ e / w)
         _, beside = _linearised(system, observed, L, z + _APART * N.T)
         bent = N + ((beside - Jt) @ multipliers).T / _APART
         curvature, axes = np.linalg.eigh((N.T @ bent + bent.T @ N) / 2.0)

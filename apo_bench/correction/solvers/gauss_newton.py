@@ -115,7 +115,8 @@ def nearest_goals(
         begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
         compiled: Whether kernels are used where Numba is installed.
     """
-    lead, n = goals.shape[:-3], system.n
+    lead = goals.shape[:-3]
+    n = system.n
     b = math.prod(lead)
     factor = np.broadcast_to(L, (*lead, *L.shape[-3:])).reshape(b, *L.shape[-3:])
     z = None if begin is None else begin.reshape(b, 6 * n)
@@ -139,7 +140,8 @@ def batch_goals(
     Args:
         sparse: Whether matrices are sparse, of a batch of one without shared errors; None leaves that to its size.
     """
-    b, unknowns = len(observed), 6 * system.n
+    b = len(observed)
+    unknowns = 6 * system.n
     z = np.zeros((b, unknowns)) if begin is None else np.array(begin)
     if sparse is None:
         sparse = b == 1 and unknowns > LARGEST_DENSE and L.shape[-1] == 6
@@ -157,17 +159,23 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
     Args:
         z: (b, 6 n), where to begin; overwritten.
     """
-    b, count = len(z), 0
-    at_rest, finite = np.zeros(b, dtype=np.bool_), np.ones(b, dtype=np.bool_)
-    before, turns = np.full(b, np.inf), np.full((MOST_TURNS, b, 2), np.nan)
+    b = len(z)
+    count = 0
+    at_rest = np.zeros(b, dtype=np.bool_)
+    finite = np.ones(b, dtype=np.bool_)
+    before = np.full(b, np.inf)
+    turns = np.full((MOST_TURNS, b, 2), np.nan)
     going = np.arange(b)
     step.linearise(z, going)
     while len(going) and count < MOST_TURNS:
-        row_size, gap2 = step.row_size[going], step.gap2[going]
+        row_size = step.row_size[going]
+        gap2 = step.gap2[going]
         sound = np.isfinite(row_size + gap2)
         if not sound.all():
             finite[going[~sound]] = False
-            going, row_size, gap2 = going[sound], row_size[sound], gap2[sound]
+            going = going[sound]
+            row_size = row_size[sound]
+            gap2 = gap2[sound]
         if not len(going):
             break
         # The step to the shortest z on the linearised contacts, J J^t damped by mu.

@@ -33,11 +33,13 @@ _EXACT = 1e-10
 _TURNS = 200
 _SETTLED = 60
 """The turn as which the equations are damped: they hold already."""
-_SLOWEST, _GROWS = 1.0 / 64.0, 1.05
+_SLOWEST = 1.0 / 64.0
+_GROWS = 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
 _TOUCH_M = 1e-9
 """An inequality is active if a vertex is nearer to its bound."""
-_HARD, _SOFT = 0, 8
+_HARD = 0
+_SOFT = 8
 """What DAQP calls an inequality, and one that may be violated."""
 
 
@@ -62,7 +64,8 @@ class Inequalities:
 
     def overstepped(self, goals: Array) -> Array:
         """By how much the worst vertex of each contact is beyond its bounds at the goals, [m]; 0 if none is."""
-        e, worst = self.system.residual(goals), np.zeros(len(self.system.letters))
+        e = self.system.residual(goals)
+        worst = np.zeros(len(self.system.letters))
         np.maximum.at(worst, self.system.contact, np.maximum(self.low - e, e - self.high))
         return worst
 
@@ -114,8 +117,16 @@ def nearest_between(
             f"walls with {system.n} operations were given, up to {LARGEST_POSTERIOR // 6} are allowed; "
             'ask for "centred" contacts instead.'
         )
-    known, before, turns, pace = jacobian_rank(start.Jt), np.inf, list(start.turns), 1.0
-    z, T, B, rest, Jt, last = start.z, start.goals, start.B, False, start.Jt, np.zeros(len(start.z))
+    known = jacobian_rank(start.Jt)
+    before = np.inf
+    turns = list(start.turns)
+    pace = 1.0
+    z = start.z
+    T = start.goals
+    B = start.B
+    rest = False
+    Jt = start.Jt
+    last = np.zeros(len(start.z))
     for _ in range(_TURNS):
         e, Jt = linearised_by(system, T, B)
         nearest = _settled(e, Jt, z)
@@ -133,7 +144,9 @@ def nearest_between(
         last = step if rest else shortened_step(step[None], L[None])[0]
         z = z + (step if rest else pace * last)
         D, Jr = exp_and_jacobian(spread(L, z))
-        T, B, before = observed @ D, Jr @ L, length
+        T = observed @ D
+        B = Jr @ L
+        before = length
         if over:
             break
     return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), np.array(turns))
@@ -143,7 +156,8 @@ def _settled(e: Array, Jt: Array, z: Array) -> Array:
     """The shortest z that satisfies the linearised equations, (6 n,), damped as if they held."""
     if not len(e):
         return np.zeros(len(z))
-    J, m = Jt.T[None], len(e)
+    J = Jt.T[None]
+    m = len(e)
     mu = damping(np.array([np.square(J).sum() / m]), np.array([e @ e / m]), _SETTLED)
     return np.asarray(shortest(J, e[None], z[None], np.full((1, m), mu))[0])
 
@@ -183,7 +197,9 @@ def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, boo
     A = J @ free
     size = np.sqrt((A * A).sum(axis=1))
     seeing = size > _BLIND * np.sqrt((J * J).sum(axis=1))
-    A, low, high = A[seeing] / size[seeing, None], low[seeing] / size[seeing], high[seeing] / size[seeing]
+    A = A[seeing] / size[seeing, None]
+    low = low[seeing] / size[seeing]
+    high = high[seeing] / size[seeing]
     k = A.shape[1]
     if not len(A) or not k:
         return np.zeros(k), True

@@ -82,7 +82,9 @@ def linearised(
         T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c) and J (b, 3 c, 6 n), and their sizes as
             `LinearStep` has them, (b,) each.
     """
-    n, c, w = observed.shape[1], len(plane), words.shape[2]
+    n = observed.shape[1]
+    c = len(plane)
+    w = words.shape[2]
     first = factors.shape[1] - 1 - n
     for o in rows:
         for k in range(n):
@@ -162,7 +164,8 @@ def linearised(
                 for d in range(4):
                     behind[last, r, d] = points[o, i, r, d]
             for j in range(last - 1, -1, -1):
-                side, letter = words[2, i, j], words[0, i, j]
+                side = words[2, i, j]
+                letter = words[0, i, j]
                 for r in range(3):
                     for d in range(4):
                         t = 0.0
@@ -181,7 +184,8 @@ def linearised(
             for d in range(4):
                 forms[0, d] = plane[i, d]
             for j in range(last):
-                side, letter = words[2, i, j], words[0, i, j]
+                side = words[2, i, j]
+                letter = words[0, i, j]
                 for d in range(4):
                     t = 0.0
                     for q in range(4):
@@ -192,7 +196,8 @@ def linearised(
                     at, sign = (j, -1.0) if side == 1 else (j + 1, 1.0)
                     for r in range(3):
                         for d in range(3):
-                            x, y = (d + 1) % 3, (d + 2) % 3
+                            x = (d + 1) % 3
+                            y = (d + 2) % 3
                             shift = sign * behind[at, r, 3] * forms[at, d]
                             turn = sign * (behind[at, r, x] * forms[at, y] - behind[at, r, y] * forms[at, x])
                             for q in range(6):
@@ -227,7 +232,8 @@ def change(
         length: (rows,), overwritten: its largest component.
         turned: (rows,), overwritten: the largest turn of a goal, [rad].
     """
-    m, size = e.shape[1], z.shape[1]
+    m = e.shape[1]
+    size = z.shape[1]
     for x in range(len(rows)):
         o = rows[x]
         # Row by row: J J^t, its factor, J z - e, and the first substitution.

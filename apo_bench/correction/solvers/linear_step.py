@@ -16,7 +16,8 @@ from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import ADJOINTS, SERIES, exp_and_jacobian
 
-SURE, NEXT = 1e-6, 1e-9
+SURE = 1e-6
+NEXT = 1e-9
 """When the solver rests with dense matrices: `sure` and `following` of `gauss_newton.settles`."""
 Rows = NDArray[np.intp]
 """Numbers of observations of a batch."""
@@ -67,11 +68,17 @@ class DenseStep:
     def __init__(
         self, system: CompactEquations, observed: Array, L: Array, soft_m: Array | None, kernels: Kernels | None
     ) -> None:
-        b, n, m = len(observed), system.n, 3 * len(system)
-        self._system, self._observed, self._L = system, observed, L
+        b = len(observed)
+        n = system.n
+        m = 3 * len(system)
+        self._system = system
+        self._observed = observed
+        self._L = L
         self._soft2 = np.zeros(m) if soft_m is None else soft_m * soft_m
-        self.T, self.B = np.empty((b, n, 4, 4)), np.empty(L.shape)
-        self.e, self._J = np.empty((b, m)), np.empty((b, m, 6 * n))
+        self.T = np.empty((b, n, 4, 4))
+        self.B = np.empty(L.shape)
+        self.e = np.empty((b, m))
+        self._J = np.empty((b, m, 6 * n))
         self.gap_m, self.gap2, self.row_size = np.empty((3, b))
         self._kernels = kernels if L.shape[-1] == 6 else None
         if self._kernels is not None:
@@ -94,20 +101,26 @@ class DenseStep:
             self._kernels.linearised(*seen, z, rows, SERIES, ADJOINTS, *self._scratch, *out)
             return
         # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
-        some, m = self._views(rows), max(self.e.shape[1], 1)
+        some = self._views(rows)
+        m = max(self.e.shape[1], 1)
         L = self._L[some]
         D, Jr = exp_and_jacobian(twists(z[some], L))
         T = self._observed[some] @ D
         B = Jr @ L
         e, Jt = linearised_by(self._system.only(some), T, B)
-        self.T[some], self.B[some], self.e[some], self._J[some] = T, B, e, np.swapaxes(Jt, 1, 2)
+        self.T[some] = T
+        self.B[some] = B
+        self.e[some] = e
+        self._J[some] = np.swapaxes(Jt, 1, 2)
         self.gap_m[some] = np.abs(e).max(axis=1, initial=0.0)
         self.gap2[some] = (e * e) @ (self._soft2 == 0.0) / m
         self.row_size[some] = np.einsum("bij,bij->b", Jt, Jt) / m
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
         if self._kernels is not None:
-            step, length, turned = np.empty((len(rows), z.shape[1])), np.empty(len(rows)), np.empty(len(rows))
+            step = np.empty((len(rows), z.shape[1]))
+            length = np.empty(len(rows))
+            turned = np.empty(len(rows))
             given = self._J, self.e, z, self._L, mu, self._soft2, rows
             self._kernels.change(*given, *self._factor, step, length, turned)
             return step, length, turned

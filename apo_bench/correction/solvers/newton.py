@@ -86,7 +86,9 @@ def descend(
     at_most: int | None = None,
 ) -> Solution:
     """One descent: at each turn T <- T dT(dq), q <- 0, with the rank that the cut-off finds, or `at_most` if less."""
-    now, changing, trace = np.array(goals), np.array(sorted(free), dtype=np.intp), list[Iterate]()
+    now = np.array(goals)
+    changing = np.array(sorted(free), dtype=np.intp)
+    trace = list[Iterate]()
     units = np.array([1.0, 1.0, 1.0, length_m, length_m, length_m] * len(changing))
     columns = (6 * changing[:, None] + np.arange(6)).ravel()
     for turn in range(turns + 1):
@@ -121,10 +123,18 @@ def least_step(J: Array, e: Array, cut_off: float, at_most: int | None = None) -
 def displacement(q: Array) -> Array:
     """dT = P(x, y, z) R_x(alpha) R_y(beta) R_z(gamma) (Eq. 4), (k, 6) -> (k, 4, 4), [m] and [rad]."""
     angles = q[:, 3:].T
-    (ca, cb, cg), (sa, sb, sg) = np.cos(angles), np.sin(angles)
+    ca, cb, cg = np.cos(angles)
+    sa, sb, sg = np.sin(angles)
     dT = np.zeros((len(q), 4, 4))
-    dT[:, 0, 0], dT[:, 0, 1], dT[:, 0, 2] = cb * cg, -cb * sg, sb
-    dT[:, 1, 0], dT[:, 1, 1], dT[:, 1, 2] = ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb
-    dT[:, 2, 0], dT[:, 2, 1], dT[:, 2, 2] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb
-    dT[:, :3, 3], dT[:, 3, 3] = q[:, :3], 1.0
+    dT[:, 0, 0] = cb * cg
+    dT[:, 0, 1] = -cb * sg
+    dT[:, 0, 2] = sb
+    dT[:, 1, 0] = ca * sg + sa * sb * cg
+    dT[:, 1, 1] = ca * cg - sa * sb * sg
+    dT[:, 1, 2] = -sa * cb
+    dT[:, 2, 0] = sa * sg - ca * sb * cg
+    dT[:, 2, 1] = sa * cg + ca * sb * sg
+    dT[:, 2, 2] = ca * cb
+    dT[:, :3, 3] = q[:, :3]
+    dT[:, 3, 3] = 1.0
     return dT

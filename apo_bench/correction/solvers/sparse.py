@@ -82,7 +82,8 @@ def sparse_solver(where: Incidence) -> _Solver:
     if pairs is not None:
         first, second = pairs
         order = _near(where, first, second)
-        a, b = order[where.contact[first]], order[where.contact[second]]
+        a = order[where.contact[first]]
+        b = order[where.contact[second]]
         if 3 * int(np.abs(a - b).max(initial=0)) + 3 <= WIDE:
             return _banded(where, first[a >= b], second[a >= b], order)
     return _together(where)
@@ -96,10 +97,14 @@ class SparseStep:
 
     def __init__(self, system: CompactEquations, observed: Array, L: Array, soft_m: Array | None) -> None:
         self._system = system if system.points.ndim == 3 else system.only(0)
-        self._observed, self._L, self._where = observed, L, incidence(system)
+        self._observed = observed
+        self._L = L
+        self._where = incidence(system)
         self._solve = sparse_solver(self._where)
         self._soft2 = np.zeros(3 * len(system)) if soft_m is None else soft_m * soft_m
-        self.T, self.B, self.e = observed, L, np.zeros((1, len(self._soft2)))
+        self.e = np.zeros((1, len(self._soft2)))
+        self.T = observed
+        self.B = L
         self.gap_m, self.gap2, self.row_size = np.zeros((3, 1))
         self._blocks = np.zeros((len(self._where.contact), 6, 3))
 
@@ -112,9 +117,11 @@ class SparseStep:
             return
         # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
         D, Jr = exp_and_jacobian(twists(z, self._L))
-        self.T, self.B = self._observed @ D, Jr @ self._L
+        self.T = self._observed @ D
+        self.B = Jr @ self._L
         e, every = self._system.blocks(self.T[0], self.B[0])
-        self.e, self._blocks = e[None], every[self._where.contact, self._where.letter]
+        self.e = e[None]
+        self._blocks = every[self._where.contact, self._where.letter]
         self.gap_m[0] = np.abs(e).max(initial=0.0)
         self.gap2[0] = (e * e) @ (self._soft2 == 0.0) / max(len(e), 1)
         self.row_size[0] = np.square(self._blocks).sum() / max(len(e), 1)
@@ -127,7 +134,9 @@ class SparseStep:
         return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L)
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
-        self.T, self.B, self._blocks = self._observed, self._L, np.zeros_like(self._blocks)
+        self._blocks = np.zeros_like(self._blocks)
+        self.T = self._observed
+        self.B = self._L
         self.e = self._system.residual(self.T)
 
 
@@ -142,16 +151,19 @@ def sparse_rank(Jt: Any) -> int:
     lowest = _EIGENVALUE * _largest(Jt)
     meets = abs(Jt).sign().sum(axis=1) / 3.0
     if (meets**2).sum() <= FEW * meets.sum():
-        K, sign = (Jt.T @ Jt - lowest * eye_array(m)).tocsc(), 1.0
+        K = (Jt.T @ Jt - lowest * eye_array(m)).tocsc()
+        sign = 1.0
     else:
-        K, sign = block_array([[eye_array(unknowns), Jt], [Jt.T, lowest * eye_array(m)]], format="csc"), -1.0
+        K = block_array([[eye_array(unknowns), Jt], [Jt.T, lowest * eye_array(m)]], format="csc")
+        sign = -1.0
     factor = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return int(np.count_nonzero(sign * factor.U.diagonal() > 0.0))
 
 
 def _largest(Jt: Any) -> float:
     """The largest eigenvalue of J J^t, roughly: twenty turns of the power method from a fixed start."""
-    y, size = np.cos(np.arange(Jt.shape[1])), 1.0
+    y = np.cos(np.arange(Jt.shape[1]))
+    size = 1.0
     for _ in range(20):
         y = Jt.T @ (Jt @ (y / np.linalg.norm(y)))
         size = float(np.linalg.norm(y))

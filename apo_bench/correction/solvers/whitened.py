@@ -49,7 +49,8 @@ def whitened(observation: Observation) -> Whitened:
 
 def spread(L: Array, z: Array) -> Array:
     """L z by operation: z (6 n,) -> (n, 6), or (6 n, f) -> (n, 6, f)."""
-    n, columns = len(L), z.shape[1:]
+    n = len(L)
+    columns = z.shape[1:]
     if L.shape[2] != 6:
         return np.asarray((L.reshape(6 * n, len(z)) @ z).reshape(n, 6, *columns))
     return np.asarray((L @ z.reshape(n, 6, *(columns or (1,)))).reshape(n, 6, *columns))
@@ -65,7 +66,8 @@ def unspread(L: Array, xi: Array) -> Array:
 
 def pulled(J: Array, B: Array) -> Array:
     """A derivative by body twists, (m, 6 n), as one by z, (m, 6 n), of which B z are the body twists."""
-    m, n = len(J), len(B)
+    m = len(J)
+    n = len(B)
     if B.shape[2] != 6:
         return np.asarray(J.reshape(m, 6 * n) @ B.reshape(6 * n, 6 * n))
     return np.asarray((J.reshape(m, n, 1, 6) @ B).reshape(m, 6 * n))

@@ -50,7 +50,10 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
     Raises:
         InputError: Too few inliers, or they are all exactly right.
     """
-    found, inlier, upright, known = residuals.found, residuals.inlier, residuals.upright, residuals.turn_known
+    found = residuals.found
+    inlier = residuals.inlier
+    upright = residuals.upright
+    known = residuals.turn_known
     near = f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg"
     for kept, limit in ((upright, near), (known, f"{near} and do not look alike when turned by any angle")):
         if kept.sum() < _FEWEST:
@@ -76,7 +79,8 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
     """
     from scipy.optimize import minimize
 
-    r, x = np.linalg.norm(errors[:, :2], axis=1), errors[:, 2]
+    r = np.linalg.norm(errors[:, :2], axis=1)
+    x = errors[:, 2]
     if max(np.median(r), np.median(np.abs(x))) <= SMALLEST * limit:
         raise InputError(
             f"the {name} that were estimated are the true ones, or nearly: half of them are off by less than "
@@ -88,7 +92,8 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
         return float(np.log(max(split.inside, 1e-300)) - seen)
 
-    low, high = np.log(SMALLEST * limit), np.log(limit)
+    low = np.log(SMALLEST * limit)
+    high = np.log(limit)
     start = [np.log(max(size, SMALLEST * limit)) for size in (np.median(r) / 1.18, np.median(np.abs(x)) / 0.675)]
     best = minimize(
         surprise,
@@ -106,7 +111,8 @@ def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
     order = np.argsort(residuals.score[found], kind="stable")
     if len(order) < _BANDS * _FEWEST:
         return ()
-    score, inlier = residuals.score[found][order], residuals.inlier[found][order]
+    score = residuals.score[found][order]
+    inlier = residuals.inlier[found][order]
     each = [
         Band(float(s[0]), 1.0 - float(i.mean()))
         for s, i in zip(*(np.array_split(x, _BANDS) for x in (score, inlier)), strict=True)
@@ -116,9 +122,13 @@ def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
 
 def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
     """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
-    upright, known = residuals.upright, residuals.turn_known
-    shift, turn, turned = measured.shift_mm, measured.turn_deg, residuals.turn_deg[known]
-    tilt, about = np.linalg.norm(turned[:, :2], axis=1), np.abs(turned[:, 2])
+    upright = residuals.upright
+    known = residuals.turn_known
+    shift = measured.shift_mm
+    turn = measured.turn_deg
+    turned = residuals.turn_deg[known]
+    tilt = np.linalg.norm(turned[:, :2], axis=1)
+    about = np.abs(turned[:, 2])
     return (
         _figures("across the ray", "mm", residuals.across_mm[upright], shift.cdf_across, shift.limit),
         _figures("along the ray", "mm", residuals.along_mm[upright], shift.cdf_along, shift.limit),
@@ -130,7 +140,8 @@ def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figu
 def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> Figures:
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
     chance = np.maximum.accumulate(cdf(grid))
-    ordered, n = np.sort(sizes), len(sizes)
+    ordered = np.sort(sizes)
+    n = len(sizes)
     at = np.interp(ordered, grid, chance)
     step = np.arange(n + 1) / n
     return Figures(

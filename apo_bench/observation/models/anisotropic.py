@@ -13,9 +13,11 @@ from apo_bench.observation.models.camera import AZIMUTH_DEG, DISTANCE_M, ELEVATI
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
-ALONG, ACROSS = 3.0, 0.5
+ALONG = 3.0
+ACROSS = 0.5
 """Standard deviation of a position over the level, along the line of sight and across it."""
-OUT_OF_IMAGE, IN_IMAGE = 2.0**0.5, 0.5
+OUT_OF_IMAGE = 2.0**0.5
+IN_IMAGE = 0.5
 """Standard deviation of a turn over the level: about axes of the image plane, and about the line of sight."""
 
 
@@ -51,7 +53,8 @@ class Anisotropic:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        sight, unit = line_of_sight(), rng.standard_normal((len(assembly), 6))
+        sight = line_of_sight()
+        unit = rng.standard_normal((len(assembly), 6))
         place = self.level.mm * 1e-3 * _stretch(sight, ALONG, ACROSS)
         turn = np.radians(self.level.deg) * _stretch(sight, IN_IMAGE, OUT_OF_IMAGE)
         rotation = np.zeros((len(assembly), 6))
@@ -101,7 +104,8 @@ class Sighted:
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        mm, rad = self.level.mm * 1e-3, np.radians(self.level.deg)
+        mm = self.level.mm * 1e-3
+        rad = np.radians(self.level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
         xi = self.camera.twists(demonstration.goals, rng.standard_normal((len(assembly), 6)) * sigma)
         seen = observe_displaced(assembly, demonstration, xi, np.zeros((6, 6)))
@@ -110,7 +114,8 @@ class Sighted:
 
 def line_of_sight() -> Array:
     """The direction in which the camera looks, world frame, (3,), of length 1: obliquely down."""
-    up, round_z = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
+    up = np.radians(ELEVATION_DEG)
+    round_z = np.radians(AZIMUTH_DEG)
     return -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
 
 

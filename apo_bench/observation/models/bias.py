@@ -76,7 +76,8 @@ class BiasView:
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()
-        unit, own = rng.standard_normal(6), rng.standard_normal((len(assembly), 6)) * OWN * sigma
+        unit = rng.standard_normal(6)
+        own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
         if not len(assembly):
             return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
         view = pose.adjoint(pose.inverse(demonstration.goals) @ view_frame(self.camera, [demonstration.goals]))

@@ -17,7 +17,9 @@ from apo_bench.geometry.rigid import is_rigid
 WORKSPACE_MIDDLE_M = np.array([0.12, 0.0, 0.03])
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
 WORKSPACE_MIDDLE_M.flags.writeable = False
-DISTANCE_M, ELEVATION_DEG, AZIMUTH_DEG = 0.9, 40.0, 25.0
+DISTANCE_M = 0.9
+ELEVATION_DEG = 40.0
+AZIMUTH_DEG = 25.0
 """How far from there it stands, how high above the table, and how far from the x axis of the world."""
 _BEHIND = 1e-9
 """A ray whose cosine with the optical axis is this near to -1 has no shortest turn."""
@@ -25,7 +27,8 @@ _BEHIND = 1e-9
 
 def _default_pose() -> Array:
     """T_world_camera of the default camera, (4, 4): obliquely from above, its x axis level."""
-    up, round_z = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
+    up = np.radians(ELEVATION_DEG)
+    round_z = np.radians(AZIMUTH_DEG)
     z = -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
     x = np.array([-np.sin(round_z), np.cos(round_z), 0.0])
     T = np.eye(4)

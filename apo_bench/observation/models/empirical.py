@@ -24,7 +24,8 @@ _ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_d
 _COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *_ERRORS)
 MOST_ROWS = 8000
 """A file holds no more residuals; of more, every so-many-th is written."""
-_LARGEST_MM, _LARGEST_DEG = 1e5, 180.01
+_LARGEST_MM = 1e5
+_LARGEST_DEG = 180.01
 
 
 @final
@@ -79,8 +80,10 @@ class Empirical:
         check_measured_level(self.level, self.sample.covariance)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        n, sample = len(assembly), self.sample
-        chance, sign = rng.random((n, 3)), rng.choice([-1.0, 1.0], (n, 1))
+        n = len(assembly)
+        sample = self.sample
+        chance = rng.random((n, 3))
+        sign = rng.choice([-1.0, 1.0], (n, 1))
         errors = _picked(sample.inliers, chance[:, 0])
         if len(sample.outliers):
             errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)

@@ -21,7 +21,8 @@ from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
 
-SMALLEST, LEAST_FREEDOM = 1e-4, 0.5
+SMALLEST = 1e-4
+LEAST_FREEDOM = 0.5
 """Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
 
 
@@ -29,7 +30,8 @@ LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
 """[m] per mm and [rad] per degree."""
 _GAUSSIAN = 1e9
 """Degrees of freedom of a Gaussian, as good as infinitely many."""
-LARGEST_M, LARGEST_RAD = 0.4, 2.0
+LARGEST_M = 0.4
+LARGEST_RAD = 2.0
 """A standard deviation per axis beyond which a level makes no sense."""
 
 
@@ -108,13 +110,16 @@ class Fitted:
     @property
     def covariance(self) -> Array:
         """(6, 6), of inliers at level 1 in the frame of the ray, [m, rad]."""
-        (across, along), (out, about) = self.measured.shift_mm.variances, self.measured.turn_deg.variances
+        across, along = self.measured.shift_mm.variances
+        out, about = self.measured.turn_deg.variances
         return np.diag(np.array([across, across, along, out, out, about]) * LEVEL_UNITS**2)
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
-        n, measured = len(assembly), self.measured
+        n = len(assembly)
+        measured = self.measured
         errors = np.concatenate([measured.shift_mm.draw(n, rng), measured.turn_deg.draw(n, rng)], axis=1)
-        gross, chance = _gross(measured, n, rng), rng.random((n, 2))
+        gross = _gross(measured, n, rng)
+        chance = rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
         made = observe_in_ray_frames(
@@ -136,7 +141,8 @@ class Fitted:
 
 def stated_tails(measured: MeasuredNoise, level: Level, camera: Camera, goals: Array) -> Tails:
     """The tails of inliers, in the frames of the rays on which parts are seen."""
-    shift, turn = measured.shift_mm, measured.turn_deg
+    shift = measured.shift_mm
+    turn = measured.turn_deg
     units = np.repeat(LEVEL_UNITS[[0, 3]] * level, 2)
     each = (shift.across, shift.along, turn.across, turn.along)
     return Tails(
@@ -198,7 +204,8 @@ def observe_in_ray_frames(
         assembly, demonstration, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale))
     )
     missed = missed & (max(level) > 0.0)
-    goals, stated = made.goals.copy(), made.covariance.copy()
+    goals = made.goals.copy()
+    stated = made.covariance.copy()
     goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
     stated[missed] = np.diag(UNSEEN_DEVIATION**2)
     return replace(made, goals=goals, covariance=stated, seen=~missed)

@@ -15,7 +15,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
-OUTLIERS, MISSES = 0.1, 0.02
+OUTLIERS = 0.1
+MISSES = 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
 TIMES = 10.0
 """An outlier errs by so many times the level."""
@@ -73,11 +74,13 @@ class Outliers:
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()
-        unit, chance = rng.standard_normal((len(assembly), 6)), rng.random((len(assembly), 2))
+        unit = rng.standard_normal((len(assembly), 6))
+        chance = rng.random((len(assembly), 2))
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
         made = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
-        goals, covariance = made.goals.copy(), made.covariance.copy()
+        goals = made.goals.copy()
+        covariance = made.covariance.copy()
         goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
@@ -86,7 +89,8 @@ class Outliers:
 
 def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:
     """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
-    now, out = dict(start), goals.copy()
+    now = dict(start)
+    out = goals.copy()
     for k, operation in enumerate(assembly.operations):
         if seen[k]:
             now[operation.main] = goals[k]

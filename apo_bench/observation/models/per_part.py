@@ -11,7 +11,8 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
-LEAST, MOST = 0.3, 4.0
+LEAST = 0.3
+MOST = 4.0
 """Range of the factor of a part on the level."""
 
 

@@ -18,7 +18,8 @@ INLIER_MM = 50.0
 TURNED_DEG = 30.0
 """An estimate that is turned more than this is of a part that looks alike when turned, or was taken the wrong way
 round; which of the two cannot be told without the symmetries of the models."""
-_GAP_DEG, _IN_GAP = 55.0, 1.0 / 30.0
+_GAP_DEG = 55.0
+_IN_GAP = 1.0 / 30.0
 """Where a part looks alike only when turned by 60 degrees or more, few turns are between `TURNED_DEG` and this: less
 than this part of all, where 14 % are if any turn about an axis is as likely."""
 MOST_PAIRS = 10_000_000
@@ -105,15 +106,18 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     from scipy.spatial.transform import Rotation
 
     partner = match_rows(estimates, truth)
-    found, n = partner >= 0, len(partner)
+    found = partner >= 0
+    n = len(partner)
     asked = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
     there = np.zeros((n, 4, 4))
     there[:] = np.eye(4)
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
-    R, R_seen = truth.R[found], estimates.R[partner[found]]
+    R = truth.R[found]
+    R_seen = estimates.R[partner[found]]
     turn = Rotation.from_matrix(_nearest(R_seen) @ np.swapaxes(_nearest(R), 1, 2)).as_rotvec(degrees=True)
-    shift, turned = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    shift = np.full((n, 3), np.nan)
+    turned = np.full((n, 3), np.nan)
     shift[found] = np.einsum("nji,nj->ni", F, estimates.t_mm[partner[found]] - truth.t_mm[found])
     turned[found] = np.einsum("nji,nj->ni", F, turn)
     trace = np.full(n, np.nan)
@@ -167,8 +171,10 @@ def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
     """Rows of the truth and of the estimates that are of one object in one image, where there are both."""
     _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
     key = key.reshape(-1)
-    there, seen = key[: len(truth)], key[len(truth) :]
-    by_truth, by_estimate = np.argsort(there, kind="stable"), np.argsort(seen, kind="stable")
+    there = key[: len(truth)]
+    seen = key[len(truth) :]
+    by_truth = np.argsort(there, kind="stable")
+    by_estimate = np.argsort(seen, kind="stable")
     common = np.intersect1d(there, seen)
     for side in zip(
         *(

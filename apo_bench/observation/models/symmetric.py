@@ -15,7 +15,8 @@ from apo_bench.geometry.symmetry import folds, nearest_alike, symmetries
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
-WORSE, _MANY = 3.0, 3.0
+WORSE = 3.0
+_MANY = 3.0
 """Factor on the level of a turn about an axis with so many equal places in a whole turn, or more."""
 
 
@@ -60,10 +61,12 @@ class Symmetric:
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         unit = rng.standard_normal((len(assembly), 6))
-        xi, covariance = np.zeros((len(assembly), 6)), np.zeros((len(assembly), 6, 6))
+        xi = np.zeros((len(assembly), 6))
+        covariance = np.zeros((len(assembly), 6, 6))
         groups = {part: symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
         for k, operation in enumerate(assembly.operations):
-            solid, group = assembly.solids[operation.main], groups[operation.main]
+            solid = assembly.solids[operation.main]
+            group = groups[operation.main]
             frame, fold = _principal(solid, group)
             about = pose.adjoint(frame)
             sigma, stated = self._deviations(fold)
@@ -85,10 +88,12 @@ def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
     """The centre of volume with the axes of a solid, or with an axis of revolution as z, (4, 4); and how often it looks
     the same in a whole turn about each, (3,).
     """
-    frame, found = pose.at(solid.centroid), revolution(solid)
+    frame = pose.at(solid.centroid)
+    found = revolution(solid)
     if found is None:
         return frame, folds(group)
-    x, frame = across_axis(found.axis), np.array(frame)
+    x = across_axis(found.axis)
+    frame = np.array(frame)
     frame[:3, :3] = np.column_stack([x, np.cross(found.axis, x), found.axis])
     return frame, np.array([len(group), len(group), np.inf])
 
@@ -112,6 +117,7 @@ class AnyTurn:
 
     @staticmethod
     def _one(solid: Solid, rng: np.random.Generator) -> Array:
-        group, found = symmetries(solid), revolution(solid)
+        group = symmetries(solid)
+        found = revolution(solid)
         one = np.asarray(group[rng.integers(len(group))])
         return one if found is None else turn_about(found.point, found.axis, rng.uniform(-np.pi, np.pi)) @ one

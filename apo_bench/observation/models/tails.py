@@ -46,7 +46,8 @@ class Split:
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
         """Places along the ray and what each stands for: density times weight, before the limit across."""
-        s, top = self.along.scale, np.arcsinh(self.limit / self.along.scale)
+        s = self.along.scale
+        top = np.arcsinh(self.limit / self.along.scale)
         y = top * _X
         x = s * np.sinh(y)
         return x, top * _W * s * np.cosh(y) * np.exp(log_density_along(self.along, x))
@@ -67,7 +68,8 @@ class Split:
 
     def cdf_across(self, r: ArrayLike) -> Array:
         """The cumulative distribution of the length of the error across."""
-        r, (x, w) = np.asarray(r, dtype=np.float64), self._nodes
+        r = np.asarray(r, dtype=np.float64)
+        x, w = self._nodes
         return _below_across(self.across, np.minimum(r[..., None], self._left(x, self.limit))) @ w / self.inside
 
     def cdf_along(self, a: ArrayLike) -> Array:
@@ -113,7 +115,8 @@ def log_density_along(tail: Tail, x: Array) -> Array:
     """The logarithm of the density of Student t in one direction."""
     from scipy.special import gammaln
 
-    h, u = tail.heaviness, (x / tail.scale) ** 2
+    h = tail.heaviness
+    u = (x / tail.scale) ** 2
     if h == 0.0:
         return -u / 2.0 - np.log(tail.scale * np.sqrt(2.0 * np.pi))
     n = 1.0 / h
@@ -123,23 +126,28 @@ def log_density_along(tail: Tail, x: Array) -> Array:
 
 def log_density_across(tail: Tail, r: Array) -> Array:
     """The logarithm of the density, per area, of Student t in two directions, at a distance r."""
-    h, u = tail.heaviness, (r / tail.scale) ** 2
+    h = tail.heaviness
+    u = (r / tail.scale) ** 2
     falls = u / 2.0 if h == 0.0 else (0.5 / h + 1.0) * np.log1p(h * u)
     return np.asarray(-falls - np.log(2.0 * np.pi * tail.scale**2))
 
 
 def _below_across(tail: Tail, r: Array) -> Array:
     """The chance that Student t in two directions is nearer than r."""
-    h, u = tail.heaviness, (r / tail.scale) ** 2
+    h = tail.heaviness
+    u = (r / tail.scale) ** 2
     return np.asarray(-np.expm1(-u / 2.0 if h == 0.0 else -0.5 / h * np.log1p(h * u)))
 
 
 def _square_below(tail: Tail, r: Array) -> Array:
     """Integral of the squared distance times the density up to r: that of 2 r (1 - F) less r^2 (1 - F)."""
-    h, u, s2 = tail.heaviness, (r / tail.scale) ** 2, tail.scale**2
+    h = tail.heaviness
+    u = (r / tail.scale) ** 2
+    s2 = tail.scale**2
     if h == 0.0:
         return np.asarray(-2.0 * s2 * np.expm1(-u / 2.0) - r * r * np.exp(-u / 2.0))
-    grown, power = np.log1p(h * u), 1.0 - 0.5 / h
+    grown = np.log1p(h * u)
+    power = 1.0 - 0.5 / h
     whole = grown if abs(power) < 1e-9 else np.expm1(power * grown) / power
     return np.asarray(s2 / h * whole - r * r * np.exp(-0.5 / h * grown))
 

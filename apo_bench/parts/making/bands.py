@@ -51,9 +51,12 @@ def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
 def _inner(corners: Array, fit: NDArray[np.bool_], i: int, width: float) -> tuple[Array, Array]:
     """The inner corners, at corner i, of the band of the side that ends there, and of that of the side that begins."""
     here = corners[i]
-    into, out = here - corners[i - 1], corners[(i + 1) % len(corners)] - here
-    into, out = into / np.linalg.norm(into), out / np.linalg.norm(out)
-    left, right = np.array([-into[1], into[0]]), np.array([-out[1], out[0]])
+    into = here - corners[i - 1]
+    out = corners[(i + 1) % len(corners)] - here
+    into = into / np.linalg.norm(into)
+    out = out / np.linalg.norm(out)
+    left = np.array([-into[1], into[0]])
+    right = np.array([-out[1], out[0]])
     turn = float(into[0] * out[1] - into[1] * out[0])
     if fit[i - 1] and fit[i]:
         both = here + width / (1.0 + float(left @ right)) * (left + right)

@@ -15,7 +15,8 @@ from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.moments import Moments
 
-_SAME_M, _PARALLEL = 1e-9, 1e-12
+_SAME_M = 1e-9
+_PARALLEL = 1e-12
 _NARROW_M = 6e-6
 """What is narrower is between two polygons of one circle."""
 
@@ -33,7 +34,8 @@ class Body:
 
     def moved(self, at_mm: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: Sequence[float] = (0.0, 0.0, 0.0)) -> Body:
         """Turned about x, then y, then z of the frame, in degrees, then shifted."""
-        R, t = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix(), 1e-3 * np.asarray(at_mm)
+        R = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
+        t = 1e-3 * np.asarray(at_mm)
         R = np.where(np.abs(R) < 1e-15, 0.0, R)
         return Body(
             tuple(_moved_piece(piece, R, t) for piece in self.pieces),
@@ -62,7 +64,8 @@ class Body:
             at_mm: Its middle.
             axis: Out of the part.
         """
-        n, r = np.asarray(axis, dtype=np.float64), 1e-3 * radius_mm
+        n = np.asarray(axis, dtype=np.float64)
+        r = 1e-3 * radius_mm
         rim = RoundFace(name, 1e-3 * np.asarray(at_mm), n / np.linalg.norm(n), (0.0, 0.0), (r, r), hole)
         return replace(self, rounds=(*self.rounds, rim))
 

@@ -40,7 +40,8 @@ def _cut(polygon: Any) -> list[Array]:
     owner = {(a, b): i for i, cell in cells.items() for a, b in zip(cell, [*cell[1:], cell[0]], strict=True)}
     diagonals = sorted({(a, b) for a, b in owner if a < b and (b, a) in owner}, key=lambda d: -_length(points, d))
     for a, b in diagonals:
-        i, k = owner[a, b], owner[b, a]
+        i = owner[a, b]
+        k = owner[b, a]
         joined = _joined(cells[i], cells[k], a, b)
         if i != k and is_convex(points[joined]):
             cells[i] = joined
@@ -63,13 +64,15 @@ def _length(points: Array, side: tuple[int, int]) -> float:
 
 def _joined(one: list[int], other: list[int], a: int, b: int) -> list[int]:
     """Two cells as one, without their common side, which goes from a to b in the first one."""
-    i, k = one.index(b), other.index(a)
+    i = one.index(b)
+    k = other.index(a)
     return [*one[i:], *one[:i], *(other[k:] + other[:k])[1:-1]]
 
 
 def is_convex(ring: Array) -> bool:
     """Whether no corner of a ring, counter-clockwise, turns to the right."""
-    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    into = ring - np.roll(ring, 1, axis=0)
+    out = np.roll(ring, -1, axis=0) - ring
     across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
     return bool((across > -_SAME_MM * np.linalg.norm(into, axis=1)).all())
 
@@ -112,7 +115,8 @@ def clipped(ring: Array, n: Array, d: float) -> Array:
     heights = (ring @ n - d).tolist()
     corners = ring.tolist()
     for i, (x, y) in enumerate(corners):
-        h, after = heights[i - 1], heights[i]
+        h = heights[i - 1]
+        after = heights[i]
         after = 0.0 if abs(after) < _ON_MM else after
         if abs(h) > _ON_MM and h * after < 0.0:
             u, v = corners[i - 1]
@@ -128,7 +132,8 @@ def wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
     found = []
     for i in range(sides):
         a, b, m = (2.0 * np.pi * (i + off) / sides for off in (-0.5, 0.5, 0.0))
-        right, left = np.array([np.sin(a), -np.cos(a)]), np.array([-np.sin(b), np.cos(b)])
+        right = np.array([np.sin(a), -np.cos(a)])
+        left = np.array([-np.sin(b), np.cos(b)])
         area = clipped(clipped(cell, right, float(right @ at)), left, float(left @ at))
         found.append((np.array([np.cos(m), np.sin(m)]), area))
     return found

@@ -55,7 +55,8 @@ def bore(
 
     The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
     """
-    a, b = chamfer_low, chamfer_high
+    a = chamfer_low
+    b = chamfer_high
     steps = [Step(low + a, high - b, radius, name=name, fit=fit, sides=sides)]
     if a:
         steps.insert(0, Step(low, low + a, radius + a, radius, name and f"{name}_chamfer_low", sides=sides))
@@ -98,7 +99,8 @@ def extrude(
     rest = area.difference(unary_union([Polygon(band) for band in beside]))
     cells = _cells(rest, bores)
     if len(cells) < len(bores):
-        hole, others = _as_hole(bores[len(cells)], low, high), [*bores[: len(cells)], *bores[len(cells) + 1 :]]
+        hole = _as_hole(bores[len(cells)], low, high)
+        others = [*bores[: len(cells)], *bores[len(cells) + 1 :]]
         return extrude(outline, low, high, holes=[*holes, hole], bores=others, bottom=bottom, top=top, fit=fit)
     for cell in cells:
         rest = rest.difference(Polygon(cell))
@@ -170,7 +172,8 @@ def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
         if step is None:
             yield _prism(cell, a, b)
             continue
-        r_a, r_b = step.at(a), step.at(b)
+        r_a = step.at(a)
+        r_b = step.at(b)
         for n, area in wedges(cell, at, step.count):
             ends = [clipped(area, -n, -float(n @ at) - r) for r in (r_a, r_b)]
             yield np.concatenate([_raised(_each_once(end), z) for end, z in zip(ends, (a, b), strict=True)])
@@ -196,7 +199,8 @@ def _sides(outline: Outline, low: float, high: float, hole: bool) -> tuple[list[
     arcs = [arc_of(outline, i) for i in range(len(outline))]
     for i, (edge, arc) in enumerate(zip(outline, arcs, strict=True)):
         if arc is None:
-            a, b = edge.start, outline[(i + 1) % len(outline)].start
+            a = edge.start
+            b = outline[(i + 1) % len(outline)].start
             corners = np.array([(*a, low), (*b, low), (*b, high), (*a, high)])
             flats.append(Face(edge.name, 1e-3 * (corners[::-1] if hole else corners), fit=edge.fit))
             continue
@@ -247,7 +251,8 @@ def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
     for z in heights_of(each.steps):
         if z - low < 1e-6 or high - z < 1e-6:
             continue
-        below, above = at_height(each.steps, z, False), at_height(each.steps, z, True)
+        below = at_height(each.steps, z, False)
+        above = at_height(each.steps, z, True)
         name = (each.flats or {}).get(z, "")
         wide, slim = (above, below) if above[0] > below[0] else (below, above)
         if wide[0] - slim[0] > _NARROW_MM:

@@ -44,7 +44,8 @@ def polygon_moments(ring: Array) -> Moments:
     u, v = np.roll(ring, -1, axis=0).T
     c = x * v - u * y
     first = np.array([(x + u) @ c, (y + v) @ c]) / 6.0
-    xx, yy = (x * x + x * u + u * u) @ c / 12.0, (y * y + y * v + v * v) @ c / 12.0
+    xx = (x * x + x * u + u * u) @ c / 12.0
+    yy = (y * y + y * v + v * v) @ c / 12.0
     xy = (x * v + 2.0 * x * y + 2.0 * u * v + u * y) @ c / 24.0
     return Moments(float(c.sum() / 2.0), first, np.array([[xx, xy], [xy, yy]]))
 
@@ -57,8 +58,10 @@ def segment_moments(center: Array, radius: float, middle: float, extent: float) 
         middle: Direction from the centre to the middle of the arc, [rad].
         extent: Of the arc, [rad].
     """
-    a, r = extent / 2.0, radius
-    s, c = np.sin(a), np.cos(a)
+    a = extent / 2.0
+    r = radius
+    s = np.sin(a)
+    c = np.cos(a)
     sector = Moments(
         a * r**2, np.array([2.0 * r**3 * s / 3.0, 0.0]), np.diag([r**4 * (a + s * c), r**4 * (a - s * c)]) / 4.0
     )
@@ -69,7 +72,9 @@ def segment_moments(center: Array, radius: float, middle: float, extent: float) 
 
 def extruded(flat: Moments, low: float, high: float) -> Moments:
     """Of the prism over a flat shape, from one height to another one."""
-    h, z1, z2 = high - low, (high**2 - low**2) / 2.0, (high**3 - low**3) / 3.0
+    h = high - low
+    z1 = (high**2 - low**2) / 2.0
+    z2 = (high**3 - low**3) / 3.0
     second = np.zeros((3, 3))
     second[:2, :2] = h * flat.second
     second[:2, 2] = second[2, :2] = z1 * flat.first
@@ -83,6 +88,7 @@ def frustum_moments(low: float, high: float, r_low: float, r_high: float) -> Mom
     z = low + (high - low) * (nodes + 1.0) / 2.0
     r = r_low + (r_high - r_low) * (nodes + 1.0) / 2.0
     w = weights * (high - low) / 2.0
-    area, cross = np.pi * r**2, np.pi * r**4 / 4.0
+    area = np.pi * r**2
+    cross = np.pi * r**4 / 4.0
     first = np.array([0.0, 0.0, float(w @ (area * z))])
     return Moments(float(w @ area), first, np.diag([w @ cross, w @ cross, w @ (area * z**2)]))

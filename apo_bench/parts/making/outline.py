@@ -75,7 +75,9 @@ def rectangle(
     width: float, depth: float, at: tuple[float, float] = (0.0, 0.0), names: Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
     """A rectangle about its middle; its sides are, in this order, at -y, +x, +y, -x."""
-    (x, y), a, b = at, width / 2.0, depth / 2.0
+    x, y = at
+    a = width / 2.0
+    b = depth / 2.0
     return polygon((x - a, y - b), (x + a, y - b), (x + a, y + b), (x - a, y + b), names=names, fit=fit)
 
 
@@ -94,7 +96,9 @@ def slot(
     fit: bool = False,
 ) -> Outline:
     """A slot along x with round ends, as long over all; its sides are, in this order, at -y, +x, +y, -x."""
-    (x, y), a, r = at, (length - width) / 2.0, width / 2.0
+    x, y = at
+    a = (length - width) / 2.0
+    r = width / 2.0
     corners = [(x - a, y - r), (x + a, y - r), (x + a, y + r), (x - a, y + r)]
     middles = [None, (x + a, y), None, (x - a, y)]
     return [Edge(*each[:2], fit, each[2]) for each in zip(corners, names, middles, strict=True)]
@@ -108,11 +112,14 @@ def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = Non
         if corners is not None and i not in corners:
             found.append(edge)
             continue
-        into, out = points[i] - points[i - 1], points[(i + 1) % len(points)] - points[i]
-        into, out = into / np.linalg.norm(into), out / np.linalg.norm(out)
+        into = points[i] - points[i - 1]
+        out = points[(i + 1) % len(points)] - points[i]
+        into = into / np.linalg.norm(into)
+        out = out / np.linalg.norm(out)
         turn = float(np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out))
         back = radius * abs(np.tan(turn / 2.0))
-        a, b = points[i] - back * into, points[i] + back * out
+        a = points[i] - back * into
+        b = points[i] + back * out
         center = a + np.sign(turn) * radius * np.array([-into[1], into[0]])
         found.append(Edge(_pair(a), center=_pair(center), clockwise=turn < 0.0, sides=sides))
         found.append(replace(edge, start=_pair(b)))
@@ -121,10 +128,12 @@ def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = Non
 
 def arc_of(outline: Outline, i: int) -> Arc | None:
     """The arc of side i; None if it is straight."""
-    edge, after = outline[i], outline[(i + 1) % len(outline)]
+    edge = outline[i]
+    after = outline[(i + 1) % len(outline)]
     if edge.center is None:
         return None
-    a, b = np.array(edge.start) - edge.center, np.array(after.start) - edge.center
+    a = np.array(edge.start) - edge.center
+    b = np.array(after.start) - edge.center
     r = float(np.linalg.norm(a))
     if abs(np.linalg.norm(b) - r) > _SAME_MM * max(1.0, r) or r < _SAME_MM:
         raise ValueError(f"side {i + 1} of an outline is no arc: its ends are not as far from its centre as each other")
@@ -149,7 +158,8 @@ def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
 
 
 def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
-    edge, arc = outline[i], arc_of(outline, i)
+    edge = outline[i]
+    arc = arc_of(outline, i)
     start = np.array(edge.start, dtype=np.float64)
     if arc is None:
         yield start

@@ -61,8 +61,10 @@ class Step:
 
     def wall(self, at: tuple[float, float], hole: bool) -> RoundFace:
         """Its face, about an axis along z."""
-        (a, b), span = self.radii, (1e-3 * self.low, 1e-3 * self.high)
-        point, axis = np.array([1e-3 * at[0], 1e-3 * at[1], 0.0]), np.array([0.0, 0.0, 1.0])
+        a, b = self.radii
+        span = (1e-3 * self.low, 1e-3 * self.high)
+        point = np.array([1e-3 * at[0], 1e-3 * at[1], 0.0])
+        axis = np.array([0.0, 0.0, 1.0])
         return RoundFace(self.name, point, axis, span, (1e-3 * a, 1e-3 * b), hole, self.fit)
 
 

@@ -14,7 +14,8 @@ from apo_bench.parts.making.extrude import flat_face
 from apo_bench.parts.making.moments import Moments
 from apo_bench.parts.making.steps import Step, at_height, heights_of, inscribed, tangent
 
-_SAME_MM, _NARROW_MM = 1e-6, 6e-3
+_SAME_MM = 1e-6
+_NARROW_MM = 6e-3
 
 
 def turned(
@@ -63,7 +64,8 @@ def shaft(
     top: str = "",
 ) -> Body:
     """A cylinder along z with chamfers of 45 degrees, [mm]; those of `name` are `name_chamfer_low` and `..._high`."""
-    a, b = chamfer_low, chamfer_high
+    a = chamfer_low
+    b = chamfer_high
     steps = [Step(low + a, high - b, radius, name=name)]
     if a:
         steps.insert(0, Step(low, low + a, radius - a, radius, name and f"{name}_chamfer_low"))
@@ -78,9 +80,11 @@ def _length(outer: Sequence[Step], inner: Sequence[Step], a: float, b: float) ->
     bore = next((s for s in inner if s.part(a, b)), None)
     if around is None:
         raise ValueError(f"no outer step reaches from {a:g} to {b:g} mm")
-    (low, high) = (around.at(a), around.at(b))
+    low = around.at(a)
+    high = around.at(b)
     if bore is None and abs(low - high) < _SAME_MM:
-        center, half = np.array([0.0, 0.0, 5e-4 * (a + b)]), 5e-4 * (b - a)
+        center = np.array([0.0, 0.0, 5e-4 * (a + b)])
+        half = 5e-4 * (b - a)
         yield cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, half))
     elif bore is None:
         yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
@@ -105,7 +109,8 @@ def _flats(outer: Sequence[Step], inner: Sequence[Step], z: float, name: str, fi
 
     areas = []
     for above in (False, True):
-        (R, n), (r, k) = at_height(outer, z, above), at_height(inner, z, above)
+        R, n = at_height(outer, z, above)
+        r, k = at_height(inner, z, above)
         n, k = (max(n, k), max(n, k)) if n and k else (n, k)
         disc = Polygon(inscribed((0.0, 0.0), R, n)) if R else Polygon()
         areas.append(disc.difference(Polygon(tangent((0.0, 0.0), r, k))) if r else disc)

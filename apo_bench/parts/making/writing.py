@@ -30,7 +30,8 @@ def solid_of(name: str, body: Body) -> Solid:
     named = [face.name for faces in (body.flats, body.rounds) for face in faces if face.name]
     if len(set(named)) < len(named):
         raise ValueError(f"part '{name}' has faces with one name; each needs its own: {', '.join(sorted(named))}")
-    flats, rounds = _called(sorted(body.flats, key=_place)), _called(body.rounds)
+    flats = _called(sorted(body.flats, key=_place))
+    rounds = _called(body.rounds)
     return Solid(
         name=name,
         faces={face.name: face for face in flats},

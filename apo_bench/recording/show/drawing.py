@@ -99,7 +99,8 @@ def _draw_parts(axes: Any, drawing: Drawing, X: Array, reach: float, close: bool
 
 
 def _draw_times(axis: Any, drawing: Drawing) -> None:
-    tracks, stays = drawing.tracks, drawing.stays
+    tracks = drawing.tracks
+    stays = drawing.stays
     rows = {part: i for i, part in enumerate(tracks)}
     for color, (part, track) in zip(_colors(len(tracks)), tracks.items(), strict=True):
         first = stays[part][0].rests[0].T if stays[part] else track.T[0]
@@ -138,10 +139,8 @@ def _level(axis: Any, points: Array, least: float) -> None:
     """The same scale in all directions, in mm; at least so much, [m], to each side."""
     from matplotlib.ticker import MaxNLocator
 
-    middle, reach = (
-        (points.max(axis=0) + points.min(axis=0)) / 2,
-        max(0.55 * float(np.ptp(points, axis=0).max()), least),
-    )
+    middle = (points.max(axis=0) + points.min(axis=0)) / 2
+    reach = max(0.55 * float(np.ptp(points, axis=0).max()), least)
     axis.set_xlim(middle[0] - reach, middle[0] + reach)
     axis.set_ylim(middle[1] - reach, middle[1] + reach)
     axis.set_zlim(middle[2] - reach, middle[2] + reach)

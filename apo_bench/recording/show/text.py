@@ -167,7 +167,8 @@ def _paths(found: Imported) -> Iterator[str]:
 
 
 def _rest_cells(rest: Rest, X: Array) -> list[str]:
-    S, p = rest.mean.scatter, 1e3 * (X @ rest.T)[:3, 3]
+    S = rest.mean.scatter
+    p = 1e3 * (X @ rest.T)[:3, 3]
     off = f"{1e3 * np.sqrt(np.trace(S[:3, :3]) / 3.0):.2f} mm {np.degrees(np.sqrt(np.trace(S[3:, 3:]) / 3.0)):.2f} deg"
     left = int((~rest.mean.inlier).sum())
     return [

@@ -18,7 +18,8 @@ def own_code(row: Mapping[str, Any]) -> tuple[str, ...]:
     """What of a row is code of somebody's own; files of noise and scenarios are data."""
     found = [row[name] for name in ("method", "arm") if ":" in (row.get(name) or "")]
     found = [name for name in found if not name.startswith(FOREIGN_ARMS)]
-    noise, relations = row["noise"], row["relations"]
+    noise = row["noise"]
+    relations = row["relations"]
     found += [noise] * (":" in noise and not noise.startswith(RESIDUALS))
     found += [relations] * (":" in relations and relations.partition(":")[0] not in WRONG)
     return tuple(dict.fromkeys(found))

@@ -47,7 +47,8 @@ def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
             say(info.option, float(row[info.column]), info.default)
     for name, info in SETTINGS.items():
         if name not in _APART and not (name == "noise" and measured):
-            value, usual = row[info.column], None if name in _ALWAYS else info.default
+            value = row[info.column]
+            usual = None if name in _ALWAYS else info.default
             if value != usual:
                 say(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
     say(SETTINGS["salt"].option, _SALT_FILE if row.get("salt") else None)

@@ -107,7 +107,8 @@ def _refuse_other(folder: Path, what: str, before: Any, now: Mapping[str, Any]) 
     """More trials of the same grid are welcome; anything else that differs makes another sweep."""
     before = before if isinstance(before, dict) else {}
     for key in sorted({*before, *now}):
-        old, new = before.get(key), now.get(key)
+        old = before.get(key)
+        new = now.get(key)
         grown = what.startswith("grid") and key == "trials" and isinstance(old, int) and old <= (new or 0)
         if old != new and not grown:
             _refuse(folder, f"{what}: {key} was {json.dumps(old)}, now {json.dumps(new)}")

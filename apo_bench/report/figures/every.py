@@ -34,7 +34,8 @@ def figures(
     times: Sequence[Times],
 ) -> dict[str, Drawing]:
     """By the name of their file."""
-    where, looks = list(grouped), styles(methods_of(found.cells))
+    where = list(grouped)
+    looks = styles(methods_of(found.cells))
     pairs = members(where, found.pairs)
     made = {
         "success_over_level": success_figure(found.cells),

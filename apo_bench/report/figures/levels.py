@@ -78,15 +78,18 @@ def methods_of(cells: Sequence[Cell]) -> list[str]:
 
 def counted(numbers: Sequence[int], what: str = "") -> str:
     """`n 40`, or `n 38 to 160` where it differs, and of what."""
-    low, high = min(numbers, default=0), max(numbers, default=0)
+    low = min(numbers, default=0)
+    high = max(numbers, default=0)
     return f"n\u00a0{low if low == high else f'{low} to {high}'}{f' {what}' if what else ''}"
 
 
 def scale(values: Sequence[float]) -> Axis:
     """An axis in points that holds zero and all values (shares)."""
-    low, high = 100 * min(0.0, *values), 100 * max(0.0, *values)
+    low = 100 * min(0.0, *values)
+    high = 100 * max(0.0, *values)
     step = next((s for s in STEPS if (high - low) / s <= 6), STEPS[-1])
-    first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
+    first = math.floor(low / step)
+    last = max(math.ceil(high / step), math.floor(low / step) + 1)
     ticks = [(k * step / 100, f"{k * step:+d}" if k else "0") for k in range(first, last + 1)]
     return Axis("difference [points]", first * step / 100, last * step / 100, ticks)
 
@@ -111,7 +114,8 @@ def _differences(setting: Setting, pairs: Sequence[Paired], looks: Mapping[str, 
         return p.difference or 0.0, *p.interval
 
     def tip(p: Paired) -> str:
-        d, (low, high) = p.difference or 0.0, p.interval
+        d = p.difference or 0.0
+        low, high = p.interval
         return f"{100 * d:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}), n {p.pairs} pairs"
 
     y = scale([x for p in pairs for x in p.interval])

@@ -6,10 +6,12 @@ from typing import Any, NamedTuple
 from apo_bench.report.figures.sheet import DPI, SAMPLE, Entry, Panel, Tips
 from apo_bench.report.figures.styles import INK, RULE, SOFT, Style
 
-DODGE, SPREAD = 0.08, 0.4
+DODGE = 0.08
+SPREAD = 0.4
 """Methods stand this far from each other at one level, so that equal values do not hide each other; and all of them
 within this part of the way to the next level."""
-LIFT, RANGE = 1.8, 8.0
+LIFT = 1.8
+RANGE = 8.0
 """For the same reason lines stand this far above each other, and all of them within this range, in px."""
 
 
@@ -104,7 +106,8 @@ def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
     axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high), **scales)
     axis.hlines([at for at, _ in y.ticks], x.low, x.high, color=RULE, linewidth=1, zorder=0)
     crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
-    below, beside = axis.get_xaxis_transform(), axis.get_yaxis_transform()
+    below = axis.get_xaxis_transform()
+    beside = axis.get_yaxis_transform()
     for at, label in x.ticks:
         axis.text(at, -0.03, label, ha="center", va="top", fontsize=8 if crowded else 10, transform=below)
     for at, label in y.ticks:

@@ -29,7 +29,8 @@ def _looks(cells: Iterable[Cell]) -> list[int]:
 
 def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     looks = sorted({c.looks for c in cells})
-    lines, methods = [], styles(list(dict.fromkeys(c.method for c in cells)))
+    lines = []
+    methods = styles(list(dict.fromkeys(c.method for c in cells)))
     for (method, style), dodge in zip(methods.items(), dodges(len(methods)), strict=True):
         for level in sorted({level_of(c) for c in cells if c.method == method}):
             own = [c for c in cells if c.method == method and level_of(c) == level]

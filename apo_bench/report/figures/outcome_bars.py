@@ -12,9 +12,15 @@ from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.settings import Setting, level_of, level_words
 
-_LEFT, _RIGHT, _HIGH, _STEP, _APART = 138, 46, 11, 14, 5
+_LEFT = 138
+_RIGHT = 46
+_HIGH = 11
+_STEP = 14
+_APART = 5
 """Where bars begin and end, their height, from one to the next, and between methods, px."""
-_LETTER, _SMALL, _MOST = 6.6, 5.8, 48
+_LETTER = 6.6
+_SMALL = 5.8
+_MOST = 48
 """How wide letters of names and of levels are, px; letters of a name that is shown whole."""
 _Box = tuple[float, float, float, float]
 
@@ -97,11 +103,14 @@ def _panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
 
 def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[_Box, str, str]]:
     """Boxes with their colours and what is said of them."""
-    found, done, level = stages_of(cell), 0, _level(cell, setting)
+    found = stages_of(cell)
+    done = 0
+    level = _level(cell, setting)
     at = f"{cell.method}{f', level {level}' if level else ''}"
     for ending, count in (("success", cell.successes), *((stage, found[stage]) for stage in _in_order(found))):
         if count:
-            left, right = _x(done / cell.trials), _x((done + count) / cell.trials)
+            left = _x(done / cell.trials)
+            right = _x((done + count) / cell.trials)
             said = f"{at}: {ending} {count} of {cell.trials} ({percent(count / cell.trials)})"
             yield (left, y, right - left, _HIGH), color_of(ending), said
             done += count

@@ -8,10 +8,13 @@ from apo_bench.report.figures.sheet import Figure, Panel, Tips
 from apo_bench.report.figures.styles import SOFT
 from apo_bench.statistics.confusion import ALL, Confusion
 
-_SIDE, _TOP, _LEFT = 74, 34, 108
+_SIDE = 74
+_TOP = 34
+_LEFT = 108
 """Of a square; where the first begins, px."""
 _HEIGHT = _TOP + 2 * _SIDE + 6
-_RIGHT_COLOR, _WRONG_COLOR = "#0072b2", "#d55e00"
+_RIGHT_COLOR = "#0072b2"
+_WRONG_COLOR = "#d55e00"
 _Counts = tuple[tuple[int, int], tuple[int, int]]
 """Predicted to fit, predicted to fail: each fitted, failed."""
 
@@ -41,7 +44,9 @@ def _panel(method: str, counts: _Counts) -> Panel:
         for i, words in enumerate(("predicted to fit", "predicted to fail")):
             axis.text(_LEFT - 8, _TOP + _SIDE * (i + 0.5) + 4, words, ha="right")
             for j, word in enumerate(("fitted", "failed")):
-                x, y, count = _LEFT + _SIDE * j, _TOP + _SIDE * i, counts[i][j]
+                x = _LEFT + _SIDE * j
+                y = _TOP + _SIDE * i
+                count = counts[i][j]
                 color = _RIGHT_COLOR if i == j else _WRONG_COLOR
                 square = boxes(axis, [(x, y, _SIDE - 2, _SIDE - 2)], [color])
                 square.set_alpha(0.08 + 0.55 * count / n)

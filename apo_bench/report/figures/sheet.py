@@ -21,11 +21,17 @@ from apo_bench.io.default_looks import default_looks
 from apo_bench.io.writing import to_write
 from apo_bench.report.figures.styles import INK, themed
 
-WIDTH, HEIGHT = 360, 230
+WIDTH = 360
+HEIGHT = 230
 """Of a panel."""
-ACROSS, LETTERS = 3, 62
+ACROSS = 3
+LETTERS = 62
 """Panels side by side in a file; letters of a line of their titles."""
-HEAD, LINE, GAP, TITLE, SAMPLE = 40, 20, 18, 32, (26, 14)
+HEAD = 40
+LINE = 20
+GAP = 18
+TITLE = 32
+SAMPLE = (26, 14)
 """Heights of the title, of a line of the legend, of the space between panels and of their titles; size of a sample."""
 DPI = 72
 """Of a sheet: one px each."""
@@ -115,7 +121,8 @@ def draw(figure: Figure) -> Drawing:
     across = min(ACROSS, len(figure.panels))
     width = across * (WIDTH + GAP) + GAP
     samples, lines = _legend_places(figure.legend, width)
-    top, places = HEAD + LINE * lines, []
+    top = HEAD + LINE * lines
+    places = []
     for i in range(0, len(figure.panels), across):
         row = figure.panels[i : i + across]
         places += [(GAP + k * (WIDTH + GAP), top + TITLE) for k in range(len(row))]
@@ -188,11 +195,14 @@ def _looks(salt: str) -> Iterator[None]:
 
 def _legend_places(entries: Sequence[Entry], width: int) -> tuple[list[tuple[int, int]], int]:
     """Upper left corners of the samples, set in lines, and how many lines there are."""
-    x, line, places = GAP, 0, []
+    x = GAP
+    line = 0
+    places = []
     for entry in entries:
         need = 48 + 7 * len(entry.name)
         if x + need > width and x > GAP:
-            x, line = GAP, line + 1
+            x = GAP
+            line = line + 1
         places.append((x, HEAD + LINE * line - 4))
         x += need
     return places, line + bool(places)

@@ -4,11 +4,14 @@ import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-INK, SOFT, RULE = "#1d2430", "#5b6575", "#d9dde4"
+INK = "#1d2430"
+SOFT = "#5b6575"
+RULE = "#d9dde4"
 """Of text and lines, of what matters less, and of the grid."""
 SUCCESS = "#cfe3dc"
 _SOLID: Any = "-"
-_DASHED, _DOTTED = (0, (4, 1.5)), (0, (1, 1))
+_DASHED = (0, (4, 1.5))
+_DOTTED = (0, (1, 1))
 
 
 class Style(NamedTuple):

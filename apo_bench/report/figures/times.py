@@ -8,7 +8,9 @@ from apo_bench.report.figures.sheet import WIDTH, Figure, Panel, Tips
 from apo_bench.report.figures.styles import INK, SOFT
 from apo_bench.statistics.times import Times
 
-_LEFT, _RIGHT, _STEP = 118, 16, 20
+_LEFT = 118
+_RIGHT = 16
+_STEP = 20
 """Where the axis begins and ends, and from one line to the next, px."""
 
 
@@ -41,7 +43,8 @@ def _panel(scenario: str, own: Sequence[Times], most: float) -> Panel:
             axis.text(x(most * share), bottom + 8, f"{most * share:g}", ha="center", color=SOFT, fontsize=9)
         axis.text(x(most / 2), bottom + 22, "wall time of a trial [s]", ha="center", color=SOFT, fontsize=9)
 
-    low, high = min(t.trials for t in own), max(t.trials for t in own)
+    low = min(t.trials for t in own)
+    high = max(t.trials for t in own)
     return Panel(f"{scenario}; n {low if low == high else f'{low} to {high}'}", draw, height, (0, 0, 0, 0))
 
 

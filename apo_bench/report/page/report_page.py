@@ -77,7 +77,8 @@ class Found:
 
 def report_page(found: Found) -> str:
     """The page, as HTML."""
-    cells, limits = found.summary.cells, limits_of(found.run)
+    cells = found.summary.cells
+    limits = limits_of(found.run)
     numbers = {cell_place(cell): i for i, cell in enumerate(cells)}
     pictured = {}
     for k, picture in enumerate(found.pictures):
@@ -131,7 +132,8 @@ def _scope(rows: Sequence[Row]) -> str:
     def many(name: str, called: str) -> str:
         return _many(len({look_up(row, name) for row in rows}), called)
 
-    excluded, tried = demonstrations([row for row in rows if row["success"] is None]), demonstrations(rows)
+    excluded = demonstrations([row for row in rows if row["success"] is None])
+    tried = demonstrations(rows)
     fidelity = ", ".join(sorted({str(row["fidelity"]) for row in rows}))
     return (
         f"{len(rows):,} trials of {many('scenario', 'scenario')}, {many('method', 'method')} and "

@@ -8,13 +8,18 @@ from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
 from apo_bench.io.default_looks import default_looks
 from apo_bench.show.graph.layout import GraphLayout, arrange
 
-_INK, _GONE, _ALARM = "#222222", "#8A8A8A", "#C8102E"
+_INK = "#222222"
+_GONE = "#8A8A8A"
+_ALARM = "#C8102E"
 _GROUND = "#E4E4E4"
 _PALE = 0.75
 """How much white is in the colour of a part."""
-_MARGIN, _HEAD, _FOOT = 0.15, 0.32, 0.3
+_MARGIN = 0.15
+_HEAD = 0.32
+_FOOT = 0.3
 """Inches around the graph, and for the title above it and the words below it."""
-_DASHES, _DASH_DOTS = (0, (4, 2.5)), (0, (9, 2, 1.5, 2))
+_DASHES = (0, (4, 2.5))
+_DASH_DOTS = (0, (9, 2, 1.5, 2))
 
 _Colors = Mapping[str, tuple[float, float, float]]
 

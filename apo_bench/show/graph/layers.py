@@ -123,12 +123,14 @@ def _ordered(rows: _Rows, links: Links) -> _Rows:
     """The order of least cost; of equal ones the first."""
     if prod(factorial(len(row)) for row in rows) <= _FEW:
         return min(product(*(permutations(row) for row in rows)), key=lambda each: _cost(each, links))
-    best, least = rows, _cost(rows, links)
+    best = rows
+    least = _cost(rows, links)
     while True:
         found = min(_neighbours(best), key=lambda each: _cost(each, links))
         if _cost(found, links) >= least:
             return best
-        best, least = found, _cost(found, links)
+        best = found
+        least = _cost(found, links)
 
 
 def _neighbours(rows: _Rows) -> list[_Rows]:

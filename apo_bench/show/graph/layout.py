@@ -16,9 +16,11 @@ _GAP = 0.72
 """Between rows: room for a label of two lines."""
 _LETTER = 0.082
 """A letter of a name."""
-_TERM, _INVERSE = 0.19, 0.16
+_TERM = 0.19
+_INVERSE = 0.16
 """A term of an ODL, and what its exponent adds."""
-_LABEL_LETTER, _LABEL_LINE = 0.07, 0.135
+_LABEL_LETTER = 0.07
+_LABEL_LINE = 0.135
 _ALONG = (0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78)
 """Places of a label on a straight piece of its arrow, the best first."""
 

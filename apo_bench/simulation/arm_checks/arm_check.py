@@ -23,12 +23,15 @@ from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
-_TABLE_M, _TURNS = 0.03, (-1.2, 0.0, 1.2)
+_TABLE_M = 0.03
+_TURNS = (-1.2, 0.0, 1.2)
 """Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
 _PUSH_N = 5.0
 """Stiffness is looked at by this push."""
-_LAYOUTS, _MOST_GIVING_M = 20, 0.002
-_LEAST_MARGIN_DEG, _MOST_TURN_DEG = 5.0, 5.0
+_LAYOUTS = 20
+_MOST_GIVING_M = 0.002
+_LEAST_MARGIN_DEG = 5.0
+_MOST_TURN_DEG = 5.0
 
 
 @final
@@ -137,9 +140,11 @@ def unsaid(arm: Arm) -> list[str]:
 
 
 def _reach(kinematics: Kinematics, arm: Arm) -> Array:
-    rows, rest = [], turn_from(tip_down(np.zeros(3)), kinematics.forward(arm.home))
+    rows = []
+    rest = turn_from(tip_down(np.zeros(3)), kinematics.forward(arm.home))
     for x, y in _GRID:
-        q, reached = np.array(arm.home), 0
+        q = np.array(arm.home)
+        reached = 0
         for turn in _TURNS:
             found = kinematics.inverse(tip_down(np.array([x, y, _TABLE_M]), rest + turn), q, 25)
             reached += found is not None

@@ -42,7 +42,8 @@ def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove
     Args:
         searches: As in `moves`.
     """
-    found, believed = list[ArmMove](), plan.start
+    found = list[ArmMove]()
+    believed = plan.start
     for move in moves(plan, scene, searches):
         made = _arm_move(plan, scene, move, believed)
         found.append(made)
@@ -53,7 +54,8 @@ def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove
 
 
 def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
-    step, t = move.step, move.transfer
+    step = move.step
+    t = move.transfer
     code, path, ended = key_angles(t, scene)
     if code:
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
@@ -61,7 +63,8 @@ def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
         return ArmMove(step.operation, step.undo)
     T = t.T_world_goal @ pose.inverse(believed[t.part])
     held = plan.assembly.operations[step.operation].moves
-    after, tip = {**believed, **{part: T @ believed[part] for part in held}}, scene.kinematics.forward(path[-1])[:3, 3]
+    after = {**believed, **{part: T @ believed[part] for part in held}}
+    tip = scene.kinematics.forward(path[-1])[:3, 3]
     struck = max(
         _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, believed),
         _struck(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
@@ -89,7 +92,8 @@ def _at_limit(scene: Scene, q: Array) -> str:
 def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> _Struck:
     """What the open fingers are in where a part stands that they take, or have let go."""
     opening = min(grip.half_width + beyond, scene.arm.opening_m)
-    boxes, T = gripper_boxes(scene.kinematics, scene.arm, opening), poses[part] @ grip.T_part_tip
+    boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
+    T = poses[part] @ grip.T_part_tip
     deepest = _Struck()
     for other, pieces in scene.pieces.items():
         if other != part:
@@ -108,21 +112,25 @@ def _centroid(plan: Plan, move: Move, poses: Poses) -> Array:
 
 def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     """Where a weight takes the tip, and what it holds: servos give way by their torque over their stiffness."""
-    kinematics, model = scene.kinematics, scene.work.model
+    kinematics = scene.kinematics
+    model = scene.work.model
     tip = kinematics.forward(q)[:3, 3]
     J = _jacobian(kinematics.model, kinematics.configuration.data, kinematics.site, scene.arm.joints)
     stiffness = np.array([model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
     wrench = np.concatenate([force, np.cross(centroid - tip, force)])
     twist = J @ ((J.T @ wrench) / stiffness)
-    there, back = np.eye(4), np.eye(4)
-    there[:3, 3], back[:3, 3] = tip, -tip
+    there = np.eye(4)
+    back = np.eye(4)
+    there[:3, 3] = tip
+    back[:3, 3] = -tip
     return np.asarray(there @ pose.exp(twist) @ back)
 
 
 def _jacobian(model: Any, data: Any, site: int, joints: tuple[str, ...]) -> Array:
     """Of the tip, (6, joints): how it moves [m] and turns [rad] with each joint [rad], world."""
-    Jp, Jr = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    Jp = np.zeros((3, model.nv))
+    Jr = np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, Jp, Jr, site)
     return np.concatenate([Jp, Jr])[:, [int(model.joint(name).dofadr[0]) for name in joints]]
 

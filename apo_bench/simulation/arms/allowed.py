@@ -7,9 +7,14 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-LARGEST_BYTES, LARGEST_MESH_BYTES, MOST_MESH_BYTES = 5_000_000, 20_000_000, 100_000_000
+LARGEST_BYTES = 5_000_000
+LARGEST_MESH_BYTES = 20_000_000
+MOST_MESH_BYTES = 100_000_000
 """Of an MJCF file, of a mesh, of all meshes that something touches by."""
-MOST_FILES, DEEPEST, MOST_ELEMENTS, LONGEST_VALUE = 50, 64, 20_000, 1_000_000
+MOST_FILES = 50
+DEEPEST = 64
+MOST_ELEMENTS = 20_000
+LONGEST_VALUE = 1_000_000
 """Files that are included; levels of nesting; elements in all; letters of an attribute."""
 MOST_OF = MappingProxyType({"geom": 1000, "body": 200, "joint": 100, "site": 1000, "general": 64, "mesh": 1000})
 MESHES = (".stl", ".obj", ".msh")
@@ -190,7 +195,9 @@ REMEDIES: Mapping[str, str] = MappingProxyType(
 )
 """What to do instead."""
 _ANY = (-1e6, 1e6)
-_PLACE, _FEW, _GAINS = (-10.0, 10.0), (0.0, 1e5), (-1e7, 1e7)
+_PLACE = (-10.0, 10.0)
+_FEW = (0.0, 1e5)
+_GAINS = (-1e7, 1e7)
 RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {
         **dict.fromkeys(("pos", "fromto", "refpos", "anchor", "zaxis", "xyaxes", "axis"), _PLACE),

@@ -15,7 +15,9 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.description import ArmDescription
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms.apart import serve; serve()"
-_LIMIT_S, _WALL_S, _LIMIT_BYTES = 60, 180, 4_000_000_000
+_LIMIT_S = 60
+_WALL_S = 180
+_LIMIT_BYTES = 4_000_000_000
 _LARGEST_FILE = 100_000
 """Bytes that a library may write into a file."""
 

@@ -29,7 +29,8 @@ from apo_bench.simulation.arms.strength import with_force
 
 _TIP = "tip"
 _GRIPPER = "gripper/"
-_FINGER_ARMATURE, _FINGER_DAMPING = 1e-4, 0.02
+_FINGER_ARMATURE = 1e-4
+_FINGER_DAMPING = 0.02
 """Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
 _USUAL_FINGERS_M_S = 0.05
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
@@ -104,7 +105,8 @@ def build_arm(said: ArmDescription) -> Arm:
     if gripper.pads is not None and gripper.mjcf is not None:
         a, b = (name if _known(rig, name) else _GRIPPER + name for name in gripper.pads)
         gripper = replace(gripper, pads=(a, b))
-    where, flange = said.gripper.mjcf or said.mjcf, rig.body(last).id
+    where = said.gripper.mjcf or said.mjcf
+    flange = rig.body(last).id
     found, times = with_force(
         spec,
         said.gripper.force_n,
@@ -141,7 +143,8 @@ def _make_passive(spec: Any, joints: Sequence[str]) -> None:
         body.gravcomp = 1.0
     for geom in spec.geoms:
         if geom.contype or geom.conaffinity:
-            geom.contype, geom.conaffinity = 1, 0
+            geom.contype = 1
+            geom.conaffinity = 0
     standing = spec.joint(joints[0]).parent
     for body in spec.bodies:
         if body.name == standing.name or not _turns(body, joints):

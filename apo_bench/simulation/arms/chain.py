@@ -30,10 +30,12 @@ def find_flange(model: Any, said: ArmDescription) -> tuple[int, Array]:
             )
         return _last_link(model, said), np.eye(4)
     if name in sites:
-        site, T = sites[name], np.eye(4)
+        site = sites[name]
+        T = np.eye(4)
         R = np.zeros(9)
         mujoco.mju_quat2Mat(R, model.site_quat[site])
-        T[:3, :3], T[:3, 3] = R.reshape(3, 3), model.site_pos[site]
+        T[:3, :3] = R.reshape(3, 3)
+        T[:3, 3] = model.site_pos[site]
         return int(model.site_bodyid[site]), T
     if name not in bodies:
         raise InputError(f"{said.file}: {unknown('flange', name, (*sites, *bodies))}")

@@ -16,7 +16,11 @@ from apo_bench.io.strict_toml import read_toml
 from apo_bench.scenario.keys import read_pose
 
 _SCHEMA = "apo-bench/arm/1"
-_MOST_JOINTS, _MOST_PAYLOAD_KG, _MOST_NM, _MOST_DEG_S, _MOST_MM_S = 16, 1000.0, 1e5, 3600.0, 1000.0
+_MOST_JOINTS = 16
+_MOST_PAYLOAD_KG = 1000.0
+_MOST_NM = 1e5
+_MOST_DEG_S = 3600.0
+_MOST_MM_S = 1000.0
 _MOST_FORCE_N = 60.0
 _MOST_OPENING_MM = 1000.0
 _STATED = ("tip", "slides", "opening_mm")

@@ -14,7 +14,8 @@ from apo_bench.simulation.arms.building import read_described
 from apo_bench.simulation.arms.description import USUAL_BASE, ArmDescription, GripperDescription
 from apo_bench.simulation.arms.tree import read_model_tree
 
-MENAGERIE, ROBOSUITE = "APO_BENCH_MENAGERIE", "APO_BENCH_ROBOSUITE"
+MENAGERIE = "APO_BENCH_MENAGERIE"
+ROBOSUITE = "APO_BENCH_ROBOSUITE"
 """Variables that name their folders."""
 _CACHE = Path("robot_descriptions") / "mujoco_menagerie"
 _2F85 = Path("robotiq_2f85") / "2f85.xml"
@@ -80,7 +81,8 @@ def _of_robosuite(name: str) -> ArmDescription:
             f"robosuite:{name}: robosuite was not found; install it with 'pip install --no-deps robosuite', or name "
             f"the folder of the package in {ROBOSUITE}."
         )
-    robots, key = root / "models" / "assets" / "robots", name.lower()
+    robots = root / "models" / "assets" / "robots"
+    key = name.lower()
     if key not in _GRIPPERS or not (robots / key / "robot.xml").is_file():
         raise InputError(f"{root}: {unknown('arm', name, _GRIPPERS)}")
     mjcf = robots / key / "robot.xml"

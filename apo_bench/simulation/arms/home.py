@@ -12,16 +12,21 @@ from apo_bench.simulation.arms.kinematics import Kinematics
 _AT = (-0.05, 0.0, 0.30)
 _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
 """Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room; ways it may wait."""
-_TURNS, _WAYS = (-1.6, 0.0, 1.6), (0.0, np.pi / 2, np.pi, -np.pi / 2)
-_TRIES, _WIDEST, _SAME_RAD = 40, 3.0, 0.2
-_TABLE_ROOM_M, _NEAR = 0.02, 0.4
+_TURNS = (-1.6, 0.0, 1.6)
+_WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
+_TRIES = 40
+_WIDEST = 3.0
+_SAME_RAD = 0.2
+_TABLE_ROOM_M = 0.02
+_NEAR = 0.4
 _ENOUGH_RAD = 0.3
 """More room to a limit than this counts less than links that are high above the table."""
 
 
 def tip_down(at: Array, turn: float = 0.0) -> Array:
     """A tip that looks down, (4, 4); at turn 0 its fingers close along x."""
-    c, s = np.cos(turn), np.sin(turn)
+    c = np.cos(turn)
+    s = np.sin(turn)
     T = np.eye(4)
     T[:3, :3] = np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, -1.0, -1.0])
     T[:3, 3] = at
@@ -34,7 +39,8 @@ def find_home(arm: Arm) -> Array:
     Raises:
         InputError: The arm does not reach over the table at all.
     """
-    kinematics, rng = Kinematics(arm, posture=False), np.random.default_rng(0)
+    kinematics = Kinematics(arm, posture=False)
+    rng = np.random.default_rng(0)
     low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.range_of_joints)
     found: list[tuple[Array, float]] = []
     for i in range(_TRIES):
@@ -74,7 +80,8 @@ def room(kinematics: Kinematics, home: Array, way: float) -> tuple[int, float]:
     """
     kinematics.keep_near(home)
     low, high = kinematics.range_of_joints
-    reached, least = 0, np.inf
+    reached = 0
+    least = np.inf
     for turn in _TURNS:
         for at in _TABLE:
             q = kinematics.inverse(tip_down(np.array(at), way + turn), home, 25)
@@ -93,6 +100,7 @@ def _unwound(q: Array, low: Array, high: Array) -> Array:
 def _in_table(kinematics: Kinematics, q: Array) -> bool:
     """Whether the centre of mass of a link lies in the table."""
     kinematics.forward(q)
-    data, model = kinematics.configuration.data, kinematics.model
+    data = kinematics.configuration.data
+    model = kinematics.model
     moved = model.body_jntnum[1:] > 0
     return bool((data.xipos[1:][moved, 2] < _TABLE_ROOM_M).any())

@@ -69,7 +69,8 @@ class Kinematics:
         self.configuration.update(self._full)
         data = self.configuration.data
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = data.site_xmat[self.site].reshape(3, 3), data.site_xpos[self.site]
+        T[:3, :3] = data.site_xmat[self.site].reshape(3, 3)
+        T[:3, 3] = data.site_xpos[self.site]
         return T
 
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
@@ -100,7 +101,8 @@ class Kinematics:
         H, c = self._task.compute_qp_objective(self.configuration)
         if self._posture is not None:
             more = self._posture.compute_qp_objective(self.configuration)
-            H, c = H + more[0], c + more[1]
+            H = H + more[0]
+            c = c + more[1]
         np.einsum("ii->i", H)[:] += self.DAMPING
         step: Array = np.linalg.solve(H, -c)
         low, high = self.GAIN * (self._range - self.configuration.q)
@@ -121,7 +123,8 @@ def _alone(arm: Arm) -> Any:
     stand = pose.unpack(np.array([*arm.base, *arm.turn]))
     for body in spec.worldbody.bodies:
         T = pose.pack(stand @ pose.unpack(np.array([*body.pos, *body.quat])))
-        body.pos, body.quat = T[:3], T[3:]
+        body.pos = T[:3]
+        body.quat = T[3:]
     return spec.compile()
 
 

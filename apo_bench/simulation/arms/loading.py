@@ -12,7 +12,8 @@ from apo_bench.errors import InputError, one_line
 from apo_bench.simulation.arms.allowed import MOST_MESH_BYTES
 from apo_bench.simulation.arms.tree import checked_size, read_model_tree
 
-_LONGEST, _LARGEST_BASE_M = 200, 0.5
+_LONGEST = 200
+_LARGEST_BASE_M = 0.5
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
 
 
@@ -118,7 +119,8 @@ def _is_world(equality: Any) -> bool:
 
 def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
     """Meshes that something touches by."""
-    used, size = {geom.meshname for geom in spec.geoms if geom.meshname}, 0
+    used = {geom.meshname for geom in spec.geoms if geom.meshname}
+    size = 0
     for mesh in list(spec.meshes):
         if mesh.name not in used:
             spec.delete(mesh)

@@ -22,7 +22,9 @@ from apo_bench.simulation.arms.pads import pads_of, reach_of
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
 from apo_bench.simulation.arms.rig import Rig, ends_of, frame_of, poses_after, rig_of
 
-_LEVELS, _LEAST_M, _FAR_M = 17, 0.004, 1.0
+_LEVELS = 17
+_LEAST_M = 0.004
+_FAR_M = 1.0
 """Commands that are tried between closed and open; grippers that open less do not count; farther is not looked."""
 _BEYOND_M = 0.01
 """So far the pads reach beyond the tip."""
@@ -58,11 +60,14 @@ def measure(
     states = {end: poses_after(rig, np.array(end)) for end in ends}
     spread = {end: float(np.linalg.norm(c - c.mean(axis=0), axis=1).sum()) for end, c in states.items()}
     if said.open is not None and said.closed is not None:
-        opened, closed = said.open, said.closed
+        opened = said.open
+        closed = said.closed
     else:
-        opened, closed = np.array(max(spread, key=spread.__getitem__)), np.array(min(spread, key=spread.__getitem__))
+        opened = np.array(max(spread, key=spread.__getitem__))
+        closed = np.array(min(spread, key=spread.__getitem__))
     rig.settle(closed)
-    at_closed, frame = np.array(rig.data.geom_xpos), frame_of(rig, flange)
+    at_closed = np.array(rig.data.geom_xpos)
+    frame = frame_of(rig, flange)
     seconds = rig.settle(opened)
     way = at_closed - rig.data.geom_xpos
     sides, across, ahead = pads_of(rig, said, way, flange)
@@ -79,8 +84,13 @@ def _table(
     frame: Array,
     flange: int,
 ) -> Measured:
-    model, data, pads = rig.model, rig.data, sides[0] + sides[1]
-    rows, reach, middles, turns = [], [], [], []
+    model = rig.model
+    data = rig.data
+    pads = sides[0] + sides[1]
+    rows = []
+    reach = []
+    middles = []
+    turns = []
     closed, opened = ends
     for part in np.linspace(1.0, 0.0, _LEVELS):
         command = closed + part * (opened - closed)
@@ -96,7 +106,8 @@ def _table(
             f"{rig.path}: the gripper opens {2e3 * rows[0][0]:.1f} mm; {1e3 * _LEAST_M:g} mm are needed, so check "
             "'open' and 'closed', or name its 'pads'."
         )
-    longest, half = max(reach), kept[len(kept) // 2]
+    longest = max(reach)
+    half = kept[len(kept) // 2]
     side = np.cross(ahead, across)
     centre = np.mean([data.geom_xpos[g] for g in pads], axis=0)
     at = (middles[half] @ across) * across + (centre @ side) * side + (longest - _BEYOND_M) * ahead
@@ -105,7 +116,8 @@ def _table(
     T = np.eye(4)
     T[:3, :3] = R_mount.T @ np.column_stack([across, side, ahead])
     T[:3, 3] = R_mount.T @ (at - data.xpos[mount])
-    left, right = sides[0][0], sides[1][0]
+    left = sides[0][0]
+    right = sides[1][0]
     apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across))
     thick = apart - 2 * rows[-1][0]
     table = [rows[i] for i in kept]
@@ -146,11 +158,14 @@ def _ascending(openings: Sequence[float]) -> list[int]:
 
 def _between(model: Any, data: Any, sides: tuple[list[int], list[int]]) -> tuple[float, Array]:
     """The width between the pads, [m], and the middle of it, (3,), world."""
-    least, middle, line = np.inf, np.zeros(3), np.zeros(6)
+    least = np.inf
+    middle = np.zeros(3)
+    line = np.zeros(6)
     for a, b in product(*sides):
         width = mujoco.mj_geomDistance(model, data, a, b, _FAR_M, line)
         if width < least:
-            least, middle = width, (line[:3] + line[3:]) / 2
+            least = width
+            middle = (line[:3] + line[3:]) / 2
     return float(least), middle
 
 
@@ -158,7 +173,8 @@ def _mount(model: Any, pads: Sequence[int], flange: int) -> int:
     """The body behind all fingers, and what is fixed to it, but for the last link of the arm."""
     chains = []
     for g in pads:
-        body, chain = int(model.geom_bodyid[g]), []
+        body = int(model.geom_bodyid[g])
+        chain = []
         while body:
             chain.append(body)
             body = int(model.body_parentid[body])

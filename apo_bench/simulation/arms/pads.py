@@ -11,7 +11,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.arms.rig import Rig, below, frame_of
 
-_MOVES_M, _TIP_M = 0.001, 0.012
+_MOVES_M = 0.001
+_TIP_M = 0.012
 """What moves less than the first is no finger; what ends within the second of the farthest end is of a pad."""
 _SNAP = np.cos(np.radians(1.0))
 
@@ -20,7 +21,8 @@ def pads_of(
     rig: Rig, said: GripperDescription, way: Array, flange: int
 ) -> tuple[tuple[list[int], list[int]], Array, Array]:
     """The pads of both sides, by geom; the closing direction and the way ahead, unit vectors, world."""
-    model, data = rig.model, rig.data
+    model = rig.model
+    data = rig.data
     hanging = below(model, flange)
     touching = [
         g
@@ -64,7 +66,8 @@ def pads_of(
 def reach_of(model: Any, data: Any, geom: int, ahead: Array) -> float:
     """How far the box around a geom reaches along a direction, world, [m]."""
     along = data.geom_xmat[geom].reshape(3, 3).T @ ahead
-    centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+    centre = model.geom_aabb[geom, :3]
+    half = model.geom_aabb[geom, 3:]
     return float(data.geom_xpos[geom] @ ahead + centre @ along + half @ np.abs(along))
 
 

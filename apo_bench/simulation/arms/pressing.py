@@ -15,9 +15,13 @@ PROBE = "probe"
 PROBE_WIDE = 0.5
 """How wide it is, as a part of the opening."""
 _AWAY_M = 1.0
-_SQUEEZES_M, _MOST_N = (0.03, 0.015, 0.008, 0.004), 60.0
+_SQUEEZES_M = (0.03, 0.015, 0.008, 0.004)
+_MOST_N = 60.0
 """How far inside a part fingers are sent at most: less where they press harder than this."""
-_PROBE_HIGH_M, _STEPS, _SLOWLY_S, _LOOKS = 0.006, 16, 0.02, 100
+_PROBE_HIGH_M = 0.006
+_STEPS = 16
+_SLOWLY_S = 0.02
+_LOOKS = 100
 """Half of its height, about the tip; in how many steps a gripper is closed on it, and how long each takes; steps over
 which the force is averaged."""
 
@@ -28,12 +32,15 @@ def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, 
 
     Farther means harder where the drive is soft; it is not more than a part should be pressed by.
     """
-    model, data = rig.model, rig.data
-    opening, opened = table[-1][0], table[-1][1]
+    model = rig.model
+    data = rig.data
+    opening = table[-1][0]
+    opened = table[-1][1]
     body = model.body(PROBE).id
     geom = int(model.body_geomadr[body])
     half = np.array([PROBE_WIDE * opening, 0.02, _PROBE_HIGH_M])
-    model.geom_size[geom], model.geom_rbound[geom] = half, float(np.linalg.norm(half))
+    model.geom_size[geom] = half
+    model.geom_rbound[geom] = float(np.linalg.norm(half))
     model.geom_aabb[geom, 3:] = half
     mocap = int(model.body_mocapid[body])
     data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
@@ -42,7 +49,8 @@ def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, 
         rig.settle(opened)
         data.mocap_pos[mocap] = at
         mujoco.mju_mat2Quat(data.mocap_quat[mocap], np.ascontiguousarray(R).ravel())
-        wanted, openings = half[0] - squeeze, [row[0] for row in table]
+        wanted = half[0] - squeeze
+        openings = [row[0] for row in table]
         closed = np.array([np.interp(wanted, openings, column) for column in np.array([row[1] for row in table]).T])
         force, friction = _pressed(rig, geom, opened, closed, R[:, 0])
         data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
@@ -57,12 +65,15 @@ def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) 
     for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         rig.settle(opened + part * (closed - opened), _SLOWLY_S)
     rig.settle(closed)
-    total, rubs, wrench = 0.0, 0.0, np.zeros(6)
+    total = 0.0
+    rubs = 0.0
+    wrench = np.zeros(6)
     for _ in range(_LOOKS):
         rig.settle(closed, STEP_S)
         for c in range(data.ncon):
             mujoco.mj_contactForce(rig.model, data, c, wrench)
             push = abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
             pad = next(int(g) for g in data.contact[c].geom if g != probe)
-            total, rubs = total + push, rubs + push * float(rig.model.geom_friction[pad, 0])
+            total = total + push
+            rubs = rubs + push * float(rig.model.geom_friction[pad, 0])
     return total / 2 / _LOOKS, round(rubs / total, 6) if total else 0.0

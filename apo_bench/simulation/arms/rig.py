@@ -16,7 +16,9 @@ from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.physics import physics
 
 STEP_S = 0.001
-_LONGEST_S, _STILL, _QUIET = 1.5, 2e-3, 20
+_LONGEST_S = 1.5
+_STILL = 2e-3
+_QUIET = 20
 """Longest time of one command; joints slower than the second rest after so many steps."""
 _MOST_ACTUATORS = 4
 
@@ -36,15 +38,18 @@ class Rig(NamedTuple):
 
     def settle(self, command: Array, most_s: float = _LONGEST_S) -> float:
         """Drive until nothing moves; returns how long it took, [s]."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         data.ctrl[self.actuators] = command
         dof = model.jnt_dofadr[self.joints]
         quiet = 0
-        steps, most = 0, round(most_s / STEP_S)
+        steps = 0
+        most = round(most_s / STEP_S)
         while steps < most and quiet < _QUIET:
             steps += 1
             mujoco.mj_step(model, data)
-            data.qpos[self.arm], data.qvel[self.arm_dof] = self.home, 0.0
+            data.qpos[self.arm] = self.home
+            data.qvel[self.arm_dof] = 0.0
             quiet = quiet + 1 if np.abs(data.qvel[dof]).max() < _STILL else 0
         if not np.isfinite(data.qpos).all() or data.warning.number.any():
             raise InputError(f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.")
@@ -62,11 +67,14 @@ def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: i
         raise InputError(
             f"{path}: the gripper has {what}; give its MJCF in 'gripper', with hinges or slides and what drives them."
         )
-    model.opt.timestep, model.opt.gravity[:] = STEP_S, 0.0
+    model.opt.timestep = STEP_S
+    model.opt.gravity[:] = 0.0
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
     hard = physics(STEP_S)
-    model.geom_solref[:], model.geom_solimp[:] = hard.solref, hard.solimp
-    model.opt.cone, model.opt.impratio = int(mujoco.mjtCone.mjCONE_ELLIPTIC), hard.impratio
+    model.geom_solref[:] = hard.solref
+    model.geom_solimp[:] = hard.solimp
+    model.opt.cone = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+    model.opt.impratio = hard.impratio
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     data = mujoco.MjData(model)
     at = np.array([model.jnt_qposadr[j] for j in arm])
@@ -130,7 +138,8 @@ def poses_after(rig: Rig, command: Array) -> Array:
 
 def frame_of(rig: Rig, body: int) -> Array:
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rig.data.xmat[body].reshape(3, 3), rig.data.xpos[body]
+    T[:3, :3] = rig.data.xmat[body].reshape(3, 3)
+    T[:3, 3] = rig.data.xpos[body]
     return T
 
 

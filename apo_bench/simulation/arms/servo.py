@@ -16,7 +16,8 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 
-_SOFT_HZ, _MOST_HZ = 15.0, 45.0
+_SOFT_HZ = 15.0
+_MOST_HZ = 45.0
 """A position actuator whose joint would swing slower than the first is too soft; none is made that swings faster than
 the second."""
 _STIFF_NM = 5000.0
@@ -37,7 +38,8 @@ def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
     found = {}
     for name in joints:
         j = model.joint(name).id
-        stiffness, limit = 0.0, math.inf
+        stiffness = 0.0
+        limit = math.inf
         for a in range(model.nu):
             kind = int(model.actuator_trntype[a])
             if kind != int(mujoco.mjtTrn.mjTRN_JOINT) or int(model.actuator_trnid[a, 0]) != j:
@@ -81,7 +83,8 @@ def add_servos(spec: Any, joints: Sequence[str], inertia: Array, drives: Mapping
     for name, felt in zip(joints, inertia, strict=True):
         kp = stiffness_for(float(felt))
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+        servo.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         servo.gainprm[0] = kp
         servo.biasprm[:3] = (0.0, -kp, -2.0 * math.sqrt(kp * float(felt)))
         if math.isfinite(drives[name].torque):

@@ -13,7 +13,9 @@ LEAST_FORCE_N = 10.0
 """Of each pad: below it parts slip."""
 _USUAL_FORCE_N = 20.0
 """As the usual arm; of a drive that is made stronger unasked."""
-_NEAR, _TRIES, _NOTHING_N = 0.02, 5, 0.01
+_NEAR = 0.02
+_TRIES = 5
+_NOTHING_N = 0.01
 
 
 def with_force(
@@ -37,7 +39,8 @@ def with_force(
     first = found = measured(spec)
     if wanted_n is None and found.hand.force_n >= LEAST_FORCE_N:
         return found, 1.0
-    aim, times = _USUAL_FORCE_N if wanted_n is None else wanted_n, 1.0
+    aim = _USUAL_FORCE_N if wanted_n is None else wanted_n
+    times = 1.0
     for _ in range(_TRIES):
         if abs(found.hand.force_n - aim) <= _NEAR * aim:
             return found, times

@@ -70,7 +70,8 @@ class _Reading:
     """Counts what all files say together."""
 
     def __init__(self, path: Path, kind: str) -> None:
-        self.main, self.kind = path, kind
+        self.main = path
+        self.kind = kind
         self.files: list[Path] = []
         self.counts: Counter[str] = Counter()
 
@@ -117,7 +118,9 @@ class _Parser:
     """Elements and attributes, and nothing else."""
 
     def __init__(self, path: Path, reading: _Reading) -> None:
-        self.path, self._reading, self._deep = path, reading, 0
+        self.path = path
+        self._reading = reading
+        self._deep = 0
         self.builder = TreeBuilder()
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start
@@ -150,7 +153,8 @@ class _Parser:
 
 def _check_element(path: Path, element: Element, outer: Element | None) -> None:
     """Refuse what may not be said, and take out what a scene has of its own."""
-    tag, around = element.tag, "" if outer is None else outer.tag
+    tag = element.tag
+    around = "" if outer is None else outer.tag
     if outer is None and tag != "mujoco":
         raise InputError(f"{path}: the outermost element is <{tag[:60]}>; an MJCF file begins with <mujoco>.")
     allowed = WRAPPED.get((around, tag), ATTRIBUTES[tag])
@@ -186,7 +190,8 @@ def _check_option(path: Path, option: Element) -> None:
 
 def _meshes(root: Element, path: Path, kind: str) -> list[Path]:
     """The files of meshes that are named, each set to its whole path; what is not there is said where it is used."""
-    found, size = [], 0
+    found = []
+    size = 0
     folders = [element.attrib for element in root.iter("compiler")]
     beside = next((said[key] for key in ("meshdir", "assetdir") for said in folders[::-1] if key in said), "")
     strip = any(said.get("strippath") == "true" for said in folders)

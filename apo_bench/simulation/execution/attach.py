@@ -12,9 +12,13 @@ from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, fir
 from apo_bench.simulation.robot.paths import Trajectory, paced, shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Guard, Robot
 
-_PLACE, _TOUCH, _INSERT, _SLIDE = 0.06, 0.01, 0.06, 0.005
+_PLACE = 0.06
+_TOUCH = 0.01
+_INSERT = 0.06
+_SLIDE = 0.005
 """Steady speeds [m/s]: down to just above the support, onto it, along an insertion, against a part at the side."""
-_PULL, _LEAVE = 0.1, 0.03
+_PULL = 0.1
+_LEAVE = 0.03
 """Peak speeds [m/s] of a part that is pulled out, and of one that is moved off a side."""
 _OVERTRAVEL_M = 0.002
 """Contact is sought this far beyond the goal."""
@@ -24,9 +28,11 @@ ARRIVED_M = 0.001
 """An insertion that stops earlier than this before its end was stopped by force."""
 _THROUGH = 0.15
 """Steady speed [m/s] where only walls are that the part is between already."""
-_BEFORE_M, _BEHIND_M = 0.008, 0.004
+_BEFORE_M = 0.008
+_BEHIND_M = 0.004
 """A mouth may be so much nearer or farther than it is believed to be."""
-_BEYOND_M, _OFF_M = 0.004, 0.0003
+_BEYOND_M = 0.004
+_OFF_M = 0.0003
 """A slide may go this much beyond the goal, this high over the floor."""
 _LOOSE_M = 0.00005
 """Faces this far apart touch for the judge, and do not rub."""
@@ -50,7 +56,9 @@ def attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[
 def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
     """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
     robot.stage = "attach"
-    guard, rise, found = Guard(t.into.way, t.insert_n), t.floats, None
+    guard = Guard(t.into.way, t.insert_n)
+    rise = t.floats
+    found = None
     if t.into.left is not None and second is not None:
         there = shifted(shifted(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
         line = _into(robot, t, there @ grip.T_part_tip, t.into.left)
@@ -58,7 +66,8 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
         if left > ARRIVED_M:
             return left + t.into.left, grip
         change(robot, t, grip, second, after_search(found, shifted(there, UP, -rise) @ second.T_part_tip))
-        grip, rise = second, t.clearance
+        grip = second
+        rise = t.clearance
         robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
     goal = after_search(found, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if any(macro.name == "move-to-bottom" for macro in t.macros):

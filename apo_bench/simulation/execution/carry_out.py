@@ -9,7 +9,9 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer, first_contac
 from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-_LIFT, _CARRY, _LOWER = (0.4, 0.25), (0.5, 0.35), (0.35, 0.2)
+_LIFT = (0.4, 0.25)
+_CARRY = (0.5, 0.35)
+_LOWER = (0.35, 0.2)
 """Peak speeds with a part, and with one that carries others, [m/s]: it drifts in the hand, the faster the more."""
 _LOST_LOAD = 0.8
 """A hand that feels less than this part of the weight of a group has lost some of it."""

@@ -25,9 +25,11 @@ from apo_bench.simulation.scene.world import sleeping, snapshot
 
 _SETTLE_S = 0.5
 """At the end, everything is left alone this long."""
-_REST_M_S, _REST_RAD_S = 5e-5, 1e-3
+_REST_M_S = 5e-5
+_REST_RAD_S = 1e-3
 """Slower than this, all parts rest and the next operation may begin; a stick that rocks in its slot takes a while."""
-LOOK_S, PATIENCE_S = 0.04, 1.5
+LOOK_S = 0.04
+PATIENCE_S = 1.5
 _SHORTEST_STEP_S = 1.0
 """Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
 _STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
@@ -126,7 +128,8 @@ def _carry_out(
         except Halt as halt:
             return _outcome(plan, "pick", halt.code, plan.schedule[0].operation, halt.part)
     else:
-        after[:], timeline[:] = kept.after, kept.timeline
+        after[:] = kept.after
+        timeline[:] = kept.timeline
     for i, (step, t) in list(enumerate(todo))[done // 2 :]:
         if robot.data.time > most_s:
             return _late(plan, "pick", step)

@@ -7,10 +7,12 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
 from apo_bench.simulation.robot.paths import at_height, shifted, smooth
 from apo_bench.simulation.robot.robot import Halt, Robot
 
-_FREE, _NEAR = 2.0, 0.8
+_FREE = 2.0
+_NEAR = 0.8
 """Peak speeds of the empty hand, [m/s]: in the air, close to parts."""
 _DEPART_M = 0.09
-OPEN_TO_PICK_M, OPEN_TO_RELEASE_M = 0.012, 0.008
+OPEN_TO_PICK_M = 0.012
+OPEN_TO_RELEASE_M = 0.008
 """How far each finger stands off before it closes, and when it has let go."""
 _LOST_M = 0.002
 """Fingers that close this far beyond the part's surface hold nothing; those of a linkage that gives way, a quarter of

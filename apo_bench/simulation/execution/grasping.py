@@ -118,7 +118,10 @@ def tip_frame(grasp: Grasp, T_part: Array) -> Array:
     """The tip in the part's frame, (4, 4): looking down where the part stands like this, closing along `across`."""
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0])
     T = np.eye(4)
-    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = grasp.across, np.cross(ahead, grasp.across), ahead, grasp.point
+    T[:3, 0] = grasp.across
+    T[:3, 1] = np.cross(ahead, grasp.across)
+    T[:3, 2] = ahead
+    T[:3, 3] = grasp.point
     return T
 
 
@@ -161,7 +164,8 @@ def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, G
 
 def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
     """Places on the part at T: those of the box around it where they are on a part of boxes, else by its shape."""
-    solid, up = scene.scenario.assembly.solids[part], _upwards(T)
+    solid = scene.scenario.assembly.solids[part]
+    up = _upwards(T)
     if all_boxes(solid.pieces):
         around = _around_box(scene, solid, T)
         if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
@@ -173,7 +177,8 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
 def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     """Across either level axis of the box around a part, the narrower one first, from the middle outwards."""
     low, high = solid.bounds
-    size, middle = high - low, (high + low) / 2
+    size = high - low
+    middle = (high + low) / 2
     up = int(np.abs(T[2, :3]).argmax())
     rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
@@ -204,7 +209,8 @@ def _clear_ones(
     scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
 ) -> Iterator[Grasp]:
     """Those grasps one after the other, worked out as they are asked for."""
-    pieces, T = scene.scenario.assembly.solids[part].pieces, places[0].T
+    pieces = scene.scenario.assembly.solids[part].pieces
+    T = places[0].T
 
     def kind(grasp: Grasp) -> tuple[float, ...]:
         return (*map(float, grasp.across), round(_known_width(pieces, grasp, T), 6))
@@ -248,7 +254,8 @@ def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[O
     """
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
     low, high = upright_bounds(boxes, R, np.zeros(3))
-    low, high = low + at.min(axis=0), high + at.max(axis=0)
+    low = low + at.min(axis=0)
+    high = high + at.max(axis=0)
     depth = np.full(len(at), -1.0)
     for each in around:
         if (low < each.high).all() and (high > each.low).all():

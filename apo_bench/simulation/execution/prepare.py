@@ -43,7 +43,9 @@ from apo_bench.simulation.robot.reach import at_end
 from apo_bench.simulation.scene.scene import Scene
 
 _GRAVITY = 9.81
-_PLACE_WEIGHTS, _INSERT_WEIGHTS, _SLIDE_WEIGHTS = 6.0, 2.5, 0.5
+_PLACE_WEIGHTS = 6.0
+_INSERT_WEIGHTS = 2.5
+_SLIDE_WEIGHTS = 0.5
 """Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
 _FINGER_M = 0.01
@@ -105,7 +107,9 @@ def unreachable(scene: Scene, transfer: Transfer) -> str:
 def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
     """Joint angles at the tip poses that must be in reach; remembered, since who foretells a transfer and who carries
     it out ask for the same."""
-    q, before, reached = np.array(scene.arm.home), None, list[Array]()
+    q = np.array(scene.arm.home)
+    before = None
+    reached = list[Array]()
     for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
         for T in poses:
             found = scene.kinematics.inverse(T, q)
@@ -113,7 +117,8 @@ def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
                 found = _reached_on_the_way(scene, before, T, q)
             if found is None:
                 return KeyAngles(code, tuple(reached), scene.kinematics.last)
-            q, before = found, T
+            q = found
+            before = T
             reached.append(q)
     return KeyAngles("", tuple(reached), q)
 
@@ -173,14 +178,17 @@ def _tasks(plan: Plan, scene: Scene) -> list[_Task]:
 def _transfer(plan: Plan, scene: Scene, task: _Task, believed: Poses, searches: bool) -> Transfer:
     k, undo = task.step
     operation = plan.assembly.operations[k]
-    part, start, target = operation.main, believed[operation.main], task.target
+    part = operation.main
+    start = believed[operation.main]
+    target = task.target
     T = target @ pose.inverse(start)
     after = {**believed, **{p: T @ believed[p] for p in operation.moves}}
     what = nominal_operations(scene.scenario)[k]
     leaves = what.after if undo or task.was == k else what.before
     comes = what.before if undo else what.after
     contacts = tuple(each.contact for each in comes.touched)
-    into, inserts = arrival_line(comes, target), any(macro.inserts for macro in comes.macros)
+    into = arrival_line(comes, target)
+    inserts = any(macro.inserts for macro in comes.macros)
     if undo and not into.level:
         into = ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
     grips, out, into = _grips(scene, task, part, arrival_line(leaves, start), into, believed, after)
@@ -235,7 +243,8 @@ def _grips(
     scene: Scene, task: _Task, part: str, out: ApproachLine, into: ApproachLine, believed: Poses, after: Poses
 ) -> tuple[tuple[Grip, ...], ApproachLine, ApproachLine]:
     """Where to hold the part, and both lines with the place where the grip changes."""
-    solids, preferred = scene.scenario.assembly.solids, scene.scenario.grasps[task.step.operation]
+    solids = scene.scenario.assembly.solids
+    preferred = scene.scenario.grasps[task.step.operation]
     if task.was is not None and out.level:
         preferred = scene.scenario.grasps[task.was]
     start = RestingPart(believed[part], obstacles(solids, believed, (part,)))
@@ -273,7 +282,8 @@ def _centring(
     Closing fingers centre a part in their own direction only; along them it has drifted in the hand. What fits into
     or onto the part later needs it in its place across the walls of that fit.
     """
-    part, T = assembly.operations[k].main, after[assembly.operations[k].main]
+    part = assembly.operations[k].main
+    T = after[assembly.operations[k].main]
     sides = [macro.way for macro in macros if macro.name == "slide-to-contact"]
     settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
     place = RestingPart(T, obstacles(assembly.solids, after, (part,)))

@@ -66,10 +66,12 @@ class ReplayCache:
         """Keep the present state under what has led to it; nothing sleeps in it."""
         awaken(robot.scene.work, robot.data)
         if mark not in self._kept:
-            model, data = robot.model, robot.data
+            model = robot.model
+            data = robot.data
             state = np.zeros(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
-            felt, welds = data.sensordata.copy(), model.eq_data.copy()
+            felt = data.sensordata.copy()
+            welds = model.eq_data.copy()
             saved = SavedState(state, felt, welds, robot.memory(), grip, tuple(after), tuple(timeline))
             _keep(self._kept, mark, saved)
 

@@ -14,15 +14,19 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
 from apo_bench.simulation.robot.robot import Guard, Robot
 
-_YAWS_DEG, _YAWED_RADIUS_M = (1.0, -1.0, 2.0, -2.0), 0.001
+_YAWS_DEG = (1.0, -1.0, 2.0, -2.0)
+_YAWED_RADIUS_M = 0.001
 """Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
-_BACK_M, _BACK, _BRING = 0.0005, 0.005, 0.03
+_BACK_M = 0.0005
+_BACK = 0.005
+_BRING = 0.03
 """Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
 _DEEP_M = 0.001
 """What goes so much deeper than where it was stopped has found the hole."""
 _SEARCHES = 3
 """A motion is searched for so many times at most, in one transfer up to twice as often."""
-_PIECE_M, _NOTHING_M = 0.01, 1e-6
+_PIECE_M = 0.01
+_NOTHING_M = 1e-6
 """Giving way, the tip goes on in pieces of this length; less than the second is nothing."""
 
 
@@ -36,7 +40,9 @@ def press_in(
         if nothing was searched for or found.
     """
     end = meant = line.end
-    left, found, aside = robot.follow(line, guard), None, 0.0
+    left = robot.follow(line, guard)
+    found = None
+    aside = 0.0
     if t.front is None:
         return left, None
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
@@ -44,14 +50,16 @@ def press_in(
         if left <= near or aside >= RADIUS_M:
             break
         stopped = shifted(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
-        macro, robot.macro = robot.macro, "search"
+        macro = robot.macro
+        robot.macro = "search"
         more = search_hole(robot, stopped, (stopped @ T_tip_front)[:3, 3], guard, t.slide_n, RADIUS_M - aside)
         robot.macro = macro
         if more is None:
             break
         guard = Guard(more[:3, :3] @ guard.way, guard.newton)
         more = shifted(more, _ease_in(robot, more @ end, guard), 1.0)
-        found, end = after_search(found, more), more @ end
+        found = after_search(found, more)
+        end = more @ end
         left = float((end - robot.T)[:3, 3] @ guard.way)
         aside = float(np.linalg.norm((end - meant)[:3, 3]))
     return left, found
@@ -78,7 +86,8 @@ def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press:
     for yaw in (0.0, *_YAWS_DEG):
         turn = _turned(yaw, front)
         _bring(robot, turn @ off, guard.way)
-        turned, far = Guard(turn[:3, :3] @ guard.way, guard.newton), min(radius, _YAWED_RADIUS_M) if yaw else radius
+        turned = Guard(turn[:3, :3] @ guard.way, guard.newton)
+        far = min(radius, _YAWED_RADIUS_M) if yaw else radius
         spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
         robot.servo(spiral)
         if spiral.found:

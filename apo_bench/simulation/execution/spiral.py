@@ -14,9 +14,12 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.robot.low_pass import LowPass
 from apo_bench.simulation.robot.robot import Guard
 
-RADIUS_M, PITCH_M = 0.002, 0.00035
+RADIUS_M = 0.002
+PITCH_M = 0.00035
 """How far off a hole is looked for; the turns are less far apart than the usual play of 0.5 mm is wide."""
-_ACROSS, _FEED, _EASE = 0.01, 0.005, 0.02
+_ACROSS = 0.01
+_FEED = 0.005
+_EASE = 0.02
 """Speeds [m/s]: along the spiral, ahead where nothing pushes back, and ahead in a hole."""
 _SOFT = 0.02
 """How fast the speed ahead grows, [m/s^2]: what lost touch by a few hundredths of a millimetre comes back softly."""
@@ -26,7 +29,8 @@ _FELT_S = 0.01
 """Forces are averaged over this time: hard parts rattle."""
 _INNER_M = 0.0005
 """Inside this radius the spiral is slower: around its middle it would turn at once."""
-_PATIENCE, _DOWN_S = 3.0, 1.0
+_PATIENCE = 3.0
+_DOWN_S = 1.0
 """A spiral ends after so many times the time that its length takes, and this long, [s], for the way ahead."""
 
 
@@ -34,7 +38,9 @@ class _Felt:
     """The force on the part, averaged: called once a physics step."""
 
     def __init__(self, guard: Guard, step_s: float) -> None:
-        self._way, self._step_s, self._averaged = guard.way.tolist(), step_s, LowPass(_FELT_S)
+        self._way = guard.way.tolist()
+        self._step_s = step_s
+        self._averaged = LowPass(_FELT_S)
 
     def __call__(self, force: Sequence[float]) -> tuple[float, list[float]]:
         """How hard it is pushed back, [N], and the rest of the force, across, (3,), [N]."""
@@ -55,12 +61,19 @@ class Spiral:
             radius: How far across it goes at most, [m].
             deep: What goes so far ahead has found the hole, [m].
         """
-        self.guard, self.press, self.radius, self.deep, self.step_s = guard, press, radius, deep, step_s
+        self.guard = guard
+        self.press = press
+        self.radius = radius
+        self.deep = deep
+        self.step_s = step_s
         level = abs(guard.way[2]) < 0.5
         first = np.cross((0.0, 0.0, 1.0) if level else (0.0, 1.0, 0.0), guard.way)
         first /= np.linalg.norm(first)
         self._axes = np.array([first, np.cross(guard.way, first)])
-        self._felt, self._ahead, self._speed, self._angle = _Felt(guard, step_s), 0.0, 0.0, 0.0
+        self._felt = _Felt(guard, step_s)
+        self._ahead = 0.0
+        self._speed = 0.0
+        self._angle = 0.0
         self._left = round((_PATIENCE * np.pi * radius**2 / PITCH_M / _ACROSS + _DOWN_S) / step_s)
         self.found = False
 
@@ -77,7 +90,8 @@ class Spiral:
         """How far the tip shall be from where it began, (3,), world, [m]; None at the end."""
         push, across = self._felt(force)
         side = math.hypot(*across)
-        self.found, self._left = self._ahead > self.deep, self._left - 1
+        self.found = self._ahead > self.deep
+        self._left = self._left - 1
         if self.found or self._r > self.radius or self._left < 0 or side > push + self.guard.newton:
             return None
         if push > self.press / 4:
@@ -93,8 +107,12 @@ class Easing:
     """Ahead, and across to where walls push: it ends after a length, or where the guard stops it."""
 
     def __init__(self, guard: Guard, length: float, step_s: float) -> None:
-        self.guard, self.length, self.step_s = guard, length, step_s
-        self._felt, self._offset, self._ahead = _Felt(guard, step_s), np.zeros(3), 0.0
+        self.guard = guard
+        self.length = length
+        self.step_s = step_s
+        self._felt = _Felt(guard, step_s)
+        self._offset = np.zeros(3)
+        self._ahead = 0.0
         self.stopped = False
 
     def __call__(self, force: Sequence[float]) -> Array | None:
@@ -105,5 +123,6 @@ class Easing:
             return None
         ahead = min(self.step_s * _EASE, self.length - self._ahead)
         across = self.step_s * _YIELD * np.array(side)
-        self._ahead, self._offset = self._ahead + ahead, self._offset + across + ahead * self.guard.way
+        self._ahead = self._ahead + ahead
+        self._offset = self._offset + across + ahead * self.guard.way
         return self._offset

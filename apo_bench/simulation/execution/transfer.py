@@ -146,9 +146,11 @@ def first_contact_pose(t: Transfer) -> Array:
 
 def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Tip poses that must be in reach for the transfer to be possible: where the part is taken, and where it is put."""
-    first, last = t.grips[0].T_part_tip, t.grips[-1].T_part_tip
+    first = t.grips[0].T_part_tip
+    last = t.grips[-1].T_part_tip
     carrying = t.grips[1 if t.out.left is not None else 0].T_part_tip
-    pick, goal = t.T_world_start @ first, t.T_world_goal @ last
+    pick = t.T_world_start @ first
+    goal = t.T_world_goal @ last
     free = shifted(t.T_world_start @ carrying, t.out.way, -t.out.travel)
     before = shifted(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
     above, over = (at_height(T, max(t.safe, T[2, 3])) for T in (free, before))

@@ -14,11 +14,16 @@ from PIL import Image, ImageDraw, ImageFont
 from apo_bench.io.default_looks import load_matplotlib
 
 _Picture = NDArray[np.uint8]
-ABOVE_PX, BELOW_PX = 32, 56
-_EDGE_PX, _LINE_PX, _TEXT_PX = 10, 22, 15
+ABOVE_PX = 32
+BELOW_PX = 56
+_EDGE_PX = 10
+_LINE_PX = 22
+_TEXT_PX = 15
 _LETTERS = 86
 """In a line of the usual width; what is longer goes on in the next."""
-_PAPER, _INK, _FAINT = (250, 250, 248), (30, 30, 32), (110, 110, 115)
+_PAPER = (250, 250, 248)
+_INK = (30, 30, 32)
+_FAINT = (110, 110, 115)
 _COLORS = {True: (20, 120, 50), False: (180, 30, 25), None: _INK}
 
 

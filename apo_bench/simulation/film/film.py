@@ -22,14 +22,19 @@ from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.render import camera_view, save_film
 from apo_bench.simulation.scene.world import World, initial_state
 
-_WIDTH, _HEIGHT = 720, 480
+_WIDTH = 720
+_HEIGHT = 480
 _INSET = (192, 128)
 SPEED = 2.0
-_FPS, _GIF_FPS = 20.0, 8.0
+_FPS = 20.0
+_GIF_FPS = 8.0
 _ENDING_S = 2.5
 """So long the end of a chapter stands still, with what came of it."""
-AZIMUTH_DEG, ELEVATION_DEG = 128.0, -24.0
-_NEAREST_M, _FARTHER, _ROOM_M = 0.12, 1.1, 0.04
+AZIMUTH_DEG = 128.0
+ELEVATION_DEG = -24.0
+_NEAREST_M = 0.12
+_FARTHER = 1.1
+_ROOM_M = 0.04
 """How far the camera stands off: this and so many diagonals of what it looks at; room above it for what comes down."""
 
 
@@ -63,7 +68,8 @@ def frames(
 def _chapter(
     assembly: Assembly, chapter: Chapter, near: Any, wide: Any, speed: float, fps: float
 ) -> Iterator[tuple[NDArray[np.uint8], float]]:
-    data, model = initial_state(chapter.world, chapter.start), chapter.world.model
+    data = initial_state(chapter.world, chapter.start)
+    model = chapter.world.model
     pace = "real time" if speed == 1.0 else f"x {speed:g}"
     with ExitStack() as stack:
         large = stack.enter_context(renderer(model, _WIDTH, _HEIGHT))
@@ -90,15 +96,20 @@ def _chapter(
 def sampled(moments: Sequence[Moment], every_s: float) -> Iterator[tuple[Moment, float, float]]:
     """Moments about so far apart in time, the last among them; each with the greatest force since the one before it and
     since its operation began, [N]: a guard stops a motion within a tick, which few pictures would meet."""
-    at, force, most, operation = -np.inf, 0.0, 0.0, moments[0].doing.operation
+    at = -np.inf
+    force = 0.0
+    most = 0.0
+    operation = moments[0].doing.operation
     for moment in moments:
         if moment.doing.operation != operation:
-            operation, most = moment.doing.operation, 0.0
+            operation = moment.doing.operation
+            most = 0.0
         force = max(force, moment.doing.force_n)
         most = max(most, force)
         if moment.time_s >= at or moment is moments[-1]:
             yield moment, force, most
-            at, force = moment.time_s + every_s - 1e-9, 0.0
+            at = moment.time_s + every_s - 1e-9
+            force = 0.0
 
 
 def put(world: World, data: Any, moment: Moment) -> None:
@@ -121,7 +132,8 @@ def operation_words(assembly: Assembly, moment: Moment) -> str:
 
 
 def _lines(assembly: Assembly, moment: Moment) -> tuple[str, ...]:
-    k, said = moment.doing.operation, operation_words(assembly, moment)
+    k = moment.doing.operation
+    said = operation_words(assembly, moment)
     if k is None:
         return (said,)
     contacts = "; ".join(map(str, assembly.operations[k].contacts))

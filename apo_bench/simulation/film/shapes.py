@@ -14,7 +14,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World
 
-_AROUND, _BALLS = 32, 2
+_AROUND = 32
+_BALLS = 2
 """Pieces around a cylinder; how often a ball is divided."""
 _SHOWN_GROUPS = 3
 """MuJoCo shows the geoms of groups 0 to 2."""
@@ -35,7 +36,8 @@ class Shape(NamedTuple):
 
 def shapes(world: World) -> tuple[Shape, ...]:
     """Everything that is drawn of a world, planes excepted."""
-    model, found = world.model, defaultdict[Any, list[tuple[Array, NDArray[np.int64]]]](list)
+    model = world.model
+    found = defaultdict[Any, list[tuple[Array, NDArray[np.int64]]]](list)
     parts = (*world.free, *world.fixed)
     for geom in range(model.ngeom):
         mesh = _mesh(model, geom)
@@ -56,7 +58,8 @@ def body_poses(scene: Scene, data: Any) -> Array:
 
 def part_shapes(world: World, part: str) -> tuple[Shape, ...]:
     """The shapes of one part, in the frame of the part."""
-    model, root = world.model, world.body[part]
+    model = world.model
+    root = world.body[part]
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     inverse = pose.inverse(pose.unpack([*data.xpos[root], *data.xquat[root]]))
@@ -85,11 +88,14 @@ def _mesh(model: Any, geom: int) -> tuple[Array, NDArray[np.int64]] | None:
     """Vertices (n, 3) and triangles (m, 3) of a geom in its own frame; None of what is no body."""
     from trimesh import creation
 
-    kind, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
+    kind = mujoco.mjtGeom(model.geom_type[geom])
+    size = model.geom_size[geom]
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         i = int(model.geom_dataid[geom])
-        v, n = int(model.mesh_vertadr[i]), int(model.mesh_vertnum[i])
-        f, m = int(model.mesh_faceadr[i]), int(model.mesh_facenum[i])
+        v = int(model.mesh_vertadr[i])
+        n = int(model.mesh_vertnum[i])
+        f = int(model.mesh_faceadr[i])
+        m = int(model.mesh_facenum[i])
         return np.array(model.mesh_vert[v : v + n], float), np.array(model.mesh_face[f : f + m], np.int64)
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
         made = creation.box(2.0 * size)

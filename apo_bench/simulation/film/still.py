@@ -22,7 +22,8 @@ from apo_bench.simulation.scene.world import initial_state, place
 
 Color = tuple[float, float, float]
 IN_PLACE = "in place"
-HAND_M, HAND_COLOR = 0.012, (0.90, 0.70, 0.60)
+HAND_M = 0.012
+HAND_COLOR = (0.90, 0.70, 0.60)
 GHOST_OPACITY = 0.4
 _OFF_M = 0.004
 """How far before a flat face its name stands."""
@@ -50,7 +51,8 @@ class Still(NamedTuple):
 def stages(scene: Scene, start: Poses, goals: Array) -> Chapter:
     """What a scenario asks for: the parts before the first operation and after each, a second apart."""
     world = scene.work
-    data, made = initial_state(world, start), list[Moment]()
+    data = initial_state(world, start)
+    made = list[Moment]()
     arm_home(scene, data)
     for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
         for part in world.free:
@@ -104,13 +106,15 @@ def label_place(scene: Scene, of: PartFace) -> Array:
 
 
 def _draw_ghost(scene: Scene, start: Poses, ghost: Ghost, drawn: Any) -> None:
-    world, model = scene.work, scene.work.model
+    world = scene.work
+    model = scene.work.model
     data = mujoco.MjData(model)
     for part, T in ghost.poses.items():
         if part in world.qpos:
             place(world, data, part, T)
     mujoco.mj_kinematics(model, data)
-    begin, wanted = drawn.ngeom, {world.free.index(part) for part in ghost.poses if part in world.qpos}
+    begin = drawn.ngeom
+    wanted = {world.free.index(part) for part in ghost.poses if part in world.qpos}
     dynamic = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
     mujoco.mjv_addGeoms(model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), dynamic, drawn)
     for geom in drawn.geoms[begin : drawn.ngeom]:

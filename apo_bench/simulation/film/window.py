@@ -81,7 +81,8 @@ def step_in_window(
     ) as window:
         with window.lock():
             window.cam.lookat[:], window.cam.distance = framing(scene.scenario.assembly, [assembled])
-            window.cam.azimuth, window.cam.elevation = AZIMUTH_DEG, ELEVATION_DEG
+            window.cam.azimuth = AZIMUTH_DEG
+            window.cam.elevation = ELEVATION_DEG
         before = time.monotonic()
         while window.is_running():
             while pressed:
@@ -99,7 +100,8 @@ def _draw(scene: Scene, data: Any, still: Still, window: Any) -> None:
     show_moment(scene, data, still.chapter, still.moment)
     window.user_scn.ngeom = 0
     draw_over(scene, still, window.user_scn)
-    font, place = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
+    font = mujoco.mjtFontScale.mjFONTSCALE_150
+    place = mujoco.mjtGridPos
     keys, meanings = ("\n".join(words) for words in zip(*_HELP, strict=True))
     said = "\n".join((still.chapter.title, *still.words))
     window.set_texts([(font, place.mjGRID_TOPLEFT, said, ""), (font, place.mjGRID_BOTTOMLEFT, keys, meanings)])

@@ -59,7 +59,8 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         stages: Where every part should be before the first operation and after each.
         late: Displaced parts that the other hand corrects.
     """
-    operation, what = scenario.assembly.operations[k], nominal_operations(scenario)[k]
+    operation = scenario.assembly.operations[k]
+    what = nominal_operations(scenario)[k]
     way = target[:3, :3] @ what.after.line.direction
     beside = _off(slide_directions(scenario.assembly, what.after, stages[k + 1]))
     return Act(

@@ -47,7 +47,8 @@ def demonstrate(
     error = spread_error(scenario, layout, _draw(scenario.careless, human_error, rng))
     stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
     hands = Hands(scene, layout.start, watch)
-    goals, after = [], []
+    goals = []
+    after = []
     with sleeping(scene.shown, True):
         hands.wait(0.05)
         for k, operation in enumerate(scenario.assembly.operations):
@@ -76,7 +77,8 @@ def demonstrate(
 
 def _draw(how: Carelessness | None, human_error: float, rng: np.random.Generator) -> Array:
     """The offset of the careless operation, (3,) [m], in the part's own frame."""
-    sign, size = rng.choice([-1.0, 1.0]), rng.uniform(0.0, 1.0)
+    sign = rng.choice([-1.0, 1.0])
+    size = rng.uniform(0.0, 1.0)
     if how is None:
         return np.zeros(3)
     return human_error * sign * (how.low_m + size * (how.high_m - how.low_m)) * how.axis

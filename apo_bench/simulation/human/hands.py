@@ -36,7 +36,8 @@ class Hands:
     """Two hands and the parts before them; one demonstration long."""
 
     def __init__(self, scene: Scene, start: Poses, watch: Hooks | Callable[[Any], None] | None = None) -> None:
-        self.scene, self.world = scene, scene.shown
+        self.scene = scene
+        self.world = scene.shown
         self.data: Any = initial_state(self.world, start)
         self._step_s = float(self.world.model.opt.timestep)
         self._hooks = hooks_of(watch)
@@ -85,7 +86,8 @@ class Hands:
 
         Where one hand moves alone, stretches on which nothing is near are left out.
         """
-        counts, done = [max(1, round(line.seconds / self._step_s)) for _, line in moves], 0
+        counts = [max(1, round(line.seconds / self._step_s)) for _, line in moves]
+        done = 0
         for begin, end in [(0, max(counts))] if len(moves) > 1 else self._spans(*moves[0], counts[0]):
             if begin > done:
                 self._pass(begin - done, partial(self._leap, *moves[0], counts[0], done))
@@ -109,7 +111,8 @@ class Hands:
 
     def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: those where something is near; at last the end."""
-        boxes, tip = self.scene.pieces, pose.inverse(line.start)
+        boxes = self.scene.pieces
+        tip = pose.inverse(line.start)
         held = tuple(self._held[hand])
         moving = [Moving(boxes[part], tip @ self.pose(part)) for part in held]
         s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
@@ -129,7 +132,8 @@ class Hands:
         """Simulate these steps of lines."""
         targets = []
         for (hand, line), n in zip(moves, counts, strict=True):
-            path, at = line.poses(line.progress(np.minimum(steps / n, 1.0))), self._mocap[hand]
+            path = line.poses(line.progress(np.minimum(steps / n, 1.0)))
+            at = self._mocap[hand]
             targets.append((self.data.mocap_pos[at], path[:, :3, 3]))
             self.data.mocap_quat[at] = _quaternion(line.end)
             if np.abs(line.turn).max() > _NO_TURN:
@@ -144,7 +148,8 @@ class Hands:
         while self._hooks.after_tick is not None and n >= (left := self._every - self._steps):
             mujoco.mj_step(self.world.model, self.data, left)
             self._tick(self.data)
-            n, self._steps = n - left, 0
+            n = n - left
+            self._steps = 0
         if n:
             mujoco.mj_step(self.world.model, self.data, n)
             self._steps += n
@@ -175,7 +180,8 @@ class Hands:
 
     def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
         weld = self._weld(hand, part)
-        quaternion, at = _quaternion(T_hand_part), self._held_at(part)
+        quaternion = _quaternion(T_hand_part)
+        at = self._held_at(part)
         self.world.model.eq_data[weld, :11] = (*at, *(T_hand_part[:3, :3] @ at + T_hand_part[:3, 3]), *quaternion, 1)
         self.data.eq_active[weld] = 1
         self._held[hand][part] = T_hand_part

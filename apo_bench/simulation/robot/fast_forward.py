@@ -34,8 +34,10 @@ def fast_forward(
     at, dof = joints
     before = forward(data.qpos[at])
     q = data.qpos[at] + by
-    after, later = forward(q), forward(q + TINY_S * velocity)
-    data.qpos[at], data.qvel[dof] = q, velocity
+    after = forward(q)
+    later = forward(q + TINY_S * velocity)
+    data.qpos[at] = q
+    data.qvel[dof] = velocity
     take_along(world, data, held, (before, after, later))
 
 

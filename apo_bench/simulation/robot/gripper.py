@@ -27,11 +27,13 @@ def gripper_boxes(kinematics: Kinematics, arm: Arm, opening: float, margin: floa
     model = kinematics.model
     data = _opened(model, arm, opening)
     tip = model.site(arm.tip).id
-    R, p = data.site_xmat[tip].reshape(3, 3), data.site_xpos[tip]
+    R = data.site_xmat[tip].reshape(3, 3)
+    p = data.site_xpos[tip]
     boxes = []
     for g in _geoms(model, arm):
         R_tip_geom = R.T @ data.geom_xmat[g].reshape(3, 3)
-        center, half = model.geom_aabb[g, :3], model.geom_aabb[g, 3:]
+        center = model.geom_aabb[g, :3]
+        half = model.geom_aabb[g, 3:]
         at = R.T @ (data.geom_xpos[g] - p) + R_tip_geom @ center
         boxes.append(Box(f"gripper{g}", at, np.abs(R_tip_geom) @ half + [margin, margin, min(margin, UPRIGHT_M)]))
     return tuple(boxes)

@@ -31,7 +31,8 @@ class HoldWatch(NamedTuple):
 
     def release(self, T: Array) -> HoldWatch:
         """The fingers are about to open, or nothing goes on."""
-        here, before = self._since(T), self.moved or (0.0, 0.0)
+        here = self._since(T)
+        before = self.moved or (0.0, 0.0)
         return self._replace(grasped=None, moved=(max(before[0], here[0]), max(before[1], here[1])))
 
     def finish(self, operation: int) -> HoldWatch:

@@ -14,7 +14,8 @@ class LowPass:
     """A first-order filter, y' = (x - y) / time constant. Plain numbers, since arrays this small are slow."""
 
     def __init__(self, time_constant_s: float) -> None:
-        self._time_constant_s, self.force = time_constant_s, [0.0, 0.0, 0.0]
+        self._time_constant_s = time_constant_s
+        self.force = [0.0, 0.0, 0.0]
 
     def __call__(self, force: Sequence[float], seconds: float) -> list[float]:
         """The filtered force, (3,), [N], after one that was felt for so long; at most the time constant."""

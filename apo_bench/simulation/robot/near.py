@@ -21,13 +21,15 @@ from apo_bench.simulation.scene.world import World, part_pose
 
 NEAR_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
-_LOOKS, _APART_M = 100, (0.0002, 0.001)
+_LOOKS = 100
+_APART_M = (0.0002, 0.001)
 """So many looks are taken along a line, but not closer together than the first nor further apart than the second."""
 _RUN_UP_S = 0.04
 """A motion is simulated from so long before it comes near: an arm that starts in motion needs that to catch up."""
 _SHORTEST_S = 0.05
 """Less than this is not worth leaving out."""
-_STILL_M_S, _STILL_RAD_S = 1e-3, 2e-2
+_STILL_M_S = 1e-3
+_STILL_RAD_S = 2e-2
 """While anything that nobody holds moves faster, nothing is left out."""
 _UPRIGHT = 1e-6
 
@@ -79,7 +81,8 @@ def near_spans(
         run_up_s: A motion is simulated from so long before it comes near.
         near_m: How near, for a single part and for a group, [m].
     """
-    n, world = len(s) - 1, world or scene.work
+    n = len(s) - 1
+    world = world or scene.work
     others = [part for part in (*world.free, *world.fixed) if part not in held]
     if not _still(world, data, others):
         return [(0, n)]
@@ -100,15 +103,18 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
 
     What turns is taken as the box around all that it sweeps, and nothing else is looked at.
     """
-    R, start = line.start[:3, :3], line.start[:3, 3]
-    tips, near = start + s[:, None] * (line.end[:3, 3] - start), np.zeros(len(s), dtype=np.bool_)
+    R = line.start[:3, :3]
+    start = line.start[:3, 3]
+    tips = start + s[:, None] * (line.end[:3, 3] - start)
+    near = np.zeros(len(s), dtype=np.bool_)
     turns = float(np.linalg.norm(line.turn)) > _UPRIGHT
     bounds = np.array([(each.low, each.high) for each in obstacles])
     for pieces, T_tip in moving:
         low, high = upright_bounds(pieces, R @ T_tip[:3, :3], R @ T_tip[:3, 3])
         if turns:
             low, high = _swept(low, high, R @ line.turn)
-        low, high = tips + (low - margin), tips + (high + margin)
+        low = tips + (low - margin)
+        high = tips + (high + margin)
         may: _Flags = np.all((low[:, None] < bounds[:, 1]) & (high[:, None] > bounds[:, 0]), axis=-1)
         if turns:
             near |= may.any(axis=1)
@@ -144,10 +150,12 @@ def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
 
 def _spans(near: _Flags, looks: Ints, n: int, run_up_s: float, step_s: float) -> list[_Span]:
     """Stretches that are near, begun earlier by the run-up, as one where little lies between."""
-    run_up, shortest = round(run_up_s / step_s), round(_SHORTEST_S / step_s)
+    run_up = round(run_up_s / step_s)
+    shortest = round(_SHORTEST_S / step_s)
     spans: list[_Span] = []
     for i in map(int, np.flatnonzero(near)):
-        begin, end = int(looks[max(i - 1, 0)]) - run_up, int(looks[min(i + 1, len(looks) - 1)])
+        begin = int(looks[max(i - 1, 0)]) - run_up
+        end = int(looks[min(i + 1, len(looks) - 1)])
         begin = 0 if begin < shortest else begin
         end = n if n - end < shortest else end
         if spans and begin - spans[-1][1] < shortest:
@@ -166,6 +174,8 @@ def _still(world: World, data: Any, parts: Iterable[str]) -> bool:
 def _pose(world: World, data: Any, part: str) -> Array:
     if part in world.dof:
         return part_pose(world, data, part)
-    body, T = world.body[part], np.eye(4)
-    T[:3, :3], T[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
+    body = world.body[part]
+    T = np.eye(4)
+    T[:3, :3] = data.xmat[body].reshape(3, 3)
+    T[:3, 3] = data.xpos[body]
     return T

@@ -50,7 +50,8 @@ class SlideFingers:
     def __init__(self, model: Any, arm: Arm) -> None:
         self.longest_s = _LONGEST_S
         self._grip = model.actuator(f"arm/{arm.grip}").id
-        limit, stiffness = model.actuator_forcerange[self._grip, 1], model.actuator_gainprm[self._grip, 0]
+        limit = model.actuator_forcerange[self._grip, 1]
+        stiffness = model.actuator_gainprm[self._grip, 0]
         self.slack = float(limit / stiffness) if model.actuator_forcelimited[self._grip] else math.inf
         self._dof = np.array([model.jnt_dofadr[model.joint(f"arm/{name}").id] for name in arm.fingers])
         self._qpos = np.array([model.jnt_qposadr[model.joint(f"arm/{name}").id] for name in arm.fingers])
@@ -76,12 +77,15 @@ class MeasuredFingers:
     """Any fingers, by what was measured of them."""
 
     def __init__(self, model: Any, hand: Hand, tip: str) -> None:
-        self.hand, self.slack, self.longest_s = hand, math.inf, max(hand.seconds, _LONGEST_S)
+        self.hand = hand
+        self.slack = math.inf
+        self.longest_s = max(hand.seconds, _LONGEST_S)
         self._actuators = np.array([model.actuator(f"arm/{name}").id for name in hand.actuators])
         joints = [model.joint(f"arm/{name}").id for name in hand.joints]
         self._pads = np.array([model.geom(f"arm/{name}").id for name in hand.pads])
         self._tip = model.site(f"arm/{tip}").id
-        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._qpos = model.jnt_qposadr[joints]
+        self._dof = model.jnt_dofadr[joints]
         self._lever: Array = np.abs(hand.opening[-1] - hand.opening[0]) / np.maximum(np.ptp(hand.states, axis=0), 1e-9)
         self._lever = np.where(np.ptp(hand.states, axis=0) > 1e-6, self._lever, 0.0)
 
@@ -100,5 +104,6 @@ class MeasuredFingers:
         return self.hand.of_command(data.ctrl[self._actuators])
 
     def put(self, data: Any, opening: float) -> None:
-        data.qpos[self._qpos], data.qvel[self._dof] = self.hand.state(opening), 0.0
+        data.qpos[self._qpos] = self.hand.state(opening)
+        data.qvel[self._dof] = 0.0
         self.command(data, opening)

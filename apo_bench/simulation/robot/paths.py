@@ -14,7 +14,8 @@ from apo_bench.geometry.arrays import Array
 
 _PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
-_GAIN, _CELL_M = 0.6, 2e-5
+_GAIN = 0.6
+_CELL_M = 2e-5
 """How fast a paced motion gains and loses speed, [m/s^2]; its speed is found in cells of this length."""
 _STRAIGHT = 1e-8
 """Rotations this near to none are as good as their antisymmetric part, which is quick to have."""
@@ -68,7 +69,8 @@ def paced(start: Array, end: Array, quick: float, slow: float, stretches: Sequen
     for begin, stop in stretches:
         limit[(x >= begin) & (x <= stop)] = slow
     limit[[0, -1]] = 0.0
-    squares, gain = limit**2, 2.0 * _GAIN * (x[1] - x[0]) * np.arange(len(x))
+    squares = limit**2
+    gain = 2.0 * _GAIN * (x[1] - x[0]) * np.arange(len(x))
     squares = np.minimum.accumulate(squares - gain) + gain
     squares = (np.minimum.accumulate((squares + gain)[::-1]) - gain[::-1])[::-1]
     v = np.sqrt(squares)
@@ -89,7 +91,8 @@ class _Trapezoid:
     ramp: float
 
     def __call__(self, t: Array) -> Array:
-        r, top = self.ramp, 1.0 - self.ramp
+        r = self.ramp
+        top = 1.0 - self.ramp
         s = np.where(t < r, t * t / (2 * r), np.where(t > top, top - (1.0 - t) ** 2 / (2 * r), t - r / 2))
         return s / top
 
@@ -118,7 +121,8 @@ def _turn_between(start: Array, end: Array) -> Array:
 
 def turn_from(rest: Array, T: Array) -> float:
     """How far a tip that looks down is turned about the vertical from its rest, -pi to pi, [rad]."""
-    a, b = rest[:2, 0], T[:2, 0]
+    a = rest[:2, 0]
+    b = T[:2, 0]
     return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
@@ -128,7 +132,8 @@ def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...
     The shorter way round may lead over a half turn away from the rest, where the wrist ends; then the other way is
     taken, with a pose in the middle.
     """
-    a, b = turn_from(rest, start), turn_from(rest, end)
+    a = turn_from(rest, start)
+    b = turn_from(rest, end)
     if abs(b - a) <= np.pi:
         return (end,)
     middle = np.array(start)

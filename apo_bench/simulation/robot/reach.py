@@ -11,13 +11,16 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import Trajectory
 
-_KNOT_M, _KNOT_RAD = 0.03, 0.15
+_KNOT_M = 0.03
+_KNOT_RAD = 0.15
 """Inverse kinematics is solved at least this densely along a line."""
-_SHORT_M, _SHORT_RAD = 0.01, 0.05
+_SHORT_M = 0.01
+_SHORT_RAD = 0.05
 """So short a line has one knot in its middle; any other has two at least."""
 _SPEED_LOOKS = 101
 """Times at which the speed of joints is looked at."""
-_FAR_M, _FAR_RAD = 0.3, 1.0
+_FAR_M = 0.3
+_FAR_RAD = 1.0
 """The spacing of knots where only the joint angles at the end are asked for."""
 
 

@@ -32,7 +32,8 @@ from apo_bench.simulation.scene.world import has_failed, initial_state, part_pos
 
 _COLLISION_N = 20.0
 """An arm that strikes a part it does not hold harder than this has made a protective stop."""
-_REST_RAD_S, _REST_M_S = 2e-3, 3e-3
+_REST_RAD_S = 2e-3
+_REST_M_S = 3e-3
 """Joints and fingers that move slower than this rest."""
 _SHIFT_M = 0.001
 """How far the tip is shifted in thought to see how the joints turn."""
@@ -43,7 +44,8 @@ class Halt(Exception):
 
     def __init__(self, stage: str, code: str, part: str = "") -> None:
         super().__init__(stage, code, part)
-        self.stage, self.code = stage, code
+        self.stage = stage
+        self.code = code
         self.part = part
         """Which part it is about, if not the one that is moved."""
 
@@ -74,8 +76,10 @@ class Robot:
         self.fidelity = "full" if self._off.any() else fidelity
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
-        self.model, self.arm = scene.work.model, scene.arm
-        self.stage, self.macro = "plan", ""
+        self.model = scene.work.model
+        self.arm = scene.arm
+        self.stage = "plan"
+        self.macro = ""
         self.step: Step | None = None
         self._held: tuple[str, ...] = ()
         self._wrist = LowPass(WRIST_S)
@@ -84,7 +88,8 @@ class Robot:
         self._handled: int | None = None
         self.peak_force_n = 0.0
         self._find_joints()
-        self._net, self._felt = np.zeros((3, self.model.nsensordata)), np.zeros(3)
+        self._net = np.zeros((3, self.model.nsensordata))
+        self._felt = np.zeros(3)
         self.data: Any = initial_state(scene.work, start)
         self.data.qpos[self._qpos] = self.arm.home + self._off
         self._fingers.put(self.data, self.arm.opening_m)
@@ -110,7 +115,8 @@ class Robot:
             return 0.0
         line = within_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(1, round(line.seconds / self.step_s))
-        s, done = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)]), 0
+        s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
+        done = 0
         for begin, end in self._spans(line, s):
             q = self.q
             if begin > done:
@@ -122,7 +128,8 @@ class Robot:
             if self._run((path + self._lead * velocity)[1:], guard) < end - begin:
                 self._hold_where_it_is()
                 return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
-            self.q, done = path[-1], end
+            self.q = path[-1]
+            done = end
         self.T = line.end
         return 0.0
 
@@ -135,12 +142,14 @@ class Robot:
         line = within_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(2, round(line.seconds / self.step_s))
         path = self._reached(along(self.scene.kinematics, line, line.progress(np.arange(n + 1) / n), self.q))
-        rows, found = path + self._lead * np.gradient(path, self.step_s, axis=0), []
+        rows = path + self._lead * np.gradient(path, self.step_s, axis=0)
+        found = []
         for row in rows[1:]:
             self.data.ctrl[self._drives] = row + self._off
             mujoco.mj_step(self.model, self.data)
             found.append(self.scene.kinematics.forward(self.data.qpos[self._qpos]))
-        self.q, self.T = path[-1], line.end
+        self.q = path[-1]
+        self.T = line.end
         return np.array(found)
 
     def pushed(self, force: Array, seconds: float = 0.5) -> Array:
@@ -168,17 +177,24 @@ class Robot:
         Raises:
             Halt: The arm does not reach around there, or something went wrong on the way.
         """
-        q, T, offset, passed = self.q, self.T, np.zeros(3), 0
+        q = self.q
+        T = self.T
+        offset = np.zeros(3)
+        passed = 0
         moves = np.array([self._across(q, T, axis) for axis in np.eye(3)])
-        force, ctrl, drives = self._net_force(), self.data.ctrl, self._drives
+        force = self._net_force()
+        ctrl = self.data.ctrl
+        drives = self._drives
         while (asked := law(force)) is not None:
-            offset, passed = asked, passed + 1
+            offset = asked
+            passed = passed + 1
             ctrl[drives] = q + offset @ moves + self._off
             mujoco.mj_step(self.model, self.data)
             force = self._feel(self.step_s)
             if passed % self._every == 0:
                 self._look()
-        self.q, self.T = q + offset @ moves, shifted(T, offset, 1.0)
+        self.q = q + offset @ moves
+        self.T = shifted(T, offset, 1.0)
 
     def _across(self, q: Array, T: Array, axis: Array) -> Array:
         """How the joints turn while the tip is shifted, (joints,), [rad/m]; as good as exact over some millimetres."""
@@ -231,7 +247,8 @@ class Robot:
 
     def _nearest_command(self, to: float) -> float:
         """The command nearest to `to` at which the fingers push as they do now, [m]: their force is limited."""
-        command, slack = self._fingers.commanded(self.data), self._fingers.slack
+        command = self._fingers.commanded(self.data)
+        slack = self._fingers.slack
         return min(max(command, self.opening() - slack), self.opening() + slack)
 
     def _grips_fully(self) -> bool:
@@ -265,7 +282,8 @@ class Robot:
     def hold(self, *parts: str) -> None:
         """Say which parts are in the hand: the held one and what it carries, or none."""
         free = self.scene.work.free
-        self._held, self._wrist = parts, LowPass(WRIST_S)
+        self._held = parts
+        self._wrist = LowPass(WRIST_S)
         self._net = np.zeros((3, self.model.nsensordata))
         for i in map(free.index, parts):
             self._net[:, 3 * (len(free) + i) : 3 * (len(free) + i) + 3] += np.eye(3)
@@ -280,7 +298,8 @@ class Robot:
         """The ideal gripper: hold the part exactly as it now is, or let go."""
         weld = self.model.equality(f"grasp_{part}").id
         if on:
-            body, mount = self.data.body(f"{part}/"), self.data.body(f"arm/{self.arm.mount}")
+            body = self.data.body(f"{part}/")
+            mount = self.data.body(f"arm/{self.arm.mount}")
             T = pose.inverse(_frame(mount)) @ _frame(body)
             q = np.zeros(4)
             mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
@@ -319,7 +338,8 @@ class Robot:
 
     def _fast_forward(self, q: Array, velocity: Array, steps: int) -> None:
         """Leave out steps on which nothing is near."""
-        joints, forward = (self._qpos, self._dof), self.scene.kinematics.forward
+        joints = (self._qpos, self._dof)
+        forward = self.scene.kinematics.forward
         fast_forward(self.scene.work, self.data, forward, joints, q - self.q, velocity, self._held)
         self._pass(steps * self.step_s)
 
@@ -340,14 +360,19 @@ class Robot:
 
     def _run(self, targets: Array, guard: Guard | None) -> int:
         """Step through joint targets (n, joints), one physics step each; returns how many were run."""
-        model, data, step, every = self.model, self.data, mujoco.mj_step, self._every
+        model = self.model
+        data = self.data
+        step = mujoco.mj_step
+        every = self._every
         rows = np.repeat(data.ctrl[None], len(targets), axis=0)
         rows[:, self._drives] = targets + self._off
         ctrl = data.ctrl
         if guard is None:
             self._run_free(rows)
             return len(targets)
-        (a, b, c), newton, feel = guard.way.tolist(), guard.newton, self._feel
+        a, b, c = guard.way.tolist()
+        newton = guard.newton
+        feel = self._feel
         for i, row in enumerate(rows, start=1):
             ctrl[:] = row
             step(model, data)
@@ -361,7 +386,10 @@ class Robot:
 
     def _run_free(self, rows: Array) -> None:
         """Step through commands (n, controls) that no guard watches: an empty hand feels once a tick, when it looks."""
-        model, data, step, ctrl = self.model, self.data, mujoco.mj_step, self.data.ctrl
+        model = self.model
+        data = self.data
+        step = mujoco.mj_step
+        ctrl = self.data.ctrl
         for i in range(0, len(rows), self._every):
             tick = rows[i : i + self._every]
             if self._held:
@@ -432,16 +460,19 @@ class Robot:
     def _find_joints(self) -> None:
         model = self.model
         joints = [model.joint(f"arm/{name}").id for name in self.arm.joints]
-        self._qpos, self._dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._qpos = model.jnt_qposadr[joints]
+        self._dof = model.jnt_dofadr[joints]
         self.step_s = float(model.opt.timestep)
         self._drives = np.array([model.actuator(f"arm/{name}").id for name in self.arm.joints])
         self._fingers = fingers_of(model, self.arm)
-        gain, bias = model.actuator_gainprm[self._drives, 0], model.actuator_biasprm[self._drives, 2]
+        gain = model.actuator_gainprm[self._drives, 0]
+        bias = model.actuator_biasprm[self._drives, 2]
         self._lead = (model.dof_damping[model.jnt_dofadr[joints]] - bias) / gain
         self._every = max(1, round(TICK_S / model.opt.timestep))
 
 
 def _frame(body: Any) -> Array:
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = body.xmat.reshape(3, 3), body.xpos
+    T[:3, :3] = body.xmat.reshape(3, 3)
+    T[:3, 3] = body.xpos
     return T

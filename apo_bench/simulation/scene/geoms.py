@@ -91,4 +91,5 @@ def _let_slide(model: Any) -> None:
     for geom in model.find_all("geom"):
         friction = usual if geom.friction is None else geom.friction
         if friction is not None and friction[0] < _GRIPPY:
-            geom.priority, geom.condim = SMOOTH_PRIORITY, geom.condim or _PADS_CONDIM
+            geom.priority = SMOOTH_PRIORITY
+            geom.condim = geom.condim or _PADS_CONDIM

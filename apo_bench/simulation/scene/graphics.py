@@ -18,9 +18,11 @@ from apo_bench.errors import InputError
 from apo_bench.io.processes import SAFE_PATH, environment
 
 _VARIABLE = "MUJOCO_GL"
-_NO_BACKEND, _CHILDREN = {_VARIABLE: "disable"}, {SAFE_PATH: "1"}
+_NO_BACKEND = {_VARIABLE: "disable"}
+_CHILDREN = {SAFE_PATH: "1"}
 """While MuJoCo is imported; while GLFW is, which starts a Python of its own."""
-_SHADOW_TEXELS, _SHADOW_REACH = 4096, 0.5
+_SHADOW_TEXELS = 4096
+_SHADOW_REACH = 0.5
 """Texels of the shadow map along a side, and its half width over the size of the scene: 0.4 mm on the table each."""
 
 
@@ -77,7 +79,8 @@ def renderer(model: Any, width: int, height: int) -> Any:
             importlib.reload(gl_context)  # where somebody else imported MuJoCo it has chosen already
         if gl_context.GLContext.__module__ == "mujoco.glfw" and (why := _no_window()):
             raise RuntimeError(why)  # drawing without a display, MuJoCo ends the process at the second try
-        model.vis.quality.shadowsize, model.vis.map.shadowclip = _SHADOW_TEXELS, _SHADOW_REACH
+        model.vis.quality.shadowsize = _SHADOW_TEXELS
+        model.vis.map.shadowclip = _SHADOW_REACH
         return mujoco.Renderer(model, height, width)
     except ValueError:
         raise

@@ -27,7 +27,8 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
     Parts of boxes alone are held across all their width, and a gripper that finds nothing loses them.
     """
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
-        solid, up = scenario.assembly.solids[operation.main], scenario.start[operation.main][2, :3]
+        solid = scenario.assembly.solids[operation.main]
+        up = scenario.start[operation.main][2, :3]
         which = f"operation {k + 1}: the grasp of '{operation.main}'"
         span = held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
         if span is None and not all_boxes(solid.pieces):
@@ -51,7 +52,8 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
         own = _smooth_friction(world, operation.main)
         most = force * (pads if own is None else own) / _SAFE
         if weight > most:
-            lifts, holds = f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg", f"{most / _GRAVITY:.3g} kg"
+            lifts = f"operation {k + 1} lifts {weight / _GRAVITY:.3g} kg"
+            holds = f"{most / _GRAVITY:.3g} kg"
             if own is not None and weight <= force * pads / _SAFE:
                 raise InputError(
                     f"{lifts} by '{operation.main}', which is too smooth: with its friction of {own:g} the gripper "

@@ -14,7 +14,8 @@ from apo_bench.geometry.arrays import Array, frozen
 
 _Color = tuple[float, float, float]
 _WIDTH_M = 0.0035
-_DASH_DOT, _LINE_M = (0.007, 0.0025, 0.0008, 0.0025), 0.0007
+_DASH_DOT = (0.007, 0.0025, 0.0008, 0.0025)
+_LINE_M = 0.0007
 """Dash, gap, dot, gap; the radius of the line."""
 _PIECES = 48
 """Straight pieces of a whole ring."""
@@ -22,7 +23,8 @@ _SWEEP_RAD = np.radians(304.0)
 _HEAD_M = 0.022
 _NAME_M = 0.011
 """How far beyond its mark a name stands."""
-_NOWHERE, _UPRIGHT = np.zeros(3), np.eye(3).ravel()
+_NOWHERE = np.zeros(3)
+_UPRIGHT = np.eye(3).ravel()
 
 
 @final
@@ -161,13 +163,15 @@ def _connect(scene: Any, kind: Any, a: Array, b: Array, color: _Color, width_m: 
     mujoco.mjv_connector(geom, kind, width_m, a, b)
     if kind == mujoco.mjtGeom.mjGEOM_ARROW:
         geom.size[2] *= 2.0  # drawn half as long as asked
-    geom.emission, geom.specular = 0.35, 0.1
+    geom.emission = 0.35
+    geom.specular = 0.1
     scene.ngeom += 1
 
 
 def pixels(points: Array, camera: Any, fovy_deg: float, width: int, height: int) -> Array:
     """Where points of the world, (k, 3), are in a picture by a free camera, (k, 2), from the upper left corner."""
-    a, e = np.radians(camera.azimuth), np.radians(camera.elevation)
+    a = np.radians(camera.azimuth)
+    e = np.radians(camera.elevation)
     forward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     right = np.array([np.sin(a), -np.cos(a), 0.0])
     ray = points - (camera.lookat - camera.distance * forward)

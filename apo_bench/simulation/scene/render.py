@@ -77,8 +77,10 @@ def camera_view(
 ) -> SceneCamera:
     """A camera that looks at a point of the world, (3,), [m]."""
     camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance = look_at, distance_m
-    camera.azimuth, camera.elevation = azimuth_deg, elevation_deg
+    camera.lookat[:] = look_at
+    camera.distance = distance_m
+    camera.azimuth = azimuth_deg
+    camera.elevation = elevation_deg
     return camera
 
 
@@ -102,12 +104,14 @@ class Film:
             shadows: Nicer, and some times slower to draw without a graphics card.
         """
         middle = np.array([*scene.scenario.site.center_m, 0.08])
-        self.fps, self.camera = fps, camera or camera_view(middle, 0.85, 128.0, -24.0)
+        self.fps = fps
+        self.camera = camera or camera_view(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._close = weakref.finalize(self, _release, self._renderer)
-        self._every, self._next = speed / fps, 0.0
+        self._every = speed / fps
+        self._next = 0.0
 
     def __call__(self, data: Any) -> None:
         if data.time >= self._next:

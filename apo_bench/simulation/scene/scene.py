@@ -89,7 +89,8 @@ def build_scene(
     check("grasp", grasp)
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     check_clearance(scenario, clearance)
-    found, settings = find_arm(arm), physics(timestep_s)
+    found = find_arm(arm)
+    settings = physics(timestep_s)
     kinematics = Kinematics(found)
     with_hands, with_arm = _compose(scenario, clearance, settings, found, grasp, kinematics.first_link)
     shown = _compiled(scenario, with_hands)
@@ -135,9 +136,12 @@ def _world(scenario: Scenario, model: Any, xml: str) -> World:
 
 def _with_measured_arm(scenario: Scenario, room: str, arm: Arm, settings: Physics) -> World:
     """Put an arm whose gripper was measured into a finished room, which names it already."""
-    spec, own = mujoco.MjSpec.from_string(room), mujoco.MjSpec.from_string(arm.model)
+    spec = mujoco.MjSpec.from_string(room)
+    own = mujoco.MjSpec.from_string(arm.model)
     for geom in own.geoms:
-        geom.solref[:2], geom.solimp, geom.condim = settings.solref, settings.solimp, _PAD_CONDIM
+        geom.solref[:2] = settings.solref
+        geom.solimp = settings.solimp
+        geom.condim = _PAD_CONDIM
         geom.priority = 1
     stand = spec.worldbody.add_body(name="arm/", pos=arm.base, quat=arm.turn)
     spec.attach(own, frame=stand.add_frame(), prefix="arm/")
@@ -184,19 +188,21 @@ def _compose(
 
 def _set_physics(room: Any, s: Physics) -> None:
     option = room.option
-    option.timestep, option.integrator, option.cone = s.timestep_s, "implicitfast", "elliptic"
-    option.impratio, option.solver, option.tolerance, option.iterations = (
-        s.impratio,
-        "Newton",
-        s.tolerance,
-        s.iterations,
-    )
+    option.timestep = s.timestep_s
+    option.integrator = "implicitfast"
+    option.cone = "elliptic"
+    option.impratio = s.impratio
+    option.solver = "Newton"
+    option.tolerance = s.tolerance
+    option.iterations = s.iterations
 
 
 def _set_contact(model: Any, s: Physics) -> None:
     """Contact parameters of a file about to be attached: PyMJCF's default classes do not inherit from the room's."""
     geom = model.default.geom
-    geom.solref, geom.solimp, geom.condim = s.solref, s.solimp, s.condim
+    geom.solref = s.solref
+    geom.solimp = s.solimp
+    geom.condim = s.condim
 
 
 def _add_part(

@@ -24,7 +24,9 @@ _THICK_M = 1e-3
 """How thick a wall is, or half as thick as the part is there."""
 _SECTORS = 4
 """What is behind the walls of a hole becomes at least so many pieces."""
-_ON_M, _PARALLEL, _THINNEST_M = 1e-7, 1e-7, 5e-5
+_ON_M = 1e-7
+_PARALLEL = 1e-7
+_THINNEST_M = 5e-5
 _SAME_VOLUME = 1e-6
 
 
@@ -76,7 +78,8 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
     for piece in pieces:
         if not isinstance(piece, Hull) or piece.cylinder is not None:
             continue
-        n, d = piece.planes[:, :3], piece.planes[:, 3]
+        n = piece.planes[:, :3]
+        d = piece.planes[:, 3]
         on = np.abs(n @ face.axis - face.slope * w) < _PARALLEL
         on &= np.abs(n @ face.point - d - radius * w) < _ON_M
         if on.sum() == 1:
@@ -93,7 +96,8 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
 
 def _sector(face: RoundFace, outwards: Array) -> Array:
     """The middle direction of the sector around the axis in which a direction lies."""
-    x, y = face.frame[:3, 0], face.frame[:3, 1]
+    x = face.frame[:3, 0]
+    y = face.frame[:3, 1]
     turn = 2.0 * np.pi / _SECTORS
     angle = turn * np.round(np.arctan2(outwards @ y, outwards @ x) / turn)
     return np.asarray(np.cos(angle) * x + np.sin(angle) * y)
@@ -113,15 +117,18 @@ def _sectors(walls: Sequence[_Wall]) -> Iterator[list[_Wall]]:
 
 def _beyond(wall: _Wall) -> Hull | None:
     """What is behind a wall; None if that is thinner than anything is made."""
-    n, d = wall.cut[:3], wall.cut[3]
+    n = wall.cut[:3]
+    d = wall.cut[3]
     return _within(wall.hull, -wall.cut) if (wall.hull.corners @ n - d).max() > _THINNEST_M else None
 
 
 def _within(hull: Hull, cut: Array) -> Hull:
     """What of a piece is on the inner side of a plane (n, d), n . x <= d, that goes through it."""
     height = hull.corners @ cut[:3] - cut[3]
-    low, high = hull.corners[height <= 0.0], hull.corners[height > 0.0]
-    a, b = height[height <= 0.0], height[height > 0.0]
+    low = hull.corners[height <= 0.0]
+    high = hull.corners[height > 0.0]
+    a = height[height <= 0.0]
+    b = height[height > 0.0]
     part = a[:, None] / (a[:, None] - b)
     crossing = low[:, None] + part[..., None] * (high - low[:, None])
     return _hull_of(hull.name, np.concatenate([low, crossing.reshape(-1, 3)]))
@@ -148,7 +155,8 @@ def _joined(pieces: list[Hull]) -> list[Hull]:
             both = _hull_of(joined[-1].name, np.concatenate([joined[-1].corners, piece.corners]))
             whole = _volume(both)
             if abs(whole - filled - volume) < _SAME_VOLUME * whole:
-                joined[-1], filled = both, whole
+                joined[-1] = both
+                filled = whole
                 continue
         joined.append(piece)
         filled = volume

@@ -61,8 +61,10 @@ def place(world: World, data: Any, part: str, T: Array) -> None:
     """Put a movable part somewhere, at rest."""
     q = np.zeros(4)
     mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
-    a, v = world.qpos[part], world.dof[part]
-    data.qpos[a : a + 3], data.qpos[a + 3 : a + 7] = T[:3, 3], q
+    a = world.qpos[part]
+    v = world.dof[part]
+    data.qpos[a : a + 3] = T[:3, 3]
+    data.qpos[a + 3 : a + 7] = q
     data.qvel[v : v + 6] = 0.0
 
 
@@ -82,9 +84,11 @@ def initial_state(world: World, start: Poses) -> Any:
 def part_pose(world: World, data: Any, part: str) -> Array:
     """The pose of a movable part, (4, 4), straight from its joint."""
     a = world.qpos[part]
-    T, R = np.eye(4), np.zeros(9)
+    T = np.eye(4)
+    R = np.zeros(9)
     mujoco.mju_quat2Mat(R, data.qpos[a + 3 : a + 7])
-    T[:3, :3], T[:3, 3] = R.reshape(3, 3), data.qpos[a : a + 3]
+    T[:3, :3] = R.reshape(3, 3)
+    T[:3, 3] = data.qpos[a : a + 3]
     return T
 
 
@@ -166,7 +170,8 @@ def touch_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
     """Whether any of these movable parts touches another part; that they touch each other, or the arm, is not meant."""
     ours = np.array([world.free.index(part) for part in parts])
     a, b = _contact_parts(world, data)
-    mine, its = np.isin(a, ours), np.isin(b, ours)
+    mine = np.isin(a, ours)
+    its = np.isin(b, ours)
     return bool(((mine & (b >= 0)) | (its & (a >= 0)))[mine != its].any())
 
 

@@ -54,11 +54,15 @@ class Sight:
         if id(view) not in self._fixed:
             self._fixed[id(view)] = view, self._fixed_parts(view)
         known = self._fixed[id(view)][1]
-        distance, cosine, normal = np.array(known.distance), np.array(known.cosine), np.array(known.normal)
+        distance = np.array(known.distance)
+        cosine = np.array(known.cosine)
+        normal = np.array(known.normal)
         geom = np.array(known.geom)
         struck, far, normals = self._cast(view, fixed=False)
         near = np.flatnonzero((struck >= 0) & (far < distance))
-        distance[near], geom[near], normal[near] = far[near], struck[near], normals[near]
+        distance[near] = far[near]
+        geom[near] = struck[near]
+        normal[near] = normals[near]
         cosine[near] = np.abs(np.einsum("ni,ni->n", normals[near], view.rays[near]))
         return Strike(distance, cosine, normal, geom)
 
@@ -74,7 +78,9 @@ class Sight:
     def _cast(self, view: View, fixed: bool) -> tuple[NDArray[np.int32], Array, Array]:
         """Numbers of geoms, distances and normals, of everything, or of what can move."""
         n = len(view.rays)
-        geom, distance, normal = np.empty(n, np.int32), np.empty(n), np.zeros(3 * n)
+        geom = np.empty(n, np.int32)
+        distance = np.empty(n)
+        normal = np.zeros(3 * n)
         ways = view.rays.reshape(-1)
         mujoco.mj_multiRay(self._model, self._own, view.origin, ways, None, fixed, -1, geom, distance, normal, n, 1e10)
         return geom, distance, normal.reshape(-1, 3)

@@ -71,7 +71,8 @@ class Change:
         Pictures are compared with the one at the last change, so that slow motions add up until they are seen.
         """
         if self._reference is None or self._differs(picture, self._reference):
-            self._reference, self._since = picture, time_s
+            self._reference = picture
+            self._since = time_s
         return time_s - self._since >= self._camera.quiet_s - 1e-9
 
     def _differs(self, picture: Array, reference: Array) -> bool:

@@ -46,10 +46,13 @@ class DemonstrationCamera:
         Args:
             rng: The noise of the TV camera.
         """
-        self.camera, self.finder = camera or TvCamera(), finder or RangeFinder()
+        self.camera = camera or TvCamera()
+        self.finder = finder or RangeFinder()
         self.period_s = self.camera.period_s
-        self._sight, self._rgba = Sight(world), np.array(world.model.geom_rgba, dtype=np.float64)
-        self._rng, self._change = rng, Change(self.camera)
+        self._sight = Sight(world)
+        self._rgba = np.array(world.model.geom_rgba, dtype=np.float64)
+        self._change = Change(self.camera)
+        self._rng = rng
         self._spell: list[tuple[float, Array]] = []
         self._images: list[RangeImage] = []
         self._times: list[float] = []

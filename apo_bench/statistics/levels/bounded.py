@@ -45,7 +45,8 @@ def surprise(
     for _ in range(_STEPS):
         a = 0.5 * (least + most)
         rising = (counts * z / np.where(counts > 0, 1.0 + a[..., None] * z, 1.0)).sum(-1) > 0.0
-        least, most = np.where(rising, a, least), np.where(rising, most, a)
+        least = np.where(rising, a, least)
+        most = np.where(rising, most, a)
     grown = np.where(counts > 0, 1.0 + (0.5 * (least + most))[..., None] * z, 1.0)
     return np.asarray(2.0 * (counts * np.log(np.maximum(grown, 1e-300))).sum(-1))
 
@@ -68,7 +69,8 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
     """Where between the mean of the sample and a bound the surprise reaches its threshold."""
     if inside == outside:
         return outside
-    most, parts = threshold(int(counts.sum())), np.linspace(0.0, 1.0, 34)[1:-1]
+    most = threshold(int(counts.sum()))
+    parts = np.linspace(0.0, 1.0, 34)[1:-1]
     for _ in range(6):
         means = inside + parts * (outside - inside)
         believed = int((surprise(values, counts, means, low, high) <= most).sum())

@@ -35,7 +35,8 @@ _OUTSIDE = np.array([0.05, 0.2, 0.5, 1.0, 2.0, 4.0])
 """How far beyond them others lie: enough to know that the likeliest is there."""
 _NORMAL = 0.6
 """A normal curve of this times the steepness is about as steep as the logistic one."""
-_LEAST, _STEP = 1e-9, 1e-4
+_LEAST = 1e-9
+_STEP = 1e-4
 
 
 @final
@@ -58,10 +59,12 @@ def profile(log_levels: Array, success: Array) -> Profile:
     """
     known = ~np.isnan(success)
     right = np.where(known, success, 0.0)
-    k, wrong = right.sum(axis=-2), (known - right).sum(axis=-2)
+    k = right.sum(axis=-2)
+    wrong = (known - right).sum(axis=-2)
     log_half, log_p, log_q = _table(tuple(log_levels.tolist()))
     likelihood = (k @ log_p + wrong @ log_q).reshape(*k.shape[:-1], len(log_half), len(OTHERS[0]))
-    best, which = likelihood.max(axis=-1), likelihood.argmax(axis=-1)
+    best = likelihood.max(axis=-1)
+    which = likelihood.argmax(axis=-1)
     at = best.argmax(axis=-1)[..., None]
     likeliest = np.take_along_axis(which, at, axis=-1)
     more = variation(log_levels, right, known, log_half[at], tuple(x[likeliest] for x in OTHERS))
@@ -75,7 +78,8 @@ def curve(log_levels: Array, log_half: Array, steepness: Array, ceiling: Array, 
 
     half = 0.5 / ceiling
     normal = ceiling * ndtr(_NORMAL * steepness * (log_half - log_levels) + ndtri(half))
-    mirrored, n = power < 0, np.maximum(1.0, np.abs(power))
+    mirrored = power < 0
+    n = np.maximum(1.0, np.abs(power))
     shift = np.where(mirrored, -logit((1.0 - half) ** (1.0 / n)), logit(half ** (1.0 / n)))
     x = steepness * (log_half - log_levels) + shift
     lopsided = ceiling * np.where(mirrored, 1.0 - expit(-x) ** n, expit(x) ** n)
@@ -95,8 +99,10 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
         return curve(log_levels, log_half + half, steepness * (1.0 + steeper), ceiling, power)
 
     p = np.clip(at(0.0, 0.0), _LEAST, 1.0 - _LEAST)
-    by_half, by_steepness = (at(_STEP, 0.0) - at(-_STEP, 0.0), at(0.0, _STEP) - at(0.0, -_STEP))
-    by_half, by_steepness = by_half / (2 * _STEP), by_steepness / (2 * _STEP)
+    by_half = at(_STEP, 0.0) - at(-_STEP, 0.0)
+    by_steepness = at(0.0, _STEP) - at(0.0, -_STEP)
+    by_half = by_half / (2 * _STEP)
+    by_steepness = by_steepness / (2 * _STEP)
     weight = known.sum(axis=-2) / (p * (1.0 - p))
     hh, hs, ss = (
         (weight * x).sum(axis=-1, keepdims=True) for x in (by_half**2, by_half * by_steepness, by_steepness**2)
@@ -104,7 +110,8 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
     free = np.where(ss > _LEAST, hs / np.maximum(ss, _LEAST), 0.0)
     direction = (by_half - free * by_steepness) / (p * (1.0 - p))
     scores = (np.where(known, right - p[..., None, :], 0.0) * direction[..., None, :]).sum(axis=-1)
-    expected, seen = (hh - free * hs)[..., 0], (scores**2).sum(axis=-1)
+    expected = (hh - free * hs)[..., 0]
+    seen = (scores**2).sum(axis=-1)
     return np.asarray(np.maximum(1.0, np.where(expected > _LEAST, seen / np.maximum(expected, _LEAST), 1.0)))
 
 

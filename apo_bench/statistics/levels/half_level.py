@@ -77,7 +77,8 @@ def half_levels(found: Iterable[Curve]) -> tuple[HalfLevel, ...]:
 
 def half_level(curve: Curve) -> HalfLevel:
     """Where a curve crosses one half."""
-    levels, known = curve.levels, ~np.isnan(curve.success)
+    levels = curve.levels
+    known = ~np.isnan(curve.success)
     right = np.nansum(curve.success, axis=0)
     over, under = map(int, sure(right, known.sum(axis=0)))
     met = levels > 0
@@ -119,7 +120,9 @@ def _profiled(levels: Array, success: Array) -> tuple[float | None, str | None, 
     """Estimate, side on which it lies beyond the levels, and both ends of the interval; see `HalfLevel`."""
     x = np.log(levels)
     found = profile(x, success)
-    h, surprise, most = found.log_half, found.surprise, threshold(len(success))
+    h = found.log_half
+    surprise = found.surprise
+    most = threshold(len(success))
     middle = float(np.median(h[surprise <= _LIKELIEST]))
     beyond = "below" if middle < x[0] else "above" if middle > x[-1] else None
     believed = np.flatnonzero(surprise <= most)

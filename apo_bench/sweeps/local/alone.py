@@ -42,7 +42,8 @@ def run_alone(work: _Work, limit_s: float, lost: Callable[[str], Row]) -> Row:
     """
     check_limit(limit_s)
     with listening() as check:
-        process, patience_s = Process(_work, work), 0.0
+        process = Process(_work, work)
+        patience_s = 0.0
         try:
             row = _row(process, limit_s, check)
             if isinstance(row, str):

@@ -82,7 +82,9 @@ class Member:
     """One of the workers: a process where there is one, and the job that it has."""
 
     def __init__(self, number: int, lock: EnvironmentLock, dispatch: Dispatch) -> None:
-        self._number, self._lock, self._dispatch = number, lock, dispatch
+        self._number = number
+        self._lock = lock
+        self._dispatch = dispatch
         self.process: Process | None = None
         self.job: Job | None = None
 

@@ -112,7 +112,8 @@ class _OtherWay(Exception):
 def _drive(plan: ClusterPlan, emit: Emit, check: Check) -> None:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "ray.log"
-        driver, patience_s = Process(drive, plan, str(log)), 0.0
+        driver = Process(drive, plan, str(log))
+        patience_s = 0.0
         try:
             _listen(driver, plan, _Joining(plan, log), emit, check)
             patience_s = GOING_S
@@ -151,12 +152,14 @@ class _Joining:
     """Watches a process that may wait for a cluster for ever, and for one that does not let it in."""
 
     def __init__(self, plan: ClusterPlan, log: Path) -> None:
-        self._plan, self._log = plan, log
+        self._plan = plan
+        self._log = log
         self.give(JOINING_S)
 
     def give(self, seconds: float) -> None:
         """So much time from now on."""
-        self._seconds, self._deadline = seconds, time.monotonic() + seconds
+        self._seconds = seconds
+        self._deadline = time.monotonic() + seconds
 
     def look(self) -> None:
         """Raise an `InputError` if there is no hope, or what else to try."""

@@ -41,7 +41,9 @@ class RayPool:
         start: Starts a task for a pickled unit.
         workers: At most so many tasks; None for as many as the cluster takes.
         """
-        self._dispatch, self._start, self._workers = dispatch, start, workers
+        self._dispatch = dispatch
+        self._start = start
+        self._workers = workers
         self._tasks: list[Task] = []
         self._is_stopping = False
 

@@ -23,7 +23,8 @@ def made_task() -> Callable[[bytes, bytes], Iterator[Message]]:
 
         import ray
 
-        host, node = platform.node(), ray.get_runtime_context().get_node_id()
+        host = platform.node()
+        node = ray.get_runtime_context().get_node_id()
         yield "here", {"host": host, "node": node, "worker": os.getpid()}
         try:
             from apo_bench.sweeps.ray.task import messages

@@ -20,7 +20,8 @@ class Again:
     """Looks that were taken beforehand; it keeps what was asked for."""
 
     def __init__(self, *observations):
-        self.observations, self.asked = list(observations), []
+        self.observations = list(observations)
+        self.asked = []
 
     @property
     def left(self):
@@ -38,7 +39,8 @@ def fresh(name, seed, number):
 
 def at_the_same_place(name, seed, number):
     """Another look at the demonstration of `look(name, seed)`."""
-    first, other = shown(name, seed)[2], shown(name, seed + 100 * (number + 1))[2]
+    first = shown(name, seed)[2]
+    other = shown(name, seed + 100 * (number + 1))[2]
     twists = pose.log(pose.inverse(other.goals) @ fresh(name, seed, number).goals)
     return replace(look(name, seed), goals=first.goals @ pose.exp(twists))
 
@@ -54,7 +56,8 @@ def test_where_nothing_is_in_doubt_nobody_asks():
 
 def test_what_was_left_out_is_looked_at_again_until_it_is_right():
     """The second view of operation 2 is as wrong as the first."""
-    name, k = "carried_bridge", 1
+    name = "carried_bridge"
+    k = 1
     second = astray(at_the_same_place(name, 2, 0), k, seed=9)
     again = Again(second, at_the_same_place(name, 2, 1), at_the_same_place(name, 2, 2))
     found = correct(astray(look(name, 2), k), "contact-robust", again)
@@ -68,7 +71,8 @@ def test_what_was_left_out_is_looked_at_again_until_it_is_right():
 
 
 def test_what_was_missed_is_looked_at_again():
-    name, k = "block_on_block", 1
+    name = "block_on_block"
+    k = 1
     observation = look(name, 3)
     missed = replace(observation, seen=np.arange(2) != k)
     again = Again(at_the_same_place(name, 3, 0))

@@ -55,7 +55,8 @@ def look(name, seed, level=1.0):
 def astray(observation, k, seed=0):
     """Operation k seen somewhere else and turned anyhow."""
     rng = np.random.default_rng([seed, k])
-    goals, q = np.array(observation.goals), rng.standard_normal(4)
+    goals = np.array(observation.goals)
+    q = rng.standard_normal(4)
     goals[k] = goals[k] @ pose.unpack(np.concatenate([rng.uniform(-0.5, 0.5, 3), q]))
     return replace(observation, goals=goals)
 
@@ -68,7 +69,8 @@ def fixed_error_mm(name, seed, correction):
 @pytest.mark.parametrize("name", BOXES)
 def test_without_outliers_it_is_contact(name):
     observation = look(name, 1)
-    plain, robust = correct(observation, "contact"), correct(observation, "contact-robust")
+    plain = correct(observation, "contact")
+    robust = correct(observation, "contact-robust")
     assert plain.test.passes
     assert robust.goals.tolist() == plain.goals.tolist()
     assert (robust.status, robust.sentence) == ("converged", plain.sentence)
@@ -77,7 +79,8 @@ def test_without_outliers_it_is_contact(name):
 
 def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
     """Every operation in turn, in four scenarios; what only one contact tells of may look right elsewhere."""
-    right, all_of_them = 0, 0
+    right = 0
+    all_of_them = 0
     for name in ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table"):
         scenario, _, _ = shown(name, 2)
         for k in range(len(scenario.assembly)):
@@ -117,7 +120,8 @@ def test_the_inferred_goal_of_a_last_operation_that_contacts_fix_is_the_true_one
 def test_planes_that_are_parallel_but_for_noise_do_not_say_where_they_meet():
     """The stick lies in two slots that were seen a little turned; along them only the middles of faces say where."""
     for seed in range(4):
-        observation, truth = look("vanished_fixture", seed), shown("vanished_fixture", seed)[1].goals
+        observation = look("vanished_fixture", seed)
+        truth = shown("vanished_fixture", seed)[1].goals
         k = len(truth) - 1
         found = inferred_goals(astray(observation, k, seed), [k]).goals[k]
         assert np.linalg.norm(found[:3, 3] - truth[k][:3, 3]) < 0.03
@@ -150,11 +154,13 @@ def test_ten_times_the_noise_is_seen_badly_and_not_left_out():
 
 
 def test_states_are_weighed_by_how_likely_they_make_what_was_seen():
-    model, right = OutlierModel(), look("carried_bridge", 6)
+    model = OutlierModel()
+    right = look("carried_bridge", 6)
     n = len(right.goals)
     inliers = ((INLIER,),) * n
     for state in (BROAD, GROSS):
-        case, doubted = Case(right, views_of(right), model), (*inliers[:-1], (state,))
+        case = Case(right, views_of(right), model)
+        doubted = (*inliers[:-1], (state,))
         assert hypothesis(case, inliers).badness < hypothesis(case, doubted).badness
     wrong = astray(right, n - 1)
     case = Case(wrong, views_of(wrong), model)
@@ -226,7 +232,8 @@ def test_of_many_operations_sets_grow_one_at_a_time(monkeypatch):
 @pytest.mark.parametrize("name", ["pocket_table", "vanished_fixture"])
 def test_sets_are_scored_as_if_each_were_looked_at_alone(name):
     observation = astray(look(name, 2), 1)
-    n, p = len(observation.goals), len(observation.assembly.solids)
+    n = len(observation.goals)
+    p = len(observation.assembly.solids)
     rest = Rest(Case(observation, views_of(observation), OutlierModel()), ((INLIER,),) * n)
     e, Jt = linearised_by(seen_system(observation), observation.goals, noise_factor(observation))
     soft = np.hypot(soft_deviation(observation), 3.0 * np.radians(1.0) ** 2 * 0.1)
