@@ -104,19 +104,27 @@ def fuzz(cases: int, seed: int, workers: int = 1, only: Sequence[str] | None = N
             if child := os.fork():
                 children.append(child)
                 continue
-            with sheet.open("w", buffering=1) as out:
-                for case in range(w, cases, workers):
-                    ended = run_case(made, seed, case, work)
-                    out.write(json.dumps(ended) + "\n")
-                    if ended.ending not in FINE:
-                        print(f"case {case}, {ended.kind}: {ended.ending}", file=sys.stderr, flush=True)
-            os._exit(0)
+            try:
+                _run_share(range(w, cases, workers), made, seed, work, sheet)
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                os._exit(0)  # not through the folder's end, which is the parent's
         for child in children:
             os.waitpid(child, 0)
         found = [Ended(*json.loads(line)) for sheet in sheets for line in sheet.read_text().splitlines()]
     if len(found) != cases:
         raise RuntimeError(f"{cases - len(found)} cases are missing")
     return sorted(found)
+
+
+def _run_share(share: range, made: Mapping[str, Kind], seed: int, work: Path, sheet: Path) -> None:
+    with sheet.open("w", buffering=1) as out:
+        for case in share:
+            ended = run_case(made, seed, case, work)
+            out.write(json.dumps(ended) + "\n")
+            if ended.ending not in FINE:
+                print(f"case {case}, {ended.kind}: {ended.ending}", file=sys.stderr, flush=True)
 
 
 def prepared(work: Path, only: Sequence[str] | None = None) -> Mapping[str, Kind]:

@@ -159,3 +159,12 @@ def test_files_are_changed_the_same_way_by_the_same_seed(suffix: str) -> None:
         once, again = (mutated(raw, suffix, np.random.default_rng(seed)) for _ in range(2))
         assert once == again
     assert len({mutated(raw, suffix, np.random.default_rng(seed)) for seed in range(50)}) > 35
+
+
+def test_what_a_reader_of_the_fuzzers_own_cannot_read_is_changed_as_bytes() -> None:
+    """An archive whose flags were changed before, as compressed patched data."""
+    raw = bytearray(packed("<model/>"))
+    raw[raw.index(b"PK\1\2") + 8] |= 0x20
+    raw[6] |= 0x20
+    levels = {mutated(bytes(raw), ".3mf", np.random.default_rng(seed))[0] for seed in range(40)}
+    assert levels == {"bytes", "tokens", "structure"}
