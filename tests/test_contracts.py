@@ -70,8 +70,8 @@ BREACHES = {
     "simulators": [
         ("apo_bench.envs.apo_replay", "mujoco"),
         ("apo_bench.cli.app", "mink"),
-        ("apo_bench.trial.stages", "dm_control"),
     ],
+    "dm-control": [("apo_bench.simulation.scene.composing", "dm_control"), ("apo_bench.envs.apo_replay", "dm_control")],
     "gymnasium": [("apo_bench.trial.trial", "gymnasium"), ("apo_bench.simulation.scene.scene", "gymnasium")],
 }
 

@@ -6,10 +6,11 @@ a contact's time constant of four steps, damping ratio 2. With a ratio of 1 a st
 rattles over an edge that should stop it.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
+
+import mujoco
 
 from apo_bench.errors import InputError
 
@@ -43,3 +44,21 @@ def physics(timestep_s: float = 0.001) -> Physics:
             "since a longer step lets misaligned parts slip into each other; use 1 (tables) or 0.5 (check)."
         )
     return Physics(timestep_s=timestep_s, solref=(4 * timestep_s, 2.0))
+
+
+def set_options(option: Any, s: Physics) -> None:
+    """Give a model that is being made (`MjSpec.option`) these settings."""
+    option.timestep = s.timestep_s
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = s.impratio
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.tolerance = s.tolerance
+    option.iterations = s.iterations
+
+
+def set_contact(geoms: Iterable[Any], s: Physics) -> None:
+    """Give geoms of an `MjSpec` this softness."""
+    for geom in geoms:
+        geom.solref[:2] = s.solref
+        geom.solimp = s.solimp

@@ -9,10 +9,8 @@ Physics knows neither which faces should touch nor how uncertain a pose is, so c
 at. Fit faces recede by the play that the observation states, or by `CLEARANCE_M`; all parts have one density.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from xml.etree import ElementTree
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -24,8 +22,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.solid import Solid
 from apo_bench.records.outcomes import sentence
-from apo_bench.simulation.physics import Physics, physics
-from apo_bench.simulation.scene.geoms import MESH_INERTIA, geom_attributes, inertial_attributes, mesh_pieces
+from apo_bench.simulation.physics import Physics, physics, set_contact, set_options
+from apo_bench.simulation.scene.geoms import add_pieces, set_mass
 from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
 
 LIFT_M = 0.0
@@ -98,41 +96,21 @@ def _world(observation: Observation) -> World:
     moved = {part for operation in observation.assembly.operations for part in operation.moves}
     free = tuple(part for part in observation.assembly.solids if part in moved)
     fixed = tuple(part for part in observation.assembly.solids if part not in moved)
-    xml = _xml(observation.assembly.solids, free, observation.play_m or CLEARANCE_M, physics())
-    model = mujoco.MjModel.from_xml_string(xml)
+    spec = _room(observation.assembly.solids, free, observation.play_m or CLEARANCE_M, physics())
+    model = spec.compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return world(model, xml, free, fixed)
+    return world(model, free, fixed)
 
 
-def _xml(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float, s: Physics) -> str:
-    root = ElementTree.Element("mujoco")
-    option = {"timestep": s.timestep_s, "impratio": s.impratio, "tolerance": s.tolerance, "iterations": s.iterations}
-    kinds = {"integrator": "implicitfast", "cone": "elliptic", "solver": "Newton"}
-    ElementTree.SubElement(root, "option", {key: str(value) for key, value in option.items()} | kinds)
-    geom = {"solref": s.solref, "solimp": s.solimp, "friction": (_FRICTION, 0.005, 0.0001)}
-    plain = {"type": "box", "density": str(_DENSITY), "condim": str(s.condim)}
-    default = ElementTree.SubElement(root, "default")
-    ElementTree.SubElement(default, "geom", plain | {key: _spelled(value) for key, value in geom.items()})
-    assets = ElementTree.SubElement(root, "asset")
-    room = ElementTree.SubElement(root, "worldbody")
+def _room(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float, s: Physics) -> Any:
+    spec = mujoco.MjSpec()
+    set_options(spec.option, s)
+    set_contact([spec.default.geom], s)
+    surface = {"friction": (_FRICTION, 0.005, 0.0001), "density": _DENSITY, "condim": s.condim}
     for part, solid in solids.items():
-        body = ElementTree.SubElement(room, "body", {"name": f"{part}/"})
+        body = spec.worldbody.add_body(name=f"{part}/")
         if part in free:
-            ElementTree.SubElement(body, "freejoint")
-        pieces = physical_pieces(solid, clearance_m)
-        if inertial := inertial_attributes(solid, _DENSITY):
-            ElementTree.SubElement(body, "inertial", _spelled_all(inertial))
-        for hull in mesh_pieces(pieces):
-            mesh = {"name": f"{part}/{hull.name}", "inertia": MESH_INERTIA, "vertex": _spelled(hull.corners.ravel())}
-            ElementTree.SubElement(assets, "mesh", mesh)
-        for piece in pieces:
-            ElementTree.SubElement(body, "geom", _spelled_all(geom_attributes(piece, f"{part}/")))
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-def _spelled_all(said: Mapping[str, object]) -> dict[str, str]:
-    return {key: str(value) if isinstance(value, str | int) else _spelled(value) for key, value in said.items()}
-
-
-def _spelled(numbers: object) -> str:
-    return " ".join(repr(float(x)) for x in np.atleast_1d(np.asarray(numbers, dtype=np.float64)))
+            body.add_freejoint()
+        set_mass(body, solid, _DENSITY)
+        add_pieces(spec, body, physical_pieces(solid, clearance_m), surface, f"{part}/")
+    return spec

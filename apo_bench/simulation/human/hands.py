@@ -18,7 +18,8 @@ from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene.scene import HANDS, Scene
+from apo_bench.simulation.scene.composing import HANDS
+from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state, part_pose, sleeping
 
 _TRAIL_S = 0.019

@@ -1,8 +1,8 @@
-"""MuJoCo and dm-control, imported without a graphics driver: one is loaded when the first picture is asked for.
+"""MuJoCo, imported without a graphics driver: one is loaded when the first picture is asked for.
 
-Both choose their OpenGL backend by the variable MUJOCO_GL while they are imported, and a driver that is loaded then
-stays in the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with CUDA) do not survive. Where
-somebody has imported MuJoCo or dm-control before, it is left as it is.
+It chooses its OpenGL backend by the variable MUJOCO_GL while it is imported, and a driver that is loaded then stays in
+the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with CUDA) do not survive. Where somebody
+has imported MuJoCo before, it is left as it is.
 """
 
 from __future__ import annotations
@@ -34,25 +34,16 @@ def import_mujoco() -> None:
         mujoco = importlib.import_module("mujoco")
     contexts = importlib.import_module("mujoco.rendering.classic.gl_context")
     for module in (contexts, mujoco, importlib.import_module("mujoco.gl_context")):
-        _choose_later(module, contexts, "GLContext")
+        _choose_later(module, contexts)
 
 
-def import_mjcf() -> Any:
-    """dm-control's mjcf; its renderer is there when somebody uses it."""
-    if "dm_control._render" not in sys.modules:
-        with environment(_NO_BACKEND):
-            render = importlib.import_module("dm_control._render")
-        _choose_later(render, render, "Renderer", "BACKEND", "USING_GPU")
-    return importlib.import_module("dm_control.mjcf")
-
-
-def _choose_later(module: ModuleType, source: ModuleType, *names: str) -> None:
-    """Take names out of a module; the first that is asked for runs `source` again, under the variable as it is then."""
-    for name in names:
-        vars(module).pop(name, None)
+def _choose_later(module: ModuleType, source: ModuleType) -> None:
+    """Take the context out of a module; who first asks for it runs `source` again, under the variable as it is then."""
+    wanted = "GLContext"
+    vars(module).pop(wanted, None)
 
     def chosen(name: str) -> Any:
-        if name not in names:
+        if name != wanted:
             raise AttributeError(f"module '{module.__name__}' has no attribute '{name}'")
         if name not in vars(source):
             importlib.reload(source)

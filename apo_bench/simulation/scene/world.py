@@ -26,7 +26,6 @@ class World:
 
     model: Any
     """`mujoco.MjModel`. Trials change its weld targets before they switch a weld on, nothing else."""
-    xml: str
     free: tuple[str, ...]
     """Movable parts, in the order of the scenario."""
     fixed: tuple[str, ...]
@@ -38,7 +37,7 @@ class World:
     """Per geom: index into free + fixed, -1 for everything else (arm, hands)."""
 
 
-def world(model: Any, xml: str, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
+def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
     """Look up every part of a compiled scene."""
     parts = free + fixed
     body = {part: model.body(f"{part}/").id for part in parts}
@@ -47,7 +46,6 @@ def world(model: Any, xml: str, free: tuple[str, ...], fixed: tuple[str, ...]) -
     joints = {part: int(model.body(f"{part}/").jntadr[0]) for part in free}
     return World(
         model=model,
-        xml=xml,
         free=free,
         fixed=fixed,
         body=body,
