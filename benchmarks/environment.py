@@ -18,7 +18,7 @@ import gymnasium
 import apo_bench
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import scenario_names
-from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -83,13 +83,13 @@ def methods(scenario: str, seeds: Iterable[int]) -> dict[str, int]:
     scene = apo_bench.build_scene(apo_bench.load_scenario(scenario))
     right = dict.fromkeys(POLICIES[1:], 0)
     for seed in seeds:
-        shown = {careless: record_demonstration(scene, careless, seed) for careless in (0.0, 1.0)}
+        shown = {careless: simulate_demonstration(scene, careless, seed) for careless in (0.0, 1.0)}
         for method in right:
             level, careless = (0.0, 0.0) if method == "oracle" else (1.0, 1.0)
             trial = TrialSettings(
                 scenario, method=method, seed=seed, level_mm=level, level_deg=level, careless=careless, fidelity=FAST
             )
-            right[method] += bool(run_trial(trial, scene, recording=shown[careless])["success"])
+            right[method] += bool(run_trial(trial, scene, simulated=shown[careless])["success"])
     return right
 
 

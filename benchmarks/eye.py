@@ -24,10 +24,10 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import OBSERVATION, Recording, range_sensor, record_demonstration, stream
+from apo_bench.trial.stages import OBSERVATION, SimulatedDemonstration, range_sensor, simulate_demonstration, stream
 
 
-def measured(scene: Scene, shown: Recording, level: float, seed: int) -> list[dict[str, object]]:
+def measured(scene: Scene, shown: SimulatedDemonstration, level: float, seed: int) -> list[dict[str, object]]:
     """One entry per operation."""
     eye = range_sensor(scene, shown, level)
     began = time.process_time()
@@ -49,7 +49,7 @@ def measured(scene: Scene, shown: Recording, level: float, seed: int) -> list[di
     return rows
 
 
-def shifted(shown: Recording) -> dict[str, np.ndarray]:
+def shifted(shown: SimulatedDemonstration) -> dict[str, np.ndarray]:
     """Parts that rested and were shifted late, with the pose in which each was seen."""
     demonstration = shown.demonstration
     last = {operation.main: k for k, operation in enumerate(demonstration.assembly.operations)}
@@ -58,11 +58,11 @@ def shifted(shown: Recording) -> dict[str, np.ndarray]:
     return {part: T for part, T in before.items() if distance_mm(shown, part, T) > 0.5}
 
 
-def distance_mm(shown: Recording, part: str, T: np.ndarray) -> float:
+def distance_mm(shown: SimulatedDemonstration, part: str, T: np.ndarray) -> float:
     return 1e3 * float(np.linalg.norm((shown.demonstration.final[part] - T)[:3, 3]))
 
 
-def noticed(scene: Scene, shown: Recording, event: Event) -> int:
+def noticed(scene: Scene, shown: SimulatedDemonstration, event: Event) -> int:
     """Pixels of shifted parts in the regions of the last operation: appeared where they are, vanished where they were.
 
     Per part some 1500 can be seen in both views together.
@@ -102,7 +102,7 @@ def main() -> None:
         watch = []
         for seed in range(args.trials):
             began = time.process_time()
-            shown = record_demonstration(scene, args.careless, seed, "range")
+            shown = simulate_demonstration(scene, args.careless, seed, "range")
             watch.append(time.process_time() - began)
             if shown.demonstration.code != "ok":
                 continue

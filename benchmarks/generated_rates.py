@@ -30,7 +30,7 @@ from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.rates import wilson
 from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of
 
@@ -88,10 +88,10 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
             if not asked:
                 continue
             scenes[name] = scenes.get(name) or scene_of(asked[0])
-            recording = record_demonstration(scenes[name], asked[0].careless, seed)
+            simulated = simulate_demonstration(scenes[name], asked[0].careless, seed)
             cache = ReplayCache()
             for settings in asked:
-                row = run_trial(settings, scenes[name], recording=recording, cache=cache)
+                row = run_trial(settings, scenes[name], simulated=simulated, cache=cache)
                 said = row["failure_stage"], row["failure_code"], row["failure_operation"], row["sentence"]
                 success = "" if row["success"] is None else int(row["success"])
                 cells = (name, settings.method, seed, success, *said)

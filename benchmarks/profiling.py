@@ -26,7 +26,7 @@ from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "profile.json"
@@ -107,9 +107,9 @@ def share(scene: Scene, method: str, fidelity: str) -> dict[str, Any]:
 
 def planned(scene: Scene, method: str, seed: int) -> Any:
     """What a method would have the robot do."""
-    shown = record_demonstration(scene, 1.0, seed)
+    shown = simulate_demonstration(scene, 1.0, seed)
     made = apply_method(
-        method, observe_recording(shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals
+        method, observe_demonstration(shown, make_noise("isotropic", Level(1.0, 1.0)), seed), shown.layout.goals
     )
     assert made.plan is not None, made.failure
     return made.plan

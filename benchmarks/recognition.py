@@ -34,7 +34,7 @@ from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.recognition import Recognition, recognitions
 from apo_bench.trial.recognised_contacts import count_contacts, recognise_by
-from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LOW = 0.5
@@ -60,9 +60,9 @@ def rows_of(scenario: str, seed: int, wide: int, twice: int) -> list[dict[str, A
     levels = LEVELS if seed < wide else tuple(level for level in LEVELS if level <= LOW)
     kinds = RECOGNISED[: 1 + (seed < wide) + (seed < twice)]
     for careless in (0.0, 1.0) if here.scenario.careless is not None and seed < wide else (0.0,):
-        shown = record_demonstration(here, careless, seed)
+        shown = simulate_demonstration(here, careless, seed)
         for level, kind in product(levels, kinds) if shown.demonstration.code == "ok" else ():
-            seen = observe_recording(shown, make_noise("isotropic", Level(level, level)), seed)
+            seen = observe_demonstration(shown, make_noise("isotropic", Level(level, level)), seed)
             told = recognise_by(seen, kind).assembly
             where = {"scenario": scenario, "noise": "isotropic", "eye": "noise", "relations": kind, "seed": seed}
             size = {"careless": careless, "level": level, "level_deg": level, "clearance_mm": here.clearance_mm}

@@ -26,7 +26,7 @@ from apo_bench.assembly.goals import Plan
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.stages import simulate_demonstration
 
 ROUNDS = 5
 
@@ -50,7 +50,7 @@ def measure(name: str) -> None:
     rows = []
     for seed in range(ROUNDS):
         rest = yardstick(scene)
-        shown_s, shown = timed(lambda seed=seed: record_demonstration(scene, 1.0, seed))
+        shown_s, shown = timed(lambda seed=seed: simulate_demonstration(scene, 1.0, seed))
         plan = Plan(scenario.assembly, shown.layout.start, shown.layout.goals)
         replay_s, result = timed(lambda plan=plan: replay(plan, scene))
         rows.append((rest, shown_s, replay_s, result.sim_seconds / replay_s, result.sim_seconds))
@@ -71,9 +71,9 @@ def reset_overhead(name: str) -> float:
     env.reset(seed=0)
     extra = []
     for seed in range(ROUNDS):
-        shown_s, _ = timed(lambda seed=seed: record_demonstration(scene, 1.0, seed))
+        shown_s, _ = timed(lambda seed=seed: simulate_demonstration(scene, 1.0, seed))
         reset_s, _ = timed(lambda seed=seed: env.reset(seed=seed))
-        again_s, _ = timed(lambda seed=seed: record_demonstration(scene, 1.0, seed))
+        again_s, _ = timed(lambda seed=seed: simulate_demonstration(scene, 1.0, seed))
         extra.append(reset_s - (shown_s + again_s) / 2)
     return float(np.median(extra)) * 1e3
 

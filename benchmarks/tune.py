@@ -33,7 +33,12 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.settling import settle
 from apo_bench.trial.pose_error import goal_errors
-from apo_bench.trial.stages import Recording, observe_recording, record_demonstration, replay_and_judge
+from apo_bench.trial.stages import (
+    SimulatedDemonstration,
+    observe_demonstration,
+    replay_and_judge,
+    simulate_demonstration,
+)
 
 SCENARIOS = ("stick_in_tower", "vanished_fixture")
 LEVELS = (1.0, 2.0)
@@ -76,7 +81,7 @@ def main(seeds: int = 6) -> None:
     for name in SCENARIOS:
         scene = build_scene(load_scenario(name))
         for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-            shown = record_demonstration(scene, CARELESS, seed)
+            shown = simulate_demonstration(scene, CARELESS, seed)
             for level, method in product(LEVELS, GRIDS):
                 for values in product(*GRIDS[method][1].values()):
                     replayed = _replayed(scene, shown, level, seed, _corrector(method, values))
@@ -98,8 +103,10 @@ def _corrector(method: str, values: Values) -> Callable[..., Any]:
     return partial(GRIDS[method][0], **_settings(method, values))
 
 
-def _replayed(scene: Scene, shown: Recording, level: float, seed: int, corrector: Callable[..., Any]) -> Replayed:
-    seen = observe_recording(shown, make_noise("isotropic", Level(level, level)), seed)
+def _replayed(
+    scene: Scene, shown: SimulatedDemonstration, level: float, seed: int, corrector: Callable[..., Any]
+) -> Replayed:
+    seen = observe_demonstration(shown, make_noise("isotropic", Level(level, level)), seed)
     truth = shown.layout.goals
     made = correct(seen, corrector)
     fixed_mm, free_mm = goal_errors(seen.assembly, seen.start, truth, made.goals)

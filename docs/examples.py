@@ -25,7 +25,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import observe_recording, record_demonstration, replay_and_judge
+from apo_bench.trial.stages import observe_demonstration, replay_and_judge, simulate_demonstration
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 5
@@ -115,8 +115,8 @@ def main(names: list[str]) -> None:
 
 def _draw(name: str, strip: Strip) -> None:
     scene = build_scene(load_scenario(name))
-    shown = record_demonstration(scene, 1.0, SEED)
-    seen = observe_recording(shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
+    shown = simulate_demonstration(scene, 1.0, SEED)
+    seen = observe_demonstration(shown, make_noise("isotropic", Level(0.0, 0.0)), SEED)
     raw = apply_method("none", seen, None).plan
     corrected = apply_method(strip.method, seen, None).plan
     assert raw is not None, "everything was seen"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.stages import simulate_demonstration
 
 SHEET = Path(__file__).parent / "pictures" / "scenarios.png"
 SIZE = (600, 500)
@@ -41,8 +41,8 @@ def finished(name: str) -> NDArray[np.uint8]:
     """What stands on the table when a careful person is done, as large as it fits."""
     scene = build_scene(load_scenario(name))
     scene.shown.model.vis.headlight.ambient[:] = 0.4
-    recording = record_demonstration(scene, 0.0, SEED)
-    poses = recording.demonstration.final
+    simulated = simulate_demonstration(scene, 0.0, SEED)
+    poses = simulated.demonstration.final
     standing = {**{part: scene.scenario.start[part] for part in scene.shown.fixed if part != "table"}, **poses}
     at = np.array([pose[:3, 3] for part, pose in standing.items() if part != "table"])
     middle = (at.min(axis=0) + at.max(axis=0)) / 2

@@ -18,7 +18,7 @@ from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request
 from apo_bench.trial.run_request import run_request
-from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 from apo_bench.trial.story import Story
 
 HERE = Path(__file__).parent / "pictures"
@@ -28,8 +28,8 @@ LEVEL = 2.0
 
 def main() -> None:
     scene = build_scene(load_scenario("stick_in_tower"))
-    shown = record_demonstration(scene, 1.0, SEED)
-    seen = observe_recording(shown, make_noise("isotropic", Level(LEVEL, LEVEL)), SEED)
+    shown = simulate_demonstration(scene, 1.0, SEED)
+    seen = observe_demonstration(shown, make_noise("isotropic", Level(LEVEL, LEVEL)), SEED)
     corrected = correct(seen, "contact").goals
     with_ur5e = build_scene(scene.scenario, arm=ARM)
     shots = [

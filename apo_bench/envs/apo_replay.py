@@ -30,16 +30,16 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.stages import (
-    Recording,
+    SimulatedDemonstration,
     demonstration_failure,
     draw_robot_error,
     looks_at,
     observation_failure,
-    observe_recording,
+    observe_demonstration,
     predicted_outcome,
     range_sensor,
-    record_demonstration,
     replay_and_judge,
+    simulate_demonstration,
     trial_outcome,
 )
 
@@ -175,7 +175,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         )
         self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
         self._trial: int | None = None
-        self._recording: Recording | None = None
+        self._simulated: SimulatedDemonstration | None = None
         self._seen: Observation | None = None
         self._look: Looks | None = None
         self._aim: Plan | None = None
@@ -240,17 +240,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
-        self._trial, recording = self._watch_human(seed)
-        noise = range_sensor(self._scene, recording, self._now.level.mm) if self._eye == RANGE else self._noise
-        self._seen = observe_recording(recording, noise, self._trial)
-        self._look = looks_at(recording, noise, self._trial, self._allowed) if self._allowed else None
-        self._recording = replace(recording, images=None)
+        self._trial, simulated = self._watch_human(seed)
+        noise = range_sensor(self._scene, simulated, self._now.level.mm) if self._eye == RANGE else self._noise
+        self._seen = observe_demonstration(simulated, noise, self._trial)
+        self._look = looks_at(simulated, noise, self._trial, self._allowed) if self._allowed else None
+        self._simulated = replace(simulated, images=None)
         self.aim(self._seen.goals)
         self._refused = observation_failure(self._seen)
         self._over = False
-        self._poses = recording.layout.start
+        self._poses = simulated.layout.start
         self._state = None
-        return self._observation(), {"demonstration": recording.demonstration.code}
+        return self._observation(), {"demonstration": simulated.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the goals, each moved by its twist.
@@ -259,7 +259,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             ResetNeeded: The episode is over, or there is none.
             InputError: The action is not in the action space.
         """
-        if self._recording is None or self._aim is None or self._over:
+        if self._simulated is None or self._aim is None or self._over:
             raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
         twist = np.asarray(action, dtype=np.float64)
         if not self.action_space.contains(twist):
@@ -269,7 +269,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
                 "allowed, as `env.action_space` says."
             )
         self._over = True
-        verdicts, end, predicted = self._replayed(self._recording, _moved(self._aim, pose.exp(twist)))
+        verdicts, end, predicted = self._replayed(self._simulated, _moved(self._aim, pose.exp(twist)))
         info = {
             **verdicts,
             "stage": end.stage,
@@ -330,13 +330,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._now = now
         self._noise = noise
 
-    def _watch_human(self, seed: int | None) -> tuple[int, Recording]:
+    def _watch_human(self, seed: int | None) -> tuple[int, SimulatedDemonstration]:
         """Trial `seed`, or the next one whose demonstration is right."""
         for _ in range(1 if seed is not None else MOST_TRIES):
             trial = int(seed) if seed is not None else self._next_trial()
-            recording = record_demonstration(self._scene, self._now.careless, trial, self._eye)
-            if seed is not None or recording.demonstration.code == "ok":
-                return trial, recording
+            simulated = simulate_demonstration(self._scene, self._now.careless, trial, self._eye)
+            if seed is not None or simulated.demonstration.code == "ok":
+                return trial, simulated
         raise InputError(
             f"{MOST_TRIES} demonstrations of '{self._scene.scenario.name}' in a row went wrong at carelessness "
             f"{self._now.careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend "
@@ -351,11 +351,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         goals = packed(self.seen.goals)
         return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
 
-    def _replayed(self, recording: Recording, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None]:
+    def _replayed(
+        self, simulated: SimulatedDemonstration, plan: Plan
+    ) -> tuple[dict[str, bool], Outcome, Predicted | None]:
         """The verdicts, where it ended, and what the plan had said."""
         failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
-        if recording.demonstration.code != "ok":
-            return failed, demonstration_failure(recording.demonstration), None
+        if simulated.demonstration.code != "ok":
+            return failed, demonstration_failure(simulated.demonstration), None
         if self._refused is not None:
             return failed, self._refused, None
         predicted = predicted_outcome(plan, self._scene)
@@ -363,7 +365,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         attempt = replay_and_judge(
             plan,
             self._scene,
-            recording.layout.goals,
+            simulated.layout.goals,
             self._watch(),
             most_s=LONGEST_REPLAY_S,
             error=draw_robot_error(self._robot_error, self._scene, self._trial),

@@ -34,7 +34,7 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     from matplotlib.figure import Figure
 
     events = run.events
-    assembly = run.recording.demonstration.assembly
+    assembly = run.simulated.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)

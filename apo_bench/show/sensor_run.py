@@ -16,10 +16,10 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 from apo_bench.trial.stages import (
     OBSERVATION,
-    Recording,
+    SimulatedDemonstration,
     demonstration_failure,
     range_sensor,
-    record_demonstration,
+    simulate_demonstration,
     stream,
 )
 
@@ -33,7 +33,7 @@ class SensorRun:
 
     name: str
     """The name of the scenario."""
-    recording: Recording
+    simulated: SimulatedDemonstration
     watched: DemonstrationImages
     images: tuple[Array, ...]
     """Measured range images, (views, height, width) each, [m]."""
@@ -51,14 +51,14 @@ def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> Se
     check("careless", careless)
     check("seed", seed)
     scene = build_scene(load_scenario(scenario))
-    recording = record_demonstration(scene, careless, seed, RANGE)
-    if recording.demonstration.code != "ok":
-        raise RuntimeError(f"{demonstration_failure(recording.demonstration).sentence}; try another seed")
-    assert recording.images is not None
-    sensor = range_sensor(scene, recording, level_mm)
+    simulated = simulate_demonstration(scene, careless, seed, RANGE)
+    if simulated.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
+    assert simulated.images is not None
+    sensor = range_sensor(scene, simulated, level_mm)
     images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
     return SensorRun(
-        scene.scenario.name, recording, recording.images, images, sensor.events(recording.demonstration, images)
+        scene.scenario.name, simulated, simulated.images, images, sensor.events(simulated.demonstration, images)
     )
 
 
@@ -86,7 +86,7 @@ def sensor_form(run: SensorRun, level_mm: float, seed: int, careless: float) -> 
         "firings_s": [round(t, 3) for t in run.watched.times_s],
         "operations": [
             {"operation": k + 1, "moves": list(operation.moves)} | _one(of.get(k), run, k)
-            for k, operation in enumerate(run.recording.demonstration.assembly.operations)
+            for k, operation in enumerate(run.simulated.demonstration.assembly.operations)
         ],
     }
 
@@ -95,7 +95,7 @@ def _one(event: Event | None, run: SensorRun, k: int) -> dict[str, Any]:
     if event is None or event.found is None:
         return {"found": False}
     deviation = np.sqrt(np.diag(event.found.covariance))
-    error = pose.log(pose.inverse(event.found.T) @ run.recording.demonstration.goals[k])
+    error = pose.log(pose.inverse(event.found.T) @ run.simulated.demonstration.goals[k])
     packed = pose.pack(event.found.T)
     return {
         "found": True,

@@ -17,7 +17,7 @@ from apo_bench.report.run_facts import scenario_files
 from apo_bench.simulation.film.track import Track
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 from apo_bench.trial.story import Story, told
 from apo_bench.trial.trial import noise_of, run_trial
 
@@ -48,13 +48,13 @@ def trial_again(folder: Path, number: int | None, salt_file: Path | None = None)
         secret = row["salt"] is not None and salt is None
         why = "its salt was not given; name its file by --salt-file" if secret else "other code or assets made it"
         raise RuntimeError(f"trial {number} of {folder} cannot be run again: {why}.")
-    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    simulated = simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
     track = Track()
-    again = run_trial(spec, scene, recording=recording, content=content, watch=track.hooks)
+    again = run_trial(spec, scene, simulated=simulated, content=content, watch=track.hooks)
     if again["sim_seconds"] is None:
         raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")
-    seen = observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
-    return again, told(spec, scene, seen, track, again, recording)
+    seen = observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.salt)
+    return again, told(spec, scene, seen, track, again, simulated)
 
 
 def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:

@@ -26,7 +26,7 @@ from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 from apo_bench.trial.row import result
 from apo_bench.trial.scene import scene_key, scene_of
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.environment_lock import EnvironmentLock
@@ -68,7 +68,7 @@ class Worker:
         Raises:
             InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
         """
-        demonstrations: dict[tuple[float, str], Recording] = {}
+        demonstrations: dict[tuple[float, str], SimulatedDemonstration] = {}
         cache = ReplayCache()
         for spec in unit.trials:
             if stopped():
@@ -81,7 +81,7 @@ class Worker:
             start = time.perf_counter()
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
-                demonstrations[key] = self._recording(spec, scene)
+                demonstrations[key] = self._simulated(spec, scene)
             shown = time.perf_counter()
             row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
             ended = time.perf_counter()
@@ -91,10 +91,10 @@ class Worker:
         """End the processes of correctors."""
         self._own.close()
 
-    def _recording(self, spec: TrialSettings, scene: Scene) -> Recording:
+    def _simulated(self, spec: TrialSettings, scene: Scene) -> SimulatedDemonstration:
         if self._kept is not None:
-            return self._kept.recording(spec, scene)
-        return record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+            return self._kept.simulated(spec, scene)
+        return simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
 
     def _method(self, name: str) -> Any:
         """The corrector; if it could be imported when the sweep began and cannot now, that is its own failure."""

@@ -16,13 +16,13 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.row import head, result
-from apo_bench.trial.stages import Recording
+from apo_bench.trial.stages import SimulatedDemonstration
 from apo_bench.trial.trial import run_trial
 
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
 
 
-def trial_row(spec: TrialSettings, scene: Scene, recording: Recording, content: str, **more: Any) -> Row:
+def trial_row(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, content: str, **more: Any) -> Row:
     """The row of a trial, also of one whose corrector misbehaved.
 
     What code of somebody's own returned may be what no row can hold; that is its failure too.
@@ -34,14 +34,14 @@ def trial_row(spec: TrialSettings, scene: Scene, recording: Recording, content: 
         InputError: The request cannot be honoured.
     """
     try:
-        row = run_trial(spec, scene, recording=recording, content=content, **more)
+        row = run_trial(spec, scene, simulated=simulated, content=content, **more)
         wrong = unwritable(row) if ":" in spec.method else ""
         said = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
     except CorrectorLost as error:
         return lost(spec, content, error.code, "corrector")
     except CorrectorMisbehaved as error:
         wrong = said = str(error)
-    return misbehaved(spec, content, recording.demonstration.code, said) if wrong else row
+    return misbehaved(spec, content, simulated.demonstration.code, said) if wrong else row
 
 
 def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:

@@ -28,7 +28,7 @@ from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.code_version import code_files
 from apo_bench.trial.fingerprint import content_pieces
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 SCHEMA = "apo-bench/kept-demonstration/1"
 _KIND = "kept demonstration"
@@ -64,7 +64,7 @@ class KeptDemonstrations:
         if not os.access(self.folder, os.R_OK | os.W_OK | os.X_OK):
             raise InputError(f"the cache '{folder}' cannot be written; name a folder that can be.")
 
-    def recording(self, settings: TrialSettings, scene: Scene) -> Recording:
+    def simulated(self, settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
         """The demonstration of a trial: read, or made and kept.
 
         What a range finder records of one is too large to be kept, so it is made again.
@@ -117,11 +117,11 @@ def _made_with() -> str:
     return _hash(json.dumps([SCHEMA, __version__, code, versions, platform.machine(), platform.processor()]))
 
 
-def _made(settings: TrialSettings, scene: Scene) -> Recording:
-    return record_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
+def _made(settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
+    return simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
 
 
-def _written(key: str, made: Recording) -> str:
+def _written(key: str, made: SimulatedDemonstration) -> str:
     human = made.demonstration
     layout = made.layout
     said = {
@@ -136,7 +136,7 @@ def _written(key: str, made: Recording) -> str:
     return json.dumps({"schema": SCHEMA, "key": key, "digest": _hash(json.dumps(said)), "demonstration": said})
 
 
-def _read(path: Path, key: str, scene: Scene) -> Recording:
+def _read(path: Path, key: str, scene: Scene) -> SimulatedDemonstration:
     """What stands in a file.
 
     Raises:
@@ -170,7 +170,7 @@ def _read(path: Path, key: str, scene: Scene) -> Recording:
         gap_m=1e-3 * scene.scenario.gap_mm,
         play_m=1e-3 * scene.clearance_mm,
     )
-    return Recording(layout, human)
+    return SimulatedDemonstration(layout, human)
 
 
 def _named(node: JsonNode, scene: Scene) -> dict[str, Array]:

@@ -17,7 +17,12 @@ from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import Recording, demonstration_failure, observe_recording, record_demonstration
+from apo_bench.trial.stages import (
+    SimulatedDemonstration,
+    demonstration_failure,
+    observe_demonstration,
+    simulate_demonstration,
+)
 from apo_bench.trial.trial import noise_of
 
 DRAWN = (
@@ -121,15 +126,15 @@ def watched(request: Request) -> Observation:
     scenario = load_scenario(request.scenario)
     spec = requested_settings(request, scenario.clearance_mm)
     scene = scene_of(spec, scenario)
-    recording = record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-    if recording.demonstration.code != "ok":
-        raise RuntimeError(f"{demonstration_failure(recording.demonstration).sentence}; try another seed")
-    return look(spec, scene, recording)
+    simulated = simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    if simulated.demonstration.code != "ok":
+        raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
+    return look(spec, scene, simulated)
 
 
-def look(spec: TrialSettings, scene: Scene, recording: Recording) -> Observation:
+def look(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Observation:
     """The demonstration of a trial through its eye."""
-    return observe_recording(recording, noise_of(spec, scene, recording), spec.seed, spec.salt)
+    return observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.salt)
 
 
 def _refuse_contradictions(request: Request, asked: Mapping[str, Any]) -> None:

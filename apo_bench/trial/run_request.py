@@ -26,7 +26,7 @@ from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 from apo_bench.trial.request import Request, look, requested_settings
 from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from apo_bench.trial.story import Story, told
 from apo_bench.trial.trial import MEASURED, run_measured
 
@@ -78,7 +78,7 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
 
 def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
     scene = scene_of(spec)
-    recording = None
+    simulated = None
     track = Track() if request.video or show else None
     watch = None if track is None else track.hooks
     if request.video:
@@ -91,14 +91,14 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: 
         seen = read_stated(request.observation, scene.scenario)
         row = _measured(request.observation, seen, spec, scene, method, watch)
     else:
-        recording = _recording(request, spec, scene)
-        row = _drawn(request, spec, scene, recording, method, watch)
+        simulated = _simulated(request, spec, scene)
+        row = _drawn(request, spec, scene, simulated, method, watch)
         if track is not None and row["sim_seconds"] is not None:
-            seen = look(spec, scene, recording)
+            seen = look(spec, scene, simulated)
     say("row", row)
     if track is None or seen is None or row["sim_seconds"] is None:
         return
-    story = told(spec, scene, seen, track, row, recording)
+    story = told(spec, scene, seen, track, row, simulated)
     if request.video:
         write_film(scene.scenario.assembly, story.assembled, story.chapters, request.video)
     if show is not None:
@@ -119,20 +119,22 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
     return row | {"spec_hash": spec_hash(spec, content, text), **MEASURED}
 
 
-def _recording(request: Request, spec: TrialSettings, scene: Scene) -> Recording:
+def _simulated(request: Request, spec: TrialSettings, scene: Scene) -> SimulatedDemonstration:
     if request.cache is None:
-        return record_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-    return KeptDemonstrations(request.cache).recording(spec, scene)
+        return simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    return KeptDemonstrations(request.cache).simulated(spec, scene)
 
 
-def _drawn(request: Request, spec: TrialSettings, scene: Scene, recording: Recording, method: Any, watch: Any) -> Row:
+def _drawn(
+    request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, method: Any, watch: Any
+) -> Row:
     if request.save_observation:
         from apo_bench.files.json_forms import observation_form, write_form
 
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
-        write_form(observation_form(look(spec, scene, recording), name), request.save_observation)
+        write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
-    return trial_row(spec, scene, recording, content, method=method, watch=watch)
+    return trial_row(spec, scene, simulated, content, method=method, watch=watch)
 
 
 def _measured(path: Path, observation: Observation, spec: TrialSettings, scene: Scene, method: Any, watch: Any) -> Row:

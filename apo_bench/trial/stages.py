@@ -45,13 +45,13 @@ four are of what is wrong with the robot."""
 
 @final
 @dataclass(frozen=True, eq=False)
-class Recording:
+class SimulatedDemonstration:
     """A demonstration and the truth behind it: shared by every method and level of a seed."""
 
     layout: Layout
     demonstration: Demonstration
     images: DemonstrationImages | None = None
-    """What the range finder recorded of it; None if only poses are asked for."""
+    """What the range finder measured of it; None if only poses are asked for."""
 
 
 @final
@@ -68,43 +68,47 @@ def stream(seed: int, which: int, salt: Salt | None = None) -> np.random.Generat
     return np.random.default_rng([seed, which, *(salt.words(seed, which) if salt else ())])
 
 
-def record_demonstration(
+def simulate_demonstration(
     scene: Scene, careless: float, seed: int, eye: str = "noise", salt: Salt | None = None
-) -> Recording:
-    """Draw the truth of a trial and let the human demonstrate it; the eye `range` records images of that."""
+) -> SimulatedDemonstration:
+    """Draw the truth of a trial and let the human demonstrate it; the eye `range` takes images of that."""
     layout = draw_layout(scene.scenario, stream(seed, LAYOUT, salt), scene.clearance_mm)
     rng = stream(seed, DEMONSTRATION, salt)
     if eye != RANGE:
-        return Recording(layout, demonstrate(scene, layout, careless, rng))
+        return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng))
     from apo_bench.simulation.sensor.watch import DemonstrationCamera
 
     watcher = DemonstrationCamera(scene.shown, stream(seed, TV, salt))
-    return Recording(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
+    return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
 
 
-def watch_again(scene: Scene, recording: Recording, careless: float, seed: int, salt: Salt | None, watch: Any) -> None:
+def watch_again(
+    scene: Scene, simulated: SimulatedDemonstration, careless: float, seed: int, salt: Salt | None, watch: Any
+) -> None:
     """Let the human demonstrate once more, the same, before somebody who looks on."""
-    demonstrate(scene, recording.layout, careless, stream(seed, DEMONSTRATION, salt), watch)
+    demonstrate(scene, simulated.layout, careless, stream(seed, DEMONSTRATION, salt), watch)
 
 
-def range_sensor(scene: Scene, recording: Recording, level_mm: float) -> RangeSensor:
-    """The range finder that recorded a demonstration, as a noise model; `level_mm` is the noise of a ray."""
+def range_sensor(scene: Scene, simulated: SimulatedDemonstration, level_mm: float) -> RangeSensor:
+    """The range finder that watched a demonstration, as a noise model; `level_mm` is the noise of a ray."""
     from apo_bench.depth_camera.range_sensor import RangeSensor
 
-    assert recording.images is not None, "record the demonstration with eye='range'"
+    assert simulated.images is not None, "simulate the demonstration with eye='range'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
-    camera = recording.images
+    camera = simulated.images
     return RangeSensor(camera.finder, camera.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
 
 
-def observe_recording(recording: Recording, noise: Noise, seed: int, salt: Salt | None = None) -> Observation:
+def observe_demonstration(
+    simulated: SimulatedDemonstration, noise: Noise, seed: int, salt: Salt | None = None
+) -> Observation:
     """What a noise model makes of the demonstration of a trial."""
-    return observe(recording.demonstration, noise, stream(seed, OBSERVATION, salt))
+    return observe(simulated.demonstration, noise, stream(seed, OBSERVATION, salt))
 
 
 def looks_at(
-    recording: Recording,
+    simulated: SimulatedDemonstration,
     noise: Noise,
     seed: int,
     allowed: int,
@@ -116,7 +120,7 @@ def looks_at(
     Args:
         assembly: As in `Looks`.
     """
-    return Looks(recording.demonstration, noise, stream(seed, LOOKS, salt), allowed, assembly)
+    return Looks(simulated.demonstration, noise, stream(seed, LOOKS, salt), allowed, assembly)
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:

@@ -17,7 +17,7 @@ from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import stages
 from apo_bench.simulation.film.track import Chapter, Track
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.stages import Recording, watch_again
+from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
 AS_SEEN = "as seen"
 AS_CORRECTED = "as corrected"
@@ -50,13 +50,13 @@ def told(
     seen: Observation,
     track: Track,
     row: Row,
-    recording: Recording | None = None,
+    simulated: SimulatedDemonstration | None = None,
 ) -> Story:
     """What is to be seen of a trial that was replayed.
 
     Args:
         track: What watched the replay.
-        recording: Its demonstration, which is run once more; None of a measured observation, whose truth is not known.
+        simulated: Its demonstration, which is run once more; None of a measured observation, whose truth is not known.
     """
     plan = track.plan
     assert plan is not None
@@ -67,10 +67,10 @@ def told(
     if method == "none" or np.array_equal(seen.goals, plan.goals):
         del goals[AS_CORRECTED]
     chapters = []
-    if recording is not None:
-        goals[AS_TRUE] = recording.layout.goals
-        start = recording.layout.start
-        chapters.append(_demonstration(spec, scene, recording))
+    if simulated is not None:
+        goals[AS_TRUE] = simulated.layout.goals
+        start = simulated.layout.start
+        chapters.append(_demonstration(spec, scene, simulated))
     reached = Chapter(
         title=f"{scene.scenario.name}: replay, method {method}",
         world=scene.work,
@@ -92,14 +92,14 @@ def ending(row: Row) -> str:
     return f"failure{where} ({row['failure_code']}): {row['sentence']}"
 
 
-def _demonstration(spec: TrialSettings, scene: Scene, recording: Recording) -> Chapter:
+def _demonstration(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Chapter:
     track = Track()
-    watch_again(scene, recording, spec.careless, spec.seed, spec.salt, track.hooks)
+    watch_again(scene, simulated, spec.careless, spec.seed, spec.salt, track.hooks)
     how = f"seen with errors of {spec.level_mm:g} mm and {spec.level_deg:g} deg"
     return Chapter(
         title=f"{scene.scenario.name}: demonstration, seed {spec.seed}",
         world=scene.shown,
-        start=recording.layout.start,
+        start=simulated.layout.start,
         moments=tuple(track.moments),
         ending=f"demonstrated; {'seen by a range finder' if spec.eye == RANGE else how}, then planned and replayed",
         good=None,

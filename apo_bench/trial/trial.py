@@ -32,15 +32,15 @@ from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import (
     RELATIONS,
     Attempt,
-    Recording,
+    SimulatedDemonstration,
     demonstration_failure,
     draw_robot_error,
     looks_at,
-    observe_recording,
+    observe_demonstration,
     predicted_outcome,
     range_sensor,
-    record_demonstration,
     replay_and_judge,
+    simulate_demonstration,
     stream,
     trial_outcome,
 )
@@ -53,7 +53,7 @@ def run_trial(
     settings: TrialSettings,
     scene: Scene | None = None,
     *,
-    recording: Recording | None = None,
+    simulated: SimulatedDemonstration | None = None,
     content: str | None = None,
     method: Any = None,
     watch: Any = None,
@@ -64,7 +64,7 @@ def run_trial(
     Args:
         scene: Compiled for the scenario, clearance, grasp, arm and time step of `settings`; compiled here if it is
             not at hand.
-        recording: The demonstration of this seed and carelessness, if it is at hand.
+        simulated: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
         method: What `OwnCorrectors.find` makes of the method of `settings`, if it is at hand.
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time; or several `Hooks`.
@@ -74,24 +74,26 @@ def run_trial(
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
     scene = scene or scene_of(settings)
-    recording = recording or record_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
+    simulated = simulated or simulate_demonstration(
+        scene, settings.careless, settings.seed, settings.eye, settings.salt
+    )
     content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
     asked = head(settings, scene.scenario, spec_hash(settings, content))
-    asked |= {"demonstration": recording.demonstration.code}
-    if recording.demonstration.code != "ok":
-        return asked | result(demonstration_failure(recording.demonstration), success=None)
-    truth = recording.layout.goals
-    noise = noise_of(settings, scene, recording)
-    observation = observe_recording(recording, noise, settings.seed, settings.salt)
+    asked |= {"demonstration": simulated.demonstration.code}
+    if simulated.demonstration.code != "ok":
+        return asked | result(demonstration_failure(simulated.demonstration), success=None)
+    truth = simulated.layout.goals
+    noise = noise_of(settings, scene, simulated)
+    observation = observe_demonstration(simulated, noise, settings.seed, settings.salt)
     given = _corrector_input(settings, observation, truth)
-    look = looks_at(recording, noise, settings.seed, settings.looks, settings.salt, given.assembly)
+    look = looks_at(simulated, noise, settings.seed, settings.looks, settings.salt, given.assembly)
     return asked | _row(settings, scene, observation, given, truth, truth, method, watch, cache, look)
 
 
-def noise_of(settings: TrialSettings, scene: Scene, recording: Recording) -> Noise:
-    """The noise model of a trial, or the range finder that recorded its demonstration."""
+def noise_of(settings: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
+    """The noise model of a trial, or the range finder that watched its demonstration."""
     if settings.eye == RANGE:
-        return range_sensor(scene, recording, settings.level_mm)
+        return range_sensor(scene, simulated, settings.level_mm)
     return make_noise(settings.noise, Level(settings.level_mm, settings.level_deg))
 
 

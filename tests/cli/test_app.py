@@ -249,11 +249,11 @@ def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypa
     from apo_bench.trial import run_request
 
     def fails(*arguments: Any) -> Any:
-        recording = record(*arguments)
-        return replace(recording, demonstration=replace(recording.demonstration, code="demonstration_failed"))
+        simulated = record(*arguments)
+        return replace(simulated, demonstration=replace(simulated.demonstration, code="demonstration_failed"))
 
-    record = run_request.record_demonstration
-    monkeypatch.setattr(run_request, "record_demonstration", fails)
+    record = run_request.simulate_demonstration
+    monkeypatch.setattr(run_request, "simulate_demonstration", fails)
     code, out, _ = run(capsys, *TRIAL, "--json")
     assert code == 1
     assert json.loads(out)["success"] is None

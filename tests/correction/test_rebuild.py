@@ -20,10 +20,10 @@ from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import (
     LAYOUT,
     Attempt,
-    Recording,
-    observe_recording,
-    record_demonstration,
+    SimulatedDemonstration,
+    observe_demonstration,
     replay_and_judge,
+    simulate_demonstration,
     stream,
 )
 
@@ -44,8 +44,8 @@ def scene_of(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, seed: int) -> Recording:
-    return record_demonstration(scene_of(name), 1.0, seed)
+def shown(name: str, seed: int) -> SimulatedDemonstration:
+    return simulate_demonstration(scene_of(name), 1.0, seed)
 
 
 def built(
@@ -137,7 +137,7 @@ def test_the_paper_s_sets_are_tried_after_real_demonstrations(name: str) -> None
     """Only the human is careless: every set but the last leaves a gap."""
     step, sets = SETS[name]
     for seed in range(4):
-        seen = observe_recording(shown(name, seed), make_noise("isotropic", Level(0.0, 0.0)), seed)
+        seen = observe_demonstration(shown(name, seed), make_noise("isotropic", Level(0.0, 0.0)), seed)
         made = correct(seen, "paper-track")
         tried = [one for one in made.tried if one.step == step - 1]
         assert [tuple(k + 1 for k in one.free) for one in tried] == sets
@@ -146,7 +146,7 @@ def test_the_paper_s_sets_are_tried_after_real_demonstrations(name: str) -> None
 
 
 def test_fig_6_frees_all_but_operation_4() -> None:
-    seen = observe_recording(shown("pocket_table", 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
+    seen = observe_demonstration(shown("pocket_table", 1), make_noise("isotropic", Level(0.0, 0.0)), 1)
     assert [k + 1 for k in correct(seen, "paper").freed] == [6, 5, 3, 2, 1]
 
 
@@ -181,7 +181,7 @@ def test_tall_parts_are_carried_over_what_stands(tmp_path: Path) -> None:
     (tmp_path / "post.xml").write_text(TALL)
     (tmp_path / "past.toml").write_text(PAST)
     scene = build_scene(load_scenario(tmp_path / "past.toml"))
-    shown = record_demonstration(scene, 0.0, 1)
+    shown = simulate_demonstration(scene, 0.0, 1)
     assert shown.demonstration.code == "ok"
     plan = Plan(scene.scenario.assembly, shown.layout.start, shown.layout.goals)
     tried = replay_and_judge(plan, scene, shown.layout.goals)

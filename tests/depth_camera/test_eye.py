@@ -32,7 +32,14 @@ from apo_bench.simulation.sensor.tv import Change, TvCamera
 from apo_bench.sweeps import sweep
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
-from apo_bench.trial.stages import OBSERVATION, Recording, observe_recording, range_sensor, record_demonstration, stream
+from apo_bench.trial.stages import (
+    OBSERVATION,
+    SimulatedDemonstration,
+    observe_demonstration,
+    range_sensor,
+    simulate_demonstration,
+    stream,
+)
 from apo_bench.trial.trial import run_trial
 from tests import pages
 
@@ -47,17 +54,17 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def _watched(name: str, seed: int) -> Recording:
-    return record_demonstration(scene(name), 1.0, seed, "range")
+def _watched(name: str, seed: int) -> SimulatedDemonstration:
+    return simulate_demonstration(scene(name), 1.0, seed, "range")
 
 
-def watched(name: str, seed: int = 3) -> Recording:
+def watched(name: str, seed: int = 3) -> SimulatedDemonstration:
     return _watched(name, seed)
 
 
 def observed(name: str, level_mm: float, seed: int = 3) -> Observation:
     shown = watched(name, seed)
-    return observe_recording(shown, range_sensor(scene(name), shown, level_mm), seed)
+    return observe_demonstration(shown, range_sensor(scene(name), shown, level_mm), seed)
 
 
 def errors(name: str, seen: Observation, seed: int = 3) -> Array:
@@ -68,7 +75,7 @@ def errors(name: str, seen: Observation, seed: int = 3) -> Array:
 
 @pytest.mark.parametrize("name", TWO)
 def test_being_watched_changes_nothing(name: str) -> None:
-    alone = record_demonstration(scene(name), 1.0, 3).demonstration
+    alone = simulate_demonstration(scene(name), 1.0, 3).demonstration
     seen = watched(name).demonstration
     assert alone.goals.tobytes() == seen.goals.tobytes()
     assert {part: T.tobytes() for part, T in alone.final.items()} == {
@@ -144,7 +151,7 @@ def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
     assert one.covariance.tobytes() == again.covariance.tobytes()
     assert (one.goals != two.goals).any()
     assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
-    fresh = record_demonstration(scene("stick_in_tower"), 1.0, 3, "range").images
+    fresh = simulate_demonstration(scene("stick_in_tower"), 1.0, 3, "range").images
     known = watched("stick_in_tower").images
     assert fresh is not None
     assert known is not None
@@ -183,10 +190,10 @@ def test_an_operation_that_no_image_shows_is_not_seen() -> None:
     shown = watched("stick_in_tower")
     eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
     blind = RangeSensor(eye.finder, eye.images[:2], eye.level_m, eye.turns, eye.play_m)
-    seen = observe_recording(shown, blind, 3)
+    seen = observe_demonstration(shown, blind, 3)
     assert seen.seen.tolist() == [True, False, False]
     none = RangeSensor(eye.finder, eye.images[:1], eye.level_m, eye.turns, eye.play_m)
-    assert not observe_recording(shown, none, 3).seen.any()
+    assert not observe_demonstration(shown, none, 3).seen.any()
 
 
 def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
@@ -206,7 +213,7 @@ def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
 
 def test_a_trial_through_the_range_finder() -> None:
     spec = TrialSettings("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
-    row = run_trial(spec, scene("stick_in_tower"), recording=watched("stick_in_tower"))
+    row = run_trial(spec, scene("stick_in_tower"), simulated=watched("stick_in_tower"))
     assert row["eye"] == "range"
     assert row["success"] is True
 
@@ -294,7 +301,7 @@ def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
     wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "apo_bench.show.sensor_run.record_demonstration", lambda *_: pytest.fail("the human demonstrated already")
+        "apo_bench.show.sensor_run.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
     )
     assert main(["eye", "block_on_block", *wrong]) == 2
     said = capsys.readouterr().err.strip()

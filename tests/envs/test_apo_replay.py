@@ -30,7 +30,7 @@ from apo_bench.records import outcomes
 from apo_bench.records.settings import TrialSettings
 from apo_bench.simulation.execution import controller as replays
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.stages import Recording, looks_at, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, looks_at, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 
 SEED = 5
@@ -53,15 +53,15 @@ def small() -> APOReplay:
 
 
 @cache
-def demonstrated(scene: Scene, careless: float, seed: int, eye: str) -> Recording:
-    return record_demonstration(scene, careless, seed, eye)
+def demonstrated(scene: Scene, careless: float, seed: int, eye: str) -> SimulatedDemonstration:
+    return simulate_demonstration(scene, careless, seed, eye)
 
 
 @pytest.fixture
 def watched(env: APOReplay) -> Iterator[APOReplay]:
     """The same environment, its demonstrations shown once: for tests of what comes after them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(envs, "record_demonstration", demonstrated)
+        patch.setattr(envs, "simulate_demonstration", demonstrated)
         yield env
 
 
@@ -197,7 +197,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
 
     again: list[Observation] = []
     made = APOReplay("block_on_block", grasp="weld", noise="outliers", looks=2)
-    monkeypatch.setattr(envs, "record_demonstration", demonstrated)
+    monkeypatch.setattr(envs, "simulate_demonstration", demonstrated)
     corrected = apo_bench.Corrected(made, Asks())
     corrected.reset(seed=SEED)
     assert again[0].seen.tolist() == [False, bool(again[0].seen[1])]
@@ -210,8 +210,8 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
         made.look([0])
     corrected.reset(seed=SEED)
     np.testing.assert_array_equal(again[1].goals, again[0].goals)
-    recording = demonstrated(made._scene, 1.0, SEED, "noise")
-    look = looks_at(recording, make_noise("outliers", Level(1.0, 1.0)), SEED, 1)
+    simulated = demonstrated(made._scene, 1.0, SEED, "noise")
+    look = looks_at(simulated, make_noise("outliers", Level(1.0, 1.0)), SEED, 1)
     np.testing.assert_array_equal(look([1]).goals, again[0].goals)
 
 
@@ -345,7 +345,7 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
 ) -> None:
     import apo_bench.envs.apo_replay as module
 
-    real = module.record_demonstration
+    real = module.simulate_demonstration
     calls = []
 
     def fails_at_first(scene: Any, careless: float, seed: int, eye: str) -> Any:
@@ -355,7 +355,7 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
             return shown
         return replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
 
-    monkeypatch.setattr(module, "record_demonstration", fails_at_first)
+    monkeypatch.setattr(module, "simulate_demonstration", fails_at_first)
     _, info = watched.reset(seed=SEED)
     assert info["demonstration"] == "demonstration_failed"
     _, reward, terminated, _, info = watched.step(zeros(watched))
@@ -371,9 +371,9 @@ def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
 ) -> None:
     import apo_bench.envs.apo_replay as module
 
-    shown = module.record_demonstration(watched._scene, 1.0, SEED, "noise")
+    shown = module.simulate_demonstration(watched._scene, 1.0, SEED, "noise")
     failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
-    monkeypatch.setattr(module, "record_demonstration", lambda *_: failed)
+    monkeypatch.setattr(module, "simulate_demonstration", lambda *_: failed)
     with pytest.raises(InputError, match="demonstrations of 'stick_in_tower' in a row went wrong at carelessness"):
         watched.reset()
 

@@ -27,7 +27,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import Recording, observe_recording, stream
+from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, stream
 from tests import scenes
 
 NAMES = sorted(NOISES)
@@ -211,7 +211,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     n = len(scenario.assembly)
     demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
     scene: Any = SimpleNamespace(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
-    shown = Recording(Layout(layout.goals, layout.start), demonstration)
+    shown = SimulatedDemonstration(Layout(layout.goals, layout.start), demonstration)
     carried_out: list[Any] = []
 
     class Carried(Exception):
@@ -225,7 +225,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(trial, "predicted_outcome", lambda *_: "")  # which needs an arm
     spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
     with pytest.raises(Carried):
-        trial.run_trial(spec, scene, recording=shown, content="any")
+        trial.run_trial(spec, scene, simulated=shown, content="any")
     expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
     assert expected.seen.all()
     assert carried_out[0].goals.tobytes() == expected.goals.tobytes()
@@ -236,9 +236,9 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("name", NAMES)
 def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
-    shown = Recording(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
+    shown = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
     for seed in range(40):
-        seen = observe_recording(shown, make_noise(name, LEVEL), seed)
+        seen = observe_demonstration(shown, make_noise(name, LEVEL), seed)
         planned = apply_method("none", seen, CYCLE.goals)
         if seen.seen.all():
             assert planned.plan is not None

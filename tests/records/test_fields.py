@@ -73,11 +73,11 @@ def test_what_every_row_says_is_needed(name: str, made: list[dict[str, Any]]) ->
 
 def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     from apo_bench.trial import failed_row
-    from apo_bench.trial.stages import record_demonstration
+    from apo_bench.trial.stages import simulate_demonstration
 
     scene = build_scene(load_scenario("block_on_block"))
-    shown = record_demonstration(scene, SPEC.careless, SPEC.seed)
-    right = run_trial(SPEC, scene, recording=shown)
+    shown = simulate_demonstration(scene, SPEC.careless, SPEC.seed)
+    right = run_trial(SPEC, scene, simulated=shown)
     monkeypatch.setattr(failed_row, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
     mine = TrialSettings("block_on_block", method="mine:correct")
     row = failed_row.trial_row(mine, scene, shown, "0")

@@ -30,7 +30,7 @@ from apo_bench.statistics.rates import tally
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.fingerprint import spec_hash
-from apo_bench.trial.stages import ARM, OBSERVATION, observe_recording, record_demonstration, stream
+from apo_bench.trial.stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
 from tests import pages
 from tests.statistics.test_rates import row, write
 
@@ -66,12 +66,12 @@ def test_a_salt_makes_every_stream_another_one() -> None:
 
 def test_every_stage_draws_with_the_salt(tower: Scene) -> None:
     noise = make_noise("isotropic", Level(1.0, 1.0))
-    plain = record_demonstration(tower, 1.0, 3)
-    salted = record_demonstration(tower, 1.0, 3, salt=HERE)
+    plain = simulate_demonstration(tower, 1.0, 3)
+    salted = simulate_demonstration(tower, 1.0, 3, salt=HERE)
     assert not np.array_equal(plain.layout.goals, salted.layout.goals)
     off = [shown.demonstration.goals[1] - shown.layout.goals[1] for shown in (plain, salted)]
     assert not np.allclose(*off, rtol=0, atol=1e-5)
-    seen = [observe_recording(plain, noise, 3, salt) for salt in (None, HERE, THERE, HERE)]
+    seen = [observe_demonstration(plain, noise, 3, salt) for salt in (None, HERE, THERE, HERE)]
     assert not any(np.array_equal(seen[0].goals, other.goals) for other in seen[1:])
     np.testing.assert_array_equal(seen[1].goals, seen[3].goals)
     expected = noise(tower.scenario.assembly, plain.demonstration, stream(3, OBSERVATION, HERE))

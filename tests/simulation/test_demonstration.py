@@ -18,7 +18,7 @@ from apo_bench.simulation.human import demonstration
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot.paths import shifted, smooth
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 NAMES = scenario_names()
 CARELESS = sorted(name for name in NAMES if load_scenario(name).careless)
@@ -41,16 +41,16 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, careless: float, seed: int) -> Recording:
-    return record_demonstration(scene(name), careless, seed)
+def shown(name: str, careless: float, seed: int) -> SimulatedDemonstration:
+    return simulate_demonstration(scene(name), careless, seed)
 
 
-def off_mm(of: Recording) -> Array:
+def off_mm(of: SimulatedDemonstration) -> Array:
     """How far each shown goal is from the truth, (n, 3), world."""
     return 1e3 * (of.demonstration.goals - of.layout.goals)[:, :3, 3]
 
 
-def end_mm(of: Recording, part: str) -> Array:
+def end_mm(of: SimulatedDemonstration, part: str) -> Array:
     """How far a part ends from where it should be, (3,), world."""
     human = of.demonstration
     true = placements(human.assembly, of.layout.start, of.layout.goals)[-1][part]
@@ -106,8 +106,8 @@ def test_cubes_hang_on_the_stick_and_land_in_their_pockets():
 def test_a_group_leaves_nothing_behind_for_the_next_trial():
     """Where a hand holds a carried part is written into the shared model; the next trial must not see it."""
     first = shown("pocket_table", 1.0, 2).demonstration
-    record_demonstration(scene("pocket_table"), 0.0, 5)
-    again = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
+    simulate_demonstration(scene("pocket_table"), 0.0, 5)
+    again = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
     np.testing.assert_array_equal(first.goals, again.goals)
     for part, T in first.final.items():
         np.testing.assert_array_equal(T, again.final[part])
@@ -118,7 +118,7 @@ def test_what_is_left_out_and_what_sleeps_changes_micrometres(monkeypatch: pytes
     quick = shown("pocket_table", 1.0, 2).demonstration
     monkeypatch.setattr(Hands, "_spans", lambda self, hand, line, n: [(0, n)])
     monkeypatch.setattr(demonstration, "sleeping", lambda world, allowed: nullcontext())
-    whole = record_demonstration(scene("pocket_table"), 1.0, 2).demonstration
+    whole = simulate_demonstration(scene("pocket_table"), 1.0, 2).demonstration
     pairs = [*zip(whole.goals, quick.goals, strict=True), *((T, quick.final[part]) for part, T in whole.final.items())]
     off = np.array([pose.log(pose.inverse(a) @ b) for a, b in pairs])
     assert np.abs(off[:, :3]).max() < 5e-6
@@ -222,6 +222,6 @@ yaw_deg = [-20, 20]
 def test_a_stick_is_pulled_out_and_a_group_put_against_a_side(tmp_path: Path):
     path = tmp_path / "own.toml"
     path.write_text(OWN)
-    of = record_demonstration(build_scene(load_scenario(path)), 0.0, 0)
+    of = simulate_demonstration(build_scene(load_scenario(path)), 0.0, 0)
     assert of.demonstration.code == "ok"
     assert np.abs(off_mm(of)[:, :2]).max() < LEVEL_MM

@@ -23,7 +23,7 @@ from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, 
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
-from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial
 
 
@@ -34,7 +34,7 @@ def _scene(name, grasp):
 
 @cache
 def _shown(name, grasp, seed, careless):
-    return record_demonstration(scene(name, grasp), careless, seed)
+    return simulate_demonstration(scene(name, grasp), careless, seed)
 
 
 def scene(name="stick_in_tower", grasp="friction"):
@@ -47,7 +47,7 @@ def shown(name="stick_in_tower", grasp="friction", seed=1, careless=1.0):
 
 def row(method, fidelity, *, grasp="friction", level=1.0, cache=None):
     spec = TrialSettings("stick_in_tower", level, level, grasp=grasp, method=method, seed=1, fidelity=fidelity)
-    return json.dumps(run_trial(spec, scene(grasp=grasp), recording=shown(grasp=grasp), cache=cache))
+    return json.dumps(run_trial(spec, scene(grasp=grasp), simulated=shown(grasp=grasp), cache=cache))
 
 
 ASKED = [("paper-track", 1.0), ("none", 1.0), ("paper", 1.0), ("paper", 0.5), ("paper-track", 1.0)]

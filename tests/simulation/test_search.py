@@ -14,7 +14,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
 from apo_bench.simulation.robot.robot import Guard, Robot
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.stages import record_demonstration, replay_and_judge
+from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 
 STEP_S = 0.001
@@ -28,7 +28,7 @@ def scene(name):
 
 @cache
 def shown(name):
-    return record_demonstration(scene(name), 0.0, 1)
+    return simulate_demonstration(scene(name), 0.0, 1)
 
 
 def layout(name):
@@ -79,7 +79,7 @@ def test_what_is_farther_off_than_the_spiral_is_not_found():
 
 def row(method, level, cache=None):
     spec = TrialSettings("stick_in_tower", level, level, careless=0.0, method=method, seed=1, fidelity="contact")
-    return run_trial(spec, scene("stick_in_tower"), recording=shown("stick_in_tower"), cache=cache)
+    return run_trial(spec, scene("stick_in_tower"), simulated=shown("stick_in_tower"), cache=cache)
 
 
 def test_where_no_hole_is_missed_nothing_changes():

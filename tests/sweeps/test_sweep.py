@@ -54,10 +54,10 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 
-    def run_trial(spec: Any, scene: Any, *, recording: str, content: str, method: Any, cache: Any) -> dict[str, Any]:
+    def run_trial(spec: Any, scene: Any, *, simulated: str, content: str, method: Any, cache: Any) -> dict[str, Any]:
         did["trial"] += 1
         assert method == spec.method
-        assert recording == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
+        assert simulated == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         key = trial_key(spec, scene.scenario.name)
         hashed = spec_hash(spec, content)
         success = spec.seed % 2 == 0
@@ -70,7 +70,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     monkeypatch.setattr("apo_bench.sweeps.grid.load_scenario", LOAD)
     monkeypatch.setattr(failed_row, "load_scenario", LOAD)
     monkeypatch.setattr(worker, "scene_of", compiled)
-    monkeypatch.setattr(worker, "record_demonstration", record)
+    monkeypatch.setattr(worker, "simulate_demonstration", record)
     monkeypatch.setattr(failed_row, "run_trial", run_trial)
     return did
 

@@ -19,7 +19,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
-from apo_bench.trial.stages import record_demonstration
+from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial
 
 HOPELESS = 40.0
@@ -32,9 +32,9 @@ def scene() -> Scene:
 
 
 def test_a_demonstration_is_the_same_after_others(scene: Scene) -> None:
-    first = record_demonstration(scene, 1.0, 4)
-    other = record_demonstration(scene, 1.0, 5)
-    again = record_demonstration(scene, 1.0, 4)
+    first = simulate_demonstration(scene, 1.0, 4)
+    other = simulate_demonstration(scene, 1.0, 5)
+    again = simulate_demonstration(scene, 1.0, 4)
     assert not np.array_equal(first.demonstration.goals, other.demonstration.goals)
     np.testing.assert_array_equal(first.layout.goals, again.layout.goals)
     np.testing.assert_array_equal(first.demonstration.goals, again.demonstration.goals)
@@ -43,18 +43,18 @@ def test_a_demonstration_is_the_same_after_others(scene: Scene) -> None:
 
 
 def test_layout_and_hand_do_not_depend_on_carelessness(scene: Scene) -> None:
-    careful = record_demonstration(scene, 0.0, 4)
-    careless = record_demonstration(scene, 1.0, 4)
+    careful = simulate_demonstration(scene, 0.0, 4)
+    careless = simulate_demonstration(scene, 1.0, 4)
     np.testing.assert_array_equal(careful.layout.goals, careless.layout.goals)
     np.testing.assert_array_equal(careful.demonstration.goals[0], careless.demonstration.goals[0])
 
 
 def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> None:
     spec = TrialSettings("stick_on_castles", grasp="weld", method="paper", seed=3)
-    shown = record_demonstration(scene, 1.0, 3)
-    first = run_trial(spec, scene, recording=shown)
+    shown = simulate_demonstration(scene, 1.0, 3)
+    first = run_trial(spec, scene, simulated=shown)
     assert first["sim_seconds"] > 1.0
-    assert run_trial(spec, scene, recording=shown) == first
+    assert run_trial(spec, scene, simulated=shown) == first
     assert run_trial(spec, build_scene(load_scenario("stick_on_castles"), grasp="weld")) == first
 
 

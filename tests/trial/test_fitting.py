@@ -24,7 +24,7 @@ from apo_bench.simulation.execution.prepare import in_reach
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.fitting import FittingPlan, fitting_plan
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import observe_recording, record_demonstration
+from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 
 plain = ContactCorrector(compiled=False)
@@ -39,8 +39,8 @@ def scene_named(name: str) -> Scene:
 
 @cache
 def seen_at(name: str, seed: int, level: float = 8.0) -> Observation:
-    recording = record_demonstration(scene_named(name), 0.0, seed)
-    return observe_recording(recording, make_noise("isotropic", Level(level, level)), seed)
+    simulated = simulate_demonstration(scene_named(name), 0.0, seed)
+    return observe_demonstration(simulated, make_noise("isotropic", Level(level, level)), seed)
 
 
 def foretold(plan: Plan, scene: Scene) -> Prediction:

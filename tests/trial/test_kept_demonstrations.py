@@ -23,7 +23,7 @@ from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial import kept_demonstrations
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, decides, demonstration_key
 from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import Recording
+from apo_bench.trial.stages import SimulatedDemonstration
 from tests.trial.test_code_version import PACKAGE, reached
 
 SPEC = TrialSettings("block_on_block", seed=7, careless=1.0)
@@ -37,21 +37,21 @@ def scene() -> Scene:
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The seeds of the demonstrations that were simulated, one entry each."""
-    made = kept_demonstrations.record_demonstration
+    made = kept_demonstrations.simulate_demonstration
     seeds = list[int]()
 
-    def counted(scene: Scene, careless: float, seed: int, *more: Any) -> Recording:
+    def counted(scene: Scene, careless: float, seed: int, *more: Any) -> SimulatedDemonstration:
         seeds.append(seed)
         return made(scene, careless, seed, *more)
 
-    monkeypatch.setattr(kept_demonstrations, "record_demonstration", counted)
+    monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", counted)
     return seeds
 
 
-def content(recording: Recording) -> list[Any]:
-    """All of a recording but the assembly; poses as bytes, parts in their order."""
-    human = recording.demonstration
-    layout = recording.layout
+def content(simulated: SimulatedDemonstration) -> list[Any]:
+    """All of a simulated demonstration but the assembly; poses as bytes, parts in their order."""
+    human = simulated.demonstration
+    layout = simulated.layout
     arrays = [layout.goals, human.goals, human.careless]
     named = [[(part, T.tobytes()) for part, T in poses.items()] for poses in (layout.start, human.start, human.final)]
     return [*(a.tobytes() for a in arrays), *named, human.code, human.why, human.gap_m, human.play_m]
@@ -59,7 +59,7 @@ def content(recording: Recording) -> list[Any]:
 
 def test_what_is_read_is_what_was_made(tmp_path: Path, once: list[int]) -> None:
     kept = KeptDemonstrations(tmp_path / "new" / "folder")
-    made, read = (kept.recording(SPEC, scene()) for _ in range(2))
+    made, read = (kept.simulated(SPEC, scene()) for _ in range(2))
     assert once == [7]
     assert content(read) == content(made)
     assert read.demonstration.assembly is scene().scenario.assembly
@@ -67,12 +67,12 @@ def test_what_is_read_is_what_was_made(tmp_path: Path, once: list[int]) -> None:
 
 
 def test_a_demonstration_that_failed_is_kept_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = kept_demonstrations.record_demonstration(scene(), 1.0, 7)
+    made = kept_demonstrations.simulate_demonstration(scene(), 1.0, 7)
     failed = replace(made.demonstration, code="demonstration_failed", why="a gap (castle.px on table.top)")
-    monkeypatch.setattr(kept_demonstrations, "record_demonstration", lambda *_: replace(made, demonstration=failed))
+    monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", lambda *_: replace(made, demonstration=failed))
     kept = KeptDemonstrations(tmp_path)
-    assert content(kept.recording(SPEC, scene())) == content(kept.recording(SPEC, scene()))
-    assert kept.recording(SPEC, scene()).demonstration.why == "a gap (castle.px on table.top)"
+    assert content(kept.simulated(SPEC, scene())) == content(kept.simulated(SPEC, scene()))
+    assert kept.simulated(SPEC, scene()).demonstration.why == "a gap (castle.px on table.top)"
 
 
 def edited(change: Callable[[dict[str, Any]], None]) -> Callable[[Path], None]:
@@ -125,15 +125,15 @@ def test_a_damaged_file_is_one_sentence_and_is_made_again(
     tmp_path: Path, once: list[int], capsys: pytest.CaptureFixture[str], spoil: Callable[[Path], None], said: str
 ) -> None:
     kept = KeptDemonstrations(tmp_path)
-    good = content(kept.recording(SPEC, scene()))
+    good = content(kept.simulated(SPEC, scene()))
     [path] = tmp_path.iterdir()
     spoil(path)
-    assert content(kept.recording(SPEC, scene())) == good
+    assert content(kept.simulated(SPEC, scene())) == good
     complaint = capsys.readouterr().err
     assert said in complaint
     assert complaint.endswith("; the demonstration is made again.\n")
     assert complaint.count("\n") == 1
-    assert content(kept.recording(SPEC, scene())) == good
+    assert content(kept.simulated(SPEC, scene())) == good
     assert once == [7, 7], "the file is whole again"
     assert list(tmp_path.iterdir()) == [path], "nothing else is left"
 
@@ -142,11 +142,11 @@ def test_a_file_of_another_user_is_not_read(
     tmp_path: Path, once: list[int], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept = KeptDemonstrations(tmp_path)
-    good = content(kept.recording(SPEC, scene()))
+    good = content(kept.simulated(SPEC, scene()))
     [path] = tmp_path.iterdir()
     signed(moved)(path)
     monkeypatch.setattr(os, "geteuid", lambda: path.stat().st_uid + 1)
-    assert content(kept.recording(SPEC, scene())) == good
+    assert content(kept.simulated(SPEC, scene())) == good
     assert "belongs to another user; the demonstration is made again." in capsys.readouterr().err
     assert once == [7, 7]
 
@@ -159,10 +159,10 @@ def moved(said: dict[str, Any]) -> None:
 def test_own_files_are_trusted_as_the_guide_says(tmp_path: Path) -> None:
     """A digest that was computed again fits: whoever writes as this user decides the truth."""
     kept = KeptDemonstrations(tmp_path)
-    good = kept.recording(SPEC, scene())
+    good = kept.simulated(SPEC, scene())
     [path] = tmp_path.iterdir()
     signed(moved)(path)
-    off = kept.recording(SPEC, scene()).layout.goals - good.layout.goals
+    off = kept.simulated(SPEC, scene()).layout.goals - good.layout.goals
     assert off[0, 0, 3] == pytest.approx(0.02)
     guide = (PACKAGE.parent / "docs" / "guide" / "sweeps.md").read_text()
     assert "the folder is trusted: its digests find damage, not intent." in guide
@@ -172,14 +172,14 @@ def test_own_files_are_trusted_as_the_guide_says(tmp_path: Path) -> None:
 def test_what_cannot_be_kept_is_used_all_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = KeptDemonstrations(tmp_path / "gone")
     kept.folder.rmdir()
-    assert kept.recording(SPEC, scene()).demonstration.code == "ok"
+    assert kept.simulated(SPEC, scene()).demonstration.code == "ok"
     assert "the demonstration cannot be kept (No such file or directory)." in capsys.readouterr().err
 
 
 def test_what_stands_in_the_way_of_a_file_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = KeptDemonstrations(tmp_path)
     (tmp_path / f"{demonstration_key(SPEC, scene())}.json").mkdir()
-    assert kept.recording(SPEC, scene()).demonstration.code == "ok"
+    assert kept.simulated(SPEC, scene()).demonstration.code == "ok"
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1
     assert complaint.endswith("the demonstration is made again, and cannot be kept (Is a directory).\n")
@@ -220,8 +220,8 @@ def test_all_code_that_a_demonstration_runs_through_is_in_the_key() -> None:
 
 
 def test_what_a_range_finder_records_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept_demonstrations, "record_demonstration", lambda *asked: asked[3])
-    assert KeptDemonstrations(tmp_path).recording(replace(SPEC, eye=RANGE, noise=RANGE), scene()) == RANGE  # type: ignore[comparison-overlap]
+    monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", lambda *asked: asked[3])
+    assert KeptDemonstrations(tmp_path).simulated(replace(SPEC, eye=RANGE, noise=RANGE), scene()) == RANGE  # type: ignore[comparison-overlap]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -230,10 +230,10 @@ def test_rows_are_the_same_bytes_with_and_without(tmp_path: Path, monkeypatch: p
     rows = []
     for out, folder in (("plain", None), ("first", tmp_path / "kept"), ("again", tmp_path / "kept")):
         if out == "again":
-            monkeypatch.setattr(kept_demonstrations, "record_demonstration", lambda *_: pytest.fail("made again"))
+            monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", lambda *_: pytest.fail("made again"))
         run_sweep(grid, tmp_path / out, cache=folder)
         rows.append((tmp_path / out / "trials.jsonl").read_bytes())
-        monkeypatch.setattr(worker, "record_demonstration", lambda *_: pytest.fail("the cache was not asked"))
+        monkeypatch.setattr(worker, "simulate_demonstration", lambda *_: pytest.fail("the cache was not asked"))
     assert rows[0] == rows[1] == rows[2]
     assert len(list((tmp_path / "kept").iterdir())) == 2
 

@@ -20,7 +20,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.recognition import recognitions
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 from tests import pages
 from tests.statistics.test_rates import UNCOUNTED
@@ -35,8 +35,8 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def shown(scene: Scene) -> Recording:
-    return record_demonstration(scene, 0.0, 4)
+def shown(scene: Scene) -> SimulatedDemonstration:
+    return simulate_demonstration(scene, 0.0, 4)
 
 
 def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) -> dict[str, Any]:
@@ -48,21 +48,25 @@ def row(relations: str, method: str = "contact", seed: int = 0, **changes: Any) 
 
 
 @pytest.mark.parametrize("relations", RECOGNISED)
-def test_a_trial_says_how_many_contacts_were_recognised(scene: Scene, shown: Recording, relations: str) -> None:
-    made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, recording=shown)
+def test_a_trial_says_how_many_contacts_were_recognised(
+    scene: Scene, shown: SimulatedDemonstration, relations: str
+) -> None:
+    made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, simulated=shown)
     assert made["success"] is True
     assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == (2, 0, 0)
     assert (made["relations"], made["wrong_relation"]) == (relations, None)
 
 
-def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: Recording) -> None:
-    made = run_trial(TrialSettings(**(asdict(SPEC) | {"method": "none"})), scene, recording=shown)
+def test_a_method_that_is_told_no_relations_has_none_counted(scene: Scene, shown: SimulatedDemonstration) -> None:
+    made = run_trial(TrialSettings(**(asdict(SPEC) | {"method": "none"})), scene, simulated=shown)
     assert {name: made[name] for name in UNCOUNTED} == dict(UNCOUNTED)
 
 
-def test_missed_and_false_relations_are_counted_like_recognised_ones(scene: Scene, shown: Recording) -> None:
+def test_missed_and_false_relations_are_counted_like_recognised_ones(
+    scene: Scene, shown: SimulatedDemonstration
+) -> None:
     for relations, counts in (("missed", (1, 1, 0)), ("false", (2, 0, 1)), ("given", (2, 0, 0))):
-        made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, recording=shown)
+        made = run_trial(TrialSettings(**(asdict(SPEC) | {"relations": relations})), scene, simulated=shown)
         assert (made["contacts_right"], made["contacts_missed"], made["contacts_false"]) == counts
 
 

@@ -24,7 +24,7 @@ from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import Recording, record_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 from tests.benchmarks.test_headline import fidelity, kept_rows, key
 
@@ -87,14 +87,14 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def shown(name: str, careless: float, seed: int) -> Recording:
+def shown(name: str, careless: float, seed: int) -> SimulatedDemonstration:
     """The demonstration that methods share, as in a sweep."""
-    return record_demonstration(scene(name), careless, seed)
+    return simulate_demonstration(scene(name), careless, seed)
 
 
 def trial(name: str, method: str, seed: int, cache: ReplayCache | None = None) -> Row:
     asked = spec(name, method, seed)
-    return run_trial(asked, scene(name), recording=shown(name, asked.careless, seed), cache=cache)
+    return run_trial(asked, scene(name), simulated=shown(name, asked.careless, seed), cache=cache)
 
 
 class Ended(NamedTuple):

@@ -26,7 +26,7 @@ from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial import stages
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import Recording, observe_recording, record_demonstration, stream
+from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration, stream
 from apo_bench.trial.trial import nominal_where_seen, run_measured, run_trial
 
 SPEC = TrialSettings("stick_in_tower", grasp="weld", method="none", seed=5)
@@ -63,13 +63,13 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def shown(scene: Scene) -> Recording:
-    return record_demonstration(scene, 1.0, SPEC.seed)
+def shown(scene: Scene) -> SimulatedDemonstration:
+    return simulate_demonstration(scene, 1.0, SPEC.seed)
 
 
 @pytest.fixture(scope="module")
-def rows(scene: Scene, shown: Recording) -> dict[str, dict[str, Any]]:
-    return {m: run_trial(replace(SPEC, method=m), scene, recording=shown) for m in ("oracle", "none", "paper")}
+def rows(scene: Scene, shown: SimulatedDemonstration) -> dict[str, dict[str, Any]]:
+    return {m: run_trial(replace(SPEC, method=m), scene, simulated=shown) for m in ("oracle", "none", "paper")}
 
 
 def refuses(seen: Observation) -> Correction:
@@ -131,7 +131,9 @@ def test_the_row_says_what_was_foretold(rows: dict[str, dict[str, Any]]) -> None
     assert [rows[method]["extra_operations"] for method in rows] == [0, 0, 0]
 
 
-def test_a_schedule_is_carried_out_and_counted(scene: Scene, shown: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_schedule_is_carried_out_and_counted(
+    scene: Scene, shown: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen = observed(scene, shown)
     made = rebuilds(seen)
     planned = apply_method(rebuilds, seen, None).plan
@@ -139,7 +141,7 @@ def test_a_schedule_is_carried_out_and_counted(scene: Scene, shown: Recording, m
     assert planned.schedule == made.schedule
     np.testing.assert_array_equal(planned.targets, made.targets)
     monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method, look: made)
-    row = run_trial(replace(SPEC, method="paper"), scene, recording=shown)
+    row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert row["tried"] == [
         {"step": 3, "free": [3], "gap_mm": pytest.approx(1.5)},
         {"step": 3, "free": [3, 2], "gap_mm": pytest.approx(0.01)},
@@ -171,10 +173,10 @@ def doubts(seen: Observation) -> Correction:
 
 
 def test_the_row_says_what_the_correction_says_of_itself(
-    scene: Scene, shown: Recording, monkeypatch: pytest.MonkeyPatch, rows: dict[str, dict[str, Any]]
+    scene: Scene, shown: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch, rows: dict[str, dict[str, Any]]
 ) -> None:
     monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method, look: doubts(seen))
-    row = run_trial(replace(SPEC, method="paper"), scene, recording=shown)
+    row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["chi_square"], row["chi_square_freedom"], row["p_value"]) == (30.0, 5, 1e-5)
     assert (row["test_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
     for method in ("oracle", "none", "paper"):
@@ -190,14 +192,14 @@ def test_the_row_says_how_far_the_plan_is_from_the_truth(rows: dict[str, dict[st
     assert rows["paper"]["planned_error_free_mm"] > 0.5
 
 
-def test_wrong_relations_are_told_and_noted(scene: Scene, shown: Recording) -> None:
+def test_wrong_relations_are_told_and_noted(scene: Scene, shown: SimulatedDemonstration) -> None:
     """Correctors meet them, nothing else does; robot and judge keep the right ones."""
     kinds = ("given", "missed", "false", "shifted:3")
-    told = {k: run_trial(replace(SPEC, method="paper", relations=k), scene, recording=shown) for k in kinds}
+    told = {k: run_trial(replace(SPEC, method="paper", relations=k), scene, simulated=shown) for k in kinds}
     assert [told[k]["relations"] for k in kinds] == list(kinds)
     assert [told[k]["wrong_relation"] is None for k in kinds] == [True, True, False, False]
     assert told["shifted:3"]["success"] is False
-    raw = [run_trial(replace(SPEC, relations=k), scene, recording=shown) for k in ("given", "shifted:3")]
+    raw = [run_trial(replace(SPEC, relations=k), scene, simulated=shown) for k in ("given", "shifted:3")]
     apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
     assert apart == {"relations", "spec_hash"}
 
@@ -254,7 +256,7 @@ def test_the_content_hash_follows_every_file(scene: Scene, tmp_path: Path) -> No
     assert len(hashes) == 7
 
 
-def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown: Recording) -> None:
+def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown: SimulatedDemonstration) -> None:
     planned = apply_method(refuses, observed(scene, shown), shown.layout.goals)
     assert planned.plan is None
     assert planned.failure is not None
@@ -263,7 +265,7 @@ def test_a_correction_that_does_not_converge_is_not_executed(scene: Scene, shown
     assert planned.correction.freed == (2, 1)
 
 
-def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: Recording) -> None:
+def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: SimulatedDemonstration) -> None:
     seen = replace(observed(scene, shown), seen=np.array([True, False, True]))
     raw = apply_method("none", seen, shown.layout.goals)
     assert raw.plan is None
@@ -276,10 +278,10 @@ def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: Recordi
 
 
 def test_a_row_without_replay_is_a_failure_with_null_physics(
-    scene: Scene, shown: Recording, monkeypatch: pytest.MonkeyPatch
+    scene: Scene, shown: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method, look: refuses(seen))
-    row = run_trial(replace(SPEC, method="paper"), scene, recording=shown)
+    row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
     assert (row["freed"], row["gap_after_mm"]) == ([3, 2], None)
     assert row["tried"] == [{"step": 3, "free": [3], "gap_mm": None}]
@@ -287,16 +289,16 @@ def test_a_row_without_replay_is_a_failure_with_null_physics(
     assert row["reached"] is row["sim_seconds"] is row["conditions"] is None
 
 
-def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: Recording) -> None:
-    failed = Recording(shown.layout, replace(shown.demonstration, code="demonstration_failed"))
-    rows = [run_trial(replace(SPEC, method=m), scene, recording=failed) for m in ("oracle", "none", "paper")]
+def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: SimulatedDemonstration) -> None:
+    failed = SimulatedDemonstration(shown.layout, replace(shown.demonstration, code="demonstration_failed"))
+    rows = [run_trial(replace(SPEC, method=m), scene, simulated=failed) for m in ("oracle", "none", "paper")]
     for row in rows:
         assert row["demonstration"] == "demonstration_failed"
         assert row["success"] is row["loose_success"] is None
         assert row["failure_stage"] == "demonstrate"
 
 
-def test_noise_reaches_the_robot(scene: Scene, shown: Recording) -> None:
+def test_noise_reaches_the_robot(scene: Scene, shown: SimulatedDemonstration) -> None:
     """Level 0 replays exactly what was shown; other levels scale the same draws."""
     goals = {L: observed(scene, shown, L).goals for L in (0.0, 1.0, 2.0)}
     np.testing.assert_array_equal(goals[0.0], shown.demonstration.goals)
@@ -315,7 +317,7 @@ def test_streams_are_apart_and_the_key_is_seed_and_stage() -> None:
     assert (stages.LAYOUT, stages.DEMONSTRATION, stages.OBSERVATION, stages.ARM) == (0, 1, 2, 3)
 
 
-def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: Recording) -> None:
+def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: SimulatedDemonstration) -> None:
     """The truth varies: a corrector that knows the scenario by heart builds it elsewhere on the table."""
     planned = apply_method(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
     assert planned.plan is not None
@@ -324,13 +326,13 @@ def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: 
     assert (verdict.as_demonstrated, verdict.demonstrated.code) == (False, "overlap")
 
 
-def test_a_measured_observation_is_judged_where_it_was_seen(scene: Scene, shown: Recording) -> None:
+def test_a_measured_observation_is_judged_where_it_was_seen(scene: Scene, shown: SimulatedDemonstration) -> None:
     seen = observed(scene, shown)
     row = run_measured(replace(SPEC, method="paper"), scene, seen, "text of the file")
     assert row["success"] is True
 
 
-def test_a_measured_observation_has_no_truth(scene: Scene, shown: Recording) -> None:
+def test_a_measured_observation_has_no_truth(scene: Scene, shown: SimulatedDemonstration) -> None:
     seen = observed(scene, shown, 40.0)
     row = run_measured(replace(SPEC, method="none"), scene, seen, "text of the file")
     assert (row["level"], row["careless"], row["noise"], row["demonstration"]) == (None, None, "measured", "ok")
@@ -340,7 +342,7 @@ def test_a_measured_observation_has_no_truth(scene: Scene, shown: Recording) -> 
         run_measured(replace(SPEC, method="oracle"), scene, seen, "")
 
 
-def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown: Recording) -> None:
+def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown: SimulatedDemonstration) -> None:
     layout = shown.layout.goals
     nominal = scene.scenario.goals
     exact = replace(observed(scene, shown), goals=layout)
@@ -395,5 +397,5 @@ def test_only_shifted_relations_have_a_size(relations: str) -> None:
         TrialSettings("stick_in_tower", relations=relations)
 
 
-def observed(scene: Scene, shown: Recording, level: float = 1.0) -> Observation:
-    return observe_recording(shown, make_noise("isotropic", Level(level, level)), SPEC.seed)
+def observed(scene: Scene, shown: SimulatedDemonstration, level: float = 1.0) -> Observation:
+    return observe_demonstration(shown, make_noise("isotropic", Level(level, level)), SPEC.seed)
