@@ -86,6 +86,29 @@ def test_what_is_wrong_with_a_log_is_one_sentence(what: str, tmp_path: Path) -> 
     assert str(found.value).endswith(".")
 
 
+def test_columns_are_known_by_their_names_however_they_are_written(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(" T_S , Id,X_MM,y_mm, Z_mm,QW,Qx,qy,qz\n" + ROW, encoding="utf-8")
+    track = read_log(tmp_path / "log.csv", "csv", Conventions()).tracks["a"]
+    assert np.allclose(track.T[0, :3, 3], [0.0, 0.0, 0.9])
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("1 0 0 0.9 0 0 0 1 7", "line 2: timestamp tx ty tz qx qy qz qw are needed, 9 words were given"),
+        ("1 0 0 0.9 0 0 0", "line 2: timestamp tx ty tz qx qy qz qw are needed, 7 words were given"),
+        ("1 0 0 0.9 0 0 1 1", "line 2: a quaternion of length 1 is needed, one of length 1.414"),
+        ("1 0 0 x 0 0 0 1", "line 2: a finite number is needed, 'x' was given"),
+        ("", "no pose stands in the file"),
+    ],
+)
+def test_what_is_wrong_with_a_line_of_tum_is_one_sentence(line: str, sentence: str, tmp_path: Path) -> None:
+    (tmp_path / "log.txt").write_text(f"# timestamp tx ty tz qx qy qz qw\n{line}\n", encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        read_log(tmp_path / "log.txt", "tum", Conventions())
+    assert sentence in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("renamed", "sentence"),
     [
